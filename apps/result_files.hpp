@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <filesystem>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -57,7 +58,7 @@ inline constexpr const char* kJournal = "run.journal";
 inline constexpr const char* kDamaged = ".damaged";
 
 /// The map of such a run.
-inline constexpr const char* kMap = "run.map";
+inline constexpr const char* kMapFile = "run.map";
 
 /// Record for viewers. A resumed run continues in record_2.mcap, and so on.
 inline constexpr const char* kRecord = "record.mcap";
@@ -98,6 +99,18 @@ inline constexpr const char* kRecord = "record.mcap";
 /// Reserve room for results that are written at the end; removed then.
 inline constexpr const char* kTrajectoryRoom = ".room_for_trajectories";
 inline constexpr const char* kSummaryRoom = ".room_for_summary";
+
+/// Throws std::runtime_error if `folder` has neither summary nor journal, but a file with the name
+/// of a result: no run has written this file, so none may replace it.
+inline void expect_no_other_files(const std::filesystem::path& folder) {
+  if (is_file(folder / kSummary) || is_file(folder / kJournal)) return;
+  for (const std::string file : kResultFiles)
+    // A run that has just begun has this file before its journal.
+    if (file != "config.yaml" && is_file(folder / file))
+      throw std::runtime_error((folder / file).string() +
+                               ": would be replaced, and is of no run, because the folder has no " +
+                               kSummary + "; choose another folder for the results");
+}
 
 /// Removes a robot's results from `folder`, except for its journal and map, so that those of an
 /// earlier run are not mistaken for those of one that fails. If the run continues (`continues`),

@@ -154,6 +154,10 @@ std::string YamlFields::decode(const YAML::Node& node, bool& value, AnyValue /*a
 }
 
 std::string YamlFields::decode(const YAML::Node& node, std::string& value, AnyValue /*accepted*/) {
+  if (node.IsNull()) {  // nothing stands after the key
+    value.clear();
+    return {};
+  }
   return YAML::convert<std::string>::decode(node, value) ? "" : "is not a text";
 }
 

@@ -59,7 +59,7 @@ void MeshFilesNode::step(const Trajectory& trajectory) {
 
 void MeshFilesNode::step(const MapMesh& map) {
   write_map(map.mesh);
-  results_.write(folder_ / kMap, [&map](const auto& file) { write_map_file(file, map); });
+  results_.write(folder_ / kMapFile, [&map](const auto& file) { write_map_file(file, map); });
 }
 
 void MeshFilesNode::step(const OptimizedMesh& mesh) {

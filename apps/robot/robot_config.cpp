@@ -50,6 +50,8 @@ fs::path find_shipped_file(const std::string& name) {
   for (const fs::path& place : places) {
     if (is_file(place)) return place;
     tried += "\n  " + place.lexically_normal().string();
+    if (fs::is_directory(place)) tried += " (a folder)";
+    if (place.is_absolute() && place == name) break;
   }
   throw ConfigError("no file " + name + "; looked for" + tried);
 }

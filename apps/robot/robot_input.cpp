@@ -78,7 +78,7 @@ std::optional<RestoredRun> restore(const RobotOptions& options, const std::strin
 
 // The map of the former process; nullopt if the file is missing or damaged.
 std::optional<ResumedMap> restore_map(const fs::path& folder, const RestoredRun& run) try {
-  const fs::path file = folder / kMap;
+  const fs::path file = folder / kMapFile;
   if (is_absent(file)) return std::nullopt;
   return ResumedMap(read_map_file(file), static_cast<KeyframeIndex>(run.keyframes.size()));
 } catch (const InputFileError& error) {

@@ -67,18 +67,19 @@ void make_output(const fs::path& folder) {
 
 // Call when all inputs of the run have been checked, because earlier results are removed.
 void remove_former(const fs::path& folder, bool continues, bool resume) {
+  if (!resume) expect_no_other_files(folder);
   if (!resume && is_file(folder / kSummary))
     log::info("robot") << folder.string() << ": the results of an earlier run are replaced";
   remove_results(folder, continues);
   if (resume) return;
-  for (const char* file : {kJournal, kMap}) fs::remove(folder / file);
+  for (const char* file : {kJournal, kMapFile}) fs::remove(folder / file);
 }
 
 // The journal and the map of the run to extend, if this process begins to do so, as the beginning
 // of this run.
 void copy_extended(const RobotOptions& options) {
   if (options.extend.empty() || options.resume) return;
-  for (const char* file : {kJournal, kMap})
+  for (const char* file : {kJournal, kMapFile})
     if (is_file(options.extend / file)) fs::copy_file(options.extend / file, options.output / file);
 }
 

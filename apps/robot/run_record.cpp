@@ -231,8 +231,10 @@ std::map<RobotId, ClosureCounts> RunRecord::closures_per_peer() const {
   for (const auto& [id, outcome] : outcomes_) {
     ClosureCounts& counts = result[id.from.robot == robot_ ? id.to.robot : id.from.robot];
     ++counts.candidates;
-    counts.verified += outcome.stage >= ClosureStage::kVerified ? 1 : 0;
-    counts.inliers += is_inlier(id) ? 1 : 0;
+    // The peer may have verified a pair that this robot did not.
+    const bool is_verified = outcome.stage >= ClosureStage::kVerified;
+    counts.verified += is_verified ? 1 : 0;
+    counts.inliers += is_verified && is_inlier(id) ? 1 : 0;
   }
   return result;
 }

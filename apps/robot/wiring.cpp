@@ -60,6 +60,12 @@ std::optional<Camera> left_camera_of(const RobotInput& input) {
   return reader != nullptr ? std::optional((*reader)->rig().stereo.cameras[0]) : std::nullopt;
 }
 
+std::filesystem::path network_file(const char* key, const std::string& name) try {
+  return find_shipped_file(name);
+} catch (const ConfigError& error) {
+  throw ConfigError(std::string(key) + ": " + error.what());
+}
+
 std::optional<KeyframeId> keyframe_of(const KeyframeReply& reply) {
   return reply.found ? std::optional(reply.keyframe.odometry.id) : std::nullopt;
 }
@@ -211,10 +217,10 @@ void Robot::add_sensing(const RobotConfig& config, double rate,
   if (mapping) add_mapping(config, rate, rig.stereo, *mapping, std::move(map));
   std::optional<ImageDescriber> describer;
   if (const std::string& network = config.place_recognition.network; !network.empty())
-    describer.emplace(find_shipped_file(network));
+    describer.emplace(network_file("place_recognition.network", network));
   std::optional<KeypointDescriber> keypoint_describer;
   if (const std::string& network = config.keyframe_features.network; !network.empty())
-    keypoint_describer.emplace(find_shipped_file(network));
+    keypoint_describer.emplace(network_file("keyframe_features.network", network));
   auto& features =
       add<KeyframeFeaturesNode>(true, config.keyframe_features, rig.stereo,
                                 KeyframeFeaturesTopics{.odometry = topics_.keyframe_odometry,

@@ -209,19 +209,33 @@ std::string mesh_table(const TeamMeshes& meshes) {
 }
 
 // Empty unless processors were too slow for the rate.
+std::string percent(double part, double rest) {
+  return fixed(100.0 * part / std::max(1.0, part + rest), 0) + " %";
+}
+
+// States the frames that a slow computer has left out.
 std::string skipped_remark(const RobotResult& robot) {
   const RunSummary summary = robot.summary.value_or(RunSummary{});
-  if (summary.rate.value_or(1.0) < 1.0)
-    return "note: the recording of " + robot.plan.name + " was played at " +
-           fixed(*summary.rate, 2) + " times its speed, all that this computer could do\n";
-  if (summary.paused_s > 0.0)
-    return "note: the recording of " + robot.plan.name + " was paused for " +
-           fixed(summary.paused_s, 1) + " s in all, as processors were short: use a lower --rate\n";
+  const std::string& name = robot.plan.name;
   const auto skipped = static_cast<double>(summary.frames_skipped);
-  const double share = skipped / std::max(1.0, skipped + static_cast<double>(summary.frames));
-  if (share <= kManySkipped) return "";
-  return "note: " + robot.plan.name + " skipped " + fixed(100.0 * share, 0) +
-         " % of its frames: use a lower --rate, or max, which waits, or fewer robots\n";
+  const auto used = static_cast<double>(summary.frames);
+  std::string text;
+  if (summary.rate.value_or(1.0) < 1.0)
+    text += "note: the recording of " + name + " was played at " + fixed(*summary.rate, 2) +
+            " times its speed, all that this computer could do\n";
+  else if (summary.paused_s > 0.0)
+    text += "note: the recording of " + name + " was paused for " + fixed(summary.paused_s, 1) +
+            " s in all, as processors were short: use a lower --rate\n";
+  if (skipped > kManySkipped * (skipped + used))
+    text += "note: " + name + " skipped " + percent(skipped, used) +
+            " of its frames: use a lower --rate, or max, which waits, or fewer robots\n";
+  if (!summary.mapping) return text;
+  const auto in_map = static_cast<double>(summary.mapping->frames);
+  const auto not_in_map = static_cast<double>(summary.mapping->dropped_under_load);
+  if (not_in_map > kManySkipped * (not_in_map + in_map))
+    text += "note: the map of " + name + " lacks " + percent(not_in_map, in_map) +
+            " of its frames: use a lower --rate, or max, which waits\n";
+  return text;
 }
 
 // Notes on the team and on robots with results. failures() has the reasons of the other robots.

@@ -169,7 +169,7 @@ RunPlayback read_run(const fs::path& folder, Stamp begin) {
   for (const fs::path& one : folders_of_robots(folder)) {
     RobotPlayback robot = read_robot(one, run.notes);
     if (robot.is_empty()) continue;
-    const auto map = read_if_there(one / kMap, run.notes, read_map_file);
+    const auto map = read_if_there(one / kMapFile, run.notes, read_map_file);
     const auto optimized = read_if_there(one / "mesh_optimized.ply", run.notes, read_ply);
     for (ViewContent& layer : read_layers(one, robot.robot(), robot.anchor(), run.notes))
       robot.add_at_end(std::move(layer));

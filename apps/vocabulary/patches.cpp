@@ -1,5 +1,6 @@
 #include <iostream>
 #include <memory>
+#include <stdexcept>
 
 #include "apps/output_file.hpp"
 #include "apps/vocabulary/commands.hpp"
@@ -74,6 +75,8 @@ void run(const PatchesCommand& command) {
   }
   constexpr std::size_t kRecord = 16 + kDescriptorBytes + kPatchSide * kPatchSide;
   const std::size_t count = records.size() / kRecord;
+  if (count == 0)
+    throw std::runtime_error("no image has a keypoint: they are black, blurred or too small");
   write_output(command.output, [&](std::ostream& out) { out << npy_header(count) << records; });
   std::cout << count << " patches of " << images.size() << " images\n";
 }

@@ -61,7 +61,7 @@ cv::dnn::MatShape shape_of_input(Bytes model) {
 
 std::string way_out(const NetworkKey& key) {
   return std::string("; use ") + key.shipped + ", which comes with the program, or leave " +
-         key.key + " empty\n";
+         key.key + " empty";
 }
 
 std::string read_network(const std::filesystem::path& file, const NetworkKey& key) {

@@ -14,6 +14,9 @@ namespace {
 // the extraction takes longer.
 constexpr int kCandidatesPerKeypoint = 4;
 
+// OpenCV fails on an image whose smallest pyramid level has no pixel.
+constexpr int kPatchOfOrb_px = 31;
+
 // Sorts by descending response, then by position, so that the order does not depend on that of the
 // detector.
 void sort_by_response(std::vector<cv::KeyPoint>& corners) {
@@ -84,6 +87,7 @@ std::vector<int> by_response(const std::vector<cv::KeyPoint>& corners) {
 }  // namespace
 
 SpreadKeypoints spread_keypoints(const cv::Mat& image, int count, int min_contrast) {
+  if (std::min(image.cols, image.rows) < kPatchOfOrb_px) return {};
   const auto extractor = make_keypoint_extractor(kCandidatesPerKeypoint * count, min_contrast);
   std::vector<cv::KeyPoint> corners;
   extractor->detect(image, corners);

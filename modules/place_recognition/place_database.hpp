@@ -42,8 +42,9 @@ struct CandidateSearch {
 /// The score of two images depends on their amount of texture. The score is therefore divided by
 /// that of the query and the keyframe before it: eta = s(v_t, v_j) / s(v_t, v_(t-1)). One threshold
 /// then suits all places (Galvez-Lopez and Tardos, TRO 2012; threshold 0.5 in Chang et al.,
-/// "Kimera-Multi", Sec. III-A). Deviation from the first paper: candidates need no temporal
-/// consistency, because geometric verification and outlier rejection follow.
+/// "Kimera-Multi", Sec. III-A, with the words of all keypoints). Deviation from the first paper:
+/// candidates need no temporal consistency, because geometric verification and outlier rejection
+/// follow.
 ///
 /// A keyframe is a view if it shows more than the view before it: s(v_t, v_view) is below
 /// new_view_score. Other robots need only the views of a robot, and search only these.

@@ -11,7 +11,7 @@ struct PlaceRecognitionConfig {
   static constexpr const char* kSection = "place_recognition";
 
   int word_keypoints = 350;
-  double similarity_threshold = 0.5;
+  double similarity_threshold = 0.4;
   double min_normalizer = 0.05;
   int max_candidates = 5;
   double min_gap_s = 10.0;

@@ -1,5 +1,7 @@
 #include "runtime/dds/domain_draw.hpp"
 
+#include <arpa/inet.h>
+#include <netinet/in.h>
 #include <sys/socket.h>
 #include <sys/un.h>
 #include <unistd.h>
@@ -7,7 +9,9 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstddef>
+#include <cstdint>
 #include <cstring>
+#include <limits>
 #include <numeric>
 #include <random>
 #include <stdexcept>
@@ -17,6 +21,26 @@
 
 namespace km {
 namespace {
+
+// True if a program on this host has a port of the domain, which any participant binds (RTPS 2.3,
+// 9.6.1: multicast, and the first participant's unicast). It need not have drawn the domain.
+bool has_participant(unsigned domain) {
+  constexpr unsigned kPorts = 7400, kPortsOfDomain = 250, kFirstUnicast = 10;
+  for (const unsigned offset : {0U, kFirstUnicast}) {
+    const unsigned port = kPorts + kPortsOfDomain * domain + offset;
+    if (port > std::numeric_limits<std::uint16_t>::max()) return false;
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_port = htons(static_cast<std::uint16_t>(port));
+    const int tried = socket(AF_INET, SOCK_DGRAM, 0);
+    if (tried < 0) return false;
+    const bool is_free = bind(tried, reinterpret_cast<sockaddr*>(&address), sizeof address) == 0;
+    const bool in_use = !is_free && errno == EADDRINUSE;
+    close(tried);
+    if (in_use) return true;
+  }
+  return false;
+}
 
 // Takes the domain by an abstract socket address. Such an address belongs to one network namespace,
 // as the ports of a domain do. The kernel frees it with the last process that has the socket.
@@ -29,7 +53,9 @@ bool take_domain(unsigned domain) {
   const int taken = socket(AF_UNIX, SOCK_DGRAM, 0);
   if (taken < 0)
     throw std::system_error(errno, std::generic_category(), "cannot take a DDS domain");
-  if (bind(taken, reinterpret_cast<const sockaddr*>(&address), size) == 0) return true;
+  if (bind(taken, reinterpret_cast<const sockaddr*>(&address), size) == 0 &&
+      !has_participant(domain))
+    return true;
   close(taken);
   return false;
 }

@@ -183,6 +183,17 @@ TEST_CASE("the optimiser's measurement of a pair of keyframes is recorded, not t
   }
 }
 
+TEST_CASE("a closure that only the peer has verified is none of this robot's", "[robot]") {
+  const ClosureId id{{1, 2}, {2, 3}};
+  RunRecord record(1);
+  record.add(closure_between(id));
+  record.add(ClosureOutcome{.id = id, .stage = ClosureStage::kReceived, .reason = {}});
+  record.add(InlierSet{1, 2, 1, {id}});
+  REQUIRE(record.inlier_closures().size() == 1);
+  CHECK(record.closures_per_peer().at(2).verified == 0);
+  CHECK(record.closures_per_peer().at(2).inliers == 0);
+}
+
 TEST_CASE("a closure is the same from whichever end it was found", "[robot]") {
   const KeyframeId low{1, 4}, high{2, 3};
   Closure closure = closure_between({high, low});

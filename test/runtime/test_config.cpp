@@ -62,6 +62,14 @@ TEST_CASE("A key without a value is none of a value that may be absent", "[confi
   CHECK_THAT(complaint("toy:\n  count:\n"), Catch::Contains("not a whole number"));
 }
 
+TEST_CASE("A text without a value is empty, in a file and on the command line", "[config]") {
+  ConfigLayers file, command_line;
+  file.add_text("toy:\n  name:\n", "a.yaml");
+  CHECK(loaded(file).name.empty());
+  command_line.add_override("toy.name=");
+  CHECK(loaded(command_line).name.empty());
+}
+
 TEST_CASE("A key that is absent keeps its default", "[config]") {
   ConfigLayers layers;
   layers.add_text("toy:\n  count: 5\n", "a.yaml");

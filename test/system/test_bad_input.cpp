@@ -165,6 +165,22 @@ TEST_CASE("A folder that results cannot go to is refused before any other output
                              "the results\n");
 }
 
+TEST_CASE("Files that no run has written are not replaced by results", "[system]") {
+  const auto recording = shared_data("euroc/MH_01_easy");
+  if (!recording) return;
+  const TemporaryFolder folder;
+  const fs::path map = folder.write("map.yaml", "mine");
+  const CommandResult result =
+      run_command(KM_BIN_DIR
+                  "/kimera_multi_robot --config config/datasets/euroc.yaml --robot 0 "
+                  "--interface lo --dataset " +
+                  recording->string() + " --output " + folder.path().string());
+  CHECK(result.exit_code == 1);
+  CHECK_THAT(result.output, Catch::Contains(map.string() + ": would be replaced") &&
+                                Catch::Contains("choose another folder"));
+  CHECK(folder.read("map.yaml") == "mine");
+}
+
 TEST_CASE("Noise that no sensor has is refused before the run", "[system]") {
   const auto recording = shared_data("euroc/MH_01_easy");
   if (!recording) return;

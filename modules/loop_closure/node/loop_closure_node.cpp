@@ -117,8 +117,8 @@ void LoopClosureNode::step(const std::shared_ptr<const KeyframeRequest>& request
   if (asked && request->network != asked->features.network)
     log::limited(log::Level::kWarn, name(), "network of " + std::to_string(request->requester))
         << "robot " << request->requester
-        << " describes keypoints by another network: keyframes are matched by ORB; set one "
-           "keyframe_features.network";
+        << " describes keypoints by another network, or by none: keyframes are matched by ORB; "
+           "set the same keyframe_features.network on all robots";
   if (asked) policy_.add_peer_request(request->requester, request->own, request->keyframe.index);
   std::optional<WordsOfRequester> words;
   if (const auto* theirs = words_.find({request->requester, request->own}))

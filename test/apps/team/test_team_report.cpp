@@ -170,6 +170,12 @@ TEST_CASE("A robot that skipped many frames is reported", "[team]") {
       Contains(
           "note: a skipped 80 % of its frames: use a lower --rate, or max, which waits, or fewer "
           "robots"));
+  // Also beside a note on its speed.
+  team.robots[0].summary->rate = 0.5;
+  team.robots[0].summary->mapping = MappingSummary{.frames = 4, .dropped_under_load = 6};
+  CHECK_THAT(to_table(team), Contains("was played at 0.50 times its speed") &&
+                                 Contains("note: a skipped 80 % of its frames") &&
+                                 Contains("note: the map of a lacks 60 % of its frames"));
 }
 
 TEST_CASE("The JSON of a run holds every robot, with all of its summary", "[team]") {

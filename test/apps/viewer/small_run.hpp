@@ -90,7 +90,7 @@ class SmallRun {
     write_ply(of(robot) / "mesh_optimized.ply", mesh);
     if (robot == 0) write_layers(mesh);
     const std::size_t vertices = mesh.vertices.size();
-    write_map_file(of(robot) / kMap,
+    write_map_file(of(robot) / kMapFile,
                    {.mesh = std::move(mesh), .seen_by = std::vector(vertices, std::array{0U, 2U})});
   }
 

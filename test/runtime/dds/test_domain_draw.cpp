@@ -1,8 +1,12 @@
+#include <arpa/inet.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <catch2/catch.hpp>
 #include <csignal>
+#include <cstdint>
 #include <set>
 
 #include "runtime/dds/domain_draw.hpp"
@@ -25,6 +29,20 @@ TEST_CASE("No domain is drawn twice, and a host without a free domain is reporte
   CHECK(*drawn.rbegin() == first + 4);
   CHECK_THROWS_WITH(draw_domain(first, first + 4),
                     Catch::Contains("are taken") && Catch::Contains("--domain"));
+}
+
+TEST_CASE("A domain with a participant of a program that drew none is not drawn", "[domain_draw]") {
+  const int offset = GENERATE(0, 10);  // multicast, and unicast of the first participant
+  const unsigned domain = 150 + static_cast<unsigned>(getpid()) % 60;
+  const int participant = socket(AF_INET, SOCK_DGRAM, 0);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(static_cast<std::uint16_t>(7400 + 250 * domain + offset));
+  const int yes = 1;
+  setsockopt(participant, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
+  REQUIRE(bind(participant, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0);
+  CHECK_THROWS_WITH(draw_domain(domain, domain), Catch::Contains("are taken"));
+  close(participant);
 }
 
 TEST_CASE("A domain stays taken until the children of the process that drew it have ended",
