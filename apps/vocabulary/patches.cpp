@@ -19,7 +19,11 @@ struct PatchesCommand : VocabularyCommand {
 };
 
 void define(Command app, PatchesCommand& command) {
-  app.add_option("images", command.images, "IMAGES").required();
+  app.add_option(
+         "images", command.images,
+         "IMAGES: files, folders of .png or .jpg, EuRoC/ASL folders, or text files with one "
+         "image per line")
+      .required();
   app.add_option("-o,--output", command.output, "File of the patches (NumPy's .npy)").required();
   command.define_images(app);
 }
@@ -85,7 +89,10 @@ void run(const PatchesCommand& command) {
 
 void add_patches(Command parent) {
   const Command app = parent.add_subcommand(
-      "patches", "Write the surroundings of keypoints to a file, for apps/lab/places");
+      "patches",
+      "Write the surroundings of keypoints to a file, for apps/lab/places.\n"
+      "Each record has image (its number), x, y [px], octave, orb (descriptor) and patch.\n"
+      "Example: kimera_multi_vocabulary patches recording_1/mav0/cam0/data -o patches.npy");
   const auto command = std::make_shared<PatchesCommand>();
   define(app, *command);
   app.callback([command] { run(*command); });
