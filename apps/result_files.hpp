@@ -107,15 +107,18 @@ inline void expect_no_other_files(const std::filesystem::path& folder) {
   for (const std::string file : kResultFiles)
     // A run that has just begun has this file before its journal.
     if (file != "config.yaml" && is_file(folder / file))
-      throw std::runtime_error((folder / file).string() +
-                               ": would be replaced, and is of no run, because the folder has no " +
-                               kSummary + "; choose another folder for the results");
+      throw std::runtime_error(
+          (folder / file).string() +
+          ": would be replaced, and is of no run, because the folder has neither " + kSummary +
+          " nor " + kJournal + "; choose another folder");
 }
 
 /// Removes a robot's results from `folder`, except for its journal and map, so that those of an
 /// earlier run are not mistaken for those of one that fails. If the run continues (`continues`),
-/// its growing files stay, too. Throws std::filesystem::filesystem_error naming the file.
+/// its growing files stay, too; otherwise expect_no_other_files(). Throws
+/// std::filesystem::filesystem_error naming the file.
 inline void remove_results(const std::filesystem::path& folder, bool continues = false) {
+  if (!continues) expect_no_other_files(folder);
   for (const std::string file : kResultFiles) {
     if (continues && std::ranges::find(kGrowingFiles, file) != kGrowingFiles.end()) continue;
     for (const char* ending : {"", ".part"})  // file cut short by the end of the process

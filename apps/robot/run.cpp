@@ -67,7 +67,6 @@ void make_output(const fs::path& folder) {
 
 // Call when all inputs of the run have been checked, because earlier results are removed.
 void remove_former(const fs::path& folder, bool continues, bool resume) {
-  if (!resume) expect_no_other_files(folder);
   if (!resume && is_file(folder / kSummary))
     log::info("robot") << folder.string() << ": the results of an earlier run are replaced";
   remove_results(folder, continues);

@@ -14,7 +14,7 @@ namespace {
 // the extraction takes longer.
 constexpr int kCandidatesPerKeypoint = 4;
 
-// OpenCV fails on an image whose smallest pyramid level has no pixel.
+// Smaller images have no keypoint, and OpenCV fails if a pyramid level has no pixel.
 constexpr int kPatchOfOrb_px = 31;
 
 // Sorts by descending response, then by position, so that the order does not depend on that of the

@@ -96,7 +96,7 @@ struct LoopClosureConfig {
         "reply_keypoints", reply_keypoints, {50, 100000},
         "maximum number of keypoints of a keyframe sent to a peer, those most likely to "
         "correspond: at first at most half, without descriptors, 6 B each; if these agree, "
-        "their descriptors of 12 B, and the others, 18 B each");
+        "their descriptors of 12 B, and the others, 17 B each");
     visitor.field("full_keyframes", full_keyframes, {1, 1000000},
                   "number of newest own keyframes in memory with all keypoints, 60 B each; older "
                   "ones are read from the run's journal when needed, or keep twice reply_keypoints "

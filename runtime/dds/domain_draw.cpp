@@ -22,23 +22,27 @@
 namespace km {
 namespace {
 
-// True if a program on this host has a port of the domain, which any participant binds (RTPS 2.3,
-// 9.6.1: multicast, and the first participant's unicast). It need not have drawn the domain.
+bool is_taken(unsigned port) {
+  if (port > std::numeric_limits<std::uint16_t>::max()) return false;
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(static_cast<std::uint16_t>(port));
+  const int tried = socket(AF_INET, SOCK_DGRAM, 0);
+  if (tried < 0) return false;
+  const bool is_bound = bind(tried, reinterpret_cast<sockaddr*>(&address), sizeof address) == 0;
+  const bool taken = !is_bound && errno == EADDRINUSE;
+  close(tried);
+  return taken;
+}
+
+// True if a program on this host takes part in the domain, whether it has drawn it or not. It has
+// the port of multicast, or one of the first ports of unicast (RTPS 2.3, 9.6.1).
 bool has_participant(unsigned domain) {
-  constexpr unsigned kPorts = 7400, kPortsOfDomain = 250, kFirstUnicast = 10;
-  for (const unsigned offset : {0U, kFirstUnicast}) {
-    const unsigned port = kPorts + kPortsOfDomain * domain + offset;
-    if (port > std::numeric_limits<std::uint16_t>::max()) return false;
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_port = htons(static_cast<std::uint16_t>(port));
-    const int tried = socket(AF_INET, SOCK_DGRAM, 0);
-    if (tried < 0) return false;
-    const bool is_free = bind(tried, reinterpret_cast<sockaddr*>(&address), sizeof address) == 0;
-    const bool in_use = !is_free && errno == EADDRINUSE;
-    close(tried);
-    if (in_use) return true;
-  }
+  constexpr unsigned kPorts = 7400, kPortsOfDomain = 250, kUnicast = 10, kParticipants = 10;
+  const unsigned multicast = kPorts + kPortsOfDomain * domain;
+  if (is_taken(multicast)) return true;
+  for (unsigned i = 0; i < kParticipants; ++i)
+    if (is_taken(multicast + kUnicast + 2 * i)) return true;
   return false;
 }
 

@@ -7,10 +7,10 @@
 #include <set>
 #include <utility>
 
+#include "apps/lab/crowd/place_sketch.hpp"
 #include "apps/lab/crowd/repeated_names.hpp"
 #include "apps/lab/crowd/word_owners.hpp"
 #include "modules/place_recognition/packed_bag.hpp"
-#include "modules/place_recognition/place_sketch.hpp"
 
 namespace km {
 namespace {

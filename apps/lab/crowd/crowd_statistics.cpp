@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
+#include "apps/lab/crowd/place_sketch.hpp"
 #include "modules/place_recognition/packed_bag.hpp"
-#include "modules/place_recognition/place_sketch.hpp"
 
 namespace km {
 namespace {

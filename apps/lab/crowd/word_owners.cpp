@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
+#include "apps/lab/crowd/place_sketch.hpp"
 #include "modules/core/bytes.hpp"
-#include "modules/place_recognition/place_sketch.hpp"
 
 namespace km {
 namespace {

@@ -112,13 +112,16 @@ TEST_CASE("Closures against ground truth", "[loop_closure][!benchmark]") {
 }
 
 // As place recognition does it: the query's score against the match, over its score against the
-// keyframe before it. Queries are the later keyframes.
+// keyframe before it. Queries are the later keyframes. A keyframe has the words of its strongest
+// `word_keypoints` keypoints.
 void add_similarities(std::vector<PairResult>& pairs,
                       const std::vector<RecordedKeyframe>& keyframes, std::size_t split,
-                      const Vocabulary& vocabulary) {
+                      const Vocabulary& vocabulary, std::size_t word_keypoints) {
   std::vector<BowVector> vectors;
-  for (const RecordedKeyframe& keyframe : keyframes)
-    vectors.push_back(vocabulary.transform(keyframe.features.descriptors));
+  for (const RecordedKeyframe& keyframe : keyframes) {
+    const std::span all(keyframe.features.descriptors);
+    vectors.push_back(vocabulary.transform(all.first(std::min(word_keypoints, all.size()))));
+  }
   std::size_t k = 0;
   for (std::size_t i = 0; i < split; ++i)
     for (std::size_t j = split; j < keyframes.size(); ++j, ++k) {
@@ -210,9 +213,13 @@ TEST_CASE("Precision and recall over the similarity", "[loop_closure][!benchmark
   }
   const auto keyframes = load_v1_01(*v1, {});
   std::vector<PairResult> pairs = verify_pairs(keyframes, 35, true);
-  add_similarities(pairs, keyframes, 35, load_vocabulary(file));
-  std::printf("V1_01, first 35 against the others, %s\n", file.c_str());
-  print_sweep(pairs);
+  const Vocabulary vocabulary = load_vocabulary(file);
+  for (const std::size_t word_keypoints : {1000, 500, 350, 250}) {
+    add_similarities(pairs, keyframes, 35, vocabulary, word_keypoints);
+    std::printf("V1_01, first 35 against the others, %s, words of %zu keypoints\n", file.c_str(),
+                word_keypoints);
+    print_sweep(pairs);
+  }
 }
 
 TEST_CASE("Speed of verification", "[loop_closure][!benchmark]") {

@@ -7,10 +7,10 @@
 #include <numeric>
 #include <random>
 
+#include "apps/lab/crowd/place_sketch.hpp"
 #include "apps/lab/crowd/repeated_names.hpp"
 #include "apps/lab/crowd/sketch_index.hpp"
 #include "apps/lab/crowd/word_owners.hpp"
-#include "modules/place_recognition/place_sketch.hpp"
 #include "test/modules/place_recognition/toy_vocabulary.hpp"
 
 namespace km {

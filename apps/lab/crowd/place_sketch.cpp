@@ -1,4 +1,4 @@
-#include "modules/place_recognition/place_sketch.hpp"
+#include "apps/lab/crowd/place_sketch.hpp"
 
 #include <algorithm>
 #include <numeric>
