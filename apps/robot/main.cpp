@@ -56,8 +56,9 @@ Exit codes: 0 done; 1 bad input or configuration, a recording that gave no pose,
 be written: the log names each and why; 5 a module did not get on (see run.patience): what the others recorded is
 written.)";
 
-double parse_rate(const std::string& text) {
-  if (text == "max") return std::numeric_limits<double>::infinity();
+PlaybackPace parse_pace(const std::string& text) {
+  if (text == "max") return PlaybackPace::fastest();
+  if (text == "auto") return {};
   char* end = nullptr;
   const double rate = std::strtod(text.c_str(), &end);
   constexpr Bounds<double> kRate{1e-3,
@@ -65,7 +66,7 @@ double parse_rate(const std::string& text) {
   if (end == text.c_str() || *end != '\0' || !kRate.contains(rate))
     throw CommandLineError(
         "--rate", text + " is neither a positive number nor max nor auto (" + kRate.text() + ")");
-  return rate;
+  return {.rate = rate, .waits = false};
 }
 
 void print_config(const RobotOptions& options) {
@@ -146,14 +147,11 @@ void add_input(Command app, RobotOptions& options) {
   app.add_option("--from", options.from_s, "Start of the part to play [s since the first image]");
   app.add_option("--to", options.to_s, "End of the part to play [s since the first image]");
   app.add_option_function<std::string>(
-         "--rate",
-         [&options](const std::string& text) {
-           options.auto_rate = text == "auto";
-           if (!options.auto_rate) options.rate = parse_rate(text);
-         },
-         "Speed of playing: 1.0 real time, 2 twice as fast, max as fast as it can, auto 1.0 or "
-         "what this computer can do beside its other work, which takes 2 s to find out")
-      .default_text("1.0");
+         "--rate", [&options](const std::string& text) { options.pace = parse_pace(text); },
+         "Speed of playing: auto in real time, and slower if processors are short; max as fast as "
+         "they can. Both use every image. A number of times real time, such as 1.0, leaves images "
+         "out if processors are short, like a robot with live cameras")
+      .default_text("auto");
 }
 
 // Runs before the dataset is opened, so that the error names the options.

@@ -48,7 +48,7 @@ struct MappingConfig {
                   "segmentation");
     visitor.field("rate_hz", rate_hz, {0.01, 100.0},
                   "[1/s] frames that go into the map, by their stamps; a mapper that is too slow "
-                  "skips frames, except at --rate max, where the recording waits for it");
+                  "skips frames, except at --rate auto and max, where the recording waits for it");
     visitor.field("max_depth_error_m", max_depth_error_m, {0.001, 100.0},
                   "[m] largest expected standard deviation of depths that are used; beyond half of "
                   "semantic_mapping's truncation surfaces have holes and steps; the standard "

@@ -25,6 +25,7 @@
 #include "modules/pose_graph/pose_graph_config.hpp"
 #include "modules/recorded_graph/graph_playback_config.hpp"
 #include "modules/semantic_mapping/semantic_mapping_config.hpp"
+#include "modules/sensors/playback_pace.hpp"
 #include "modules/sensors/sensors_config.hpp"
 #include "modules/view/view_config.hpp"
 #include "modules/vio/tracker_config.hpp"
@@ -52,9 +53,7 @@ struct RobotOptions {
   std::filesystem::path extend;    ///< Results of a finished run that this run extends.
   std::optional<double> from_s;    ///< Part of the recording [s since its first image].
   std::optional<double> to_s;
-  double rate = 1.0;  ///< Times real time; infinity for as fast as possible.
-  bool auto_rate =
-      false;  ///< In place of `rate`: speed that this computer can keep, see playing_speed().
+  PlaybackPace pace;  ///< Not used if `is_live`.
 
   std::optional<int> domain;  ///< DDS domain; from the configuration if absent.
   std::string link;           ///< Name or file of a link profile; from the configuration if empty.

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cmath>
 #include <cstdlib>
 #include <map>
 #include <optional>
@@ -18,7 +17,6 @@
 #include "apps/result_writer.hpp"
 #include "apps/robot/growing_file.hpp"
 #include "apps/robot/map_results.hpp"
-#include "apps/robot/playing_speed.hpp"
 #include "apps/robot/process_usage.hpp"
 #include "apps/robot/reserved_room.hpp"
 #include "apps/robot/results.hpp"
@@ -439,7 +437,6 @@ int conclude(const RobotOptions& options, const RobotConfig& config, Robot& robo
   summary.commit = built_commit();
   summary.frames = end.images.value_or(ImageCounts{}).read;
   summary.frames_skipped = end.images.value_or(ImageCounts{}).skipped;
-  if (options.auto_rate) summary.rate = options.rate;
   if (const SensorsNode* sensors = robot.sensors()) {
     summary.paused_s = sensors->paused_s();
     const ReaderReport faults = sensors->faults();
@@ -514,25 +511,6 @@ std::optional<fs::path> record_file(const RobotOptions& options, bool continues)
   return numbered(file, number);
 }
 
-// Opens the recording a second time and plays its beginning. Nullopt if there is no recording to
-// measure.
-std::optional<double> chosen_rate(const RobotOptions& options, const RobotConfig& config,
-                                  const std::optional<MappingPlan>& mapping, const RigInput& rig,
-                                  SignalWatch& signals) {
-  if (!options.auto_rate || options.dataset.empty() || options.is_live) return std::nullopt;
-  RobotOptions fresh = options;
-  fresh.resume = false;
-  std::optional<RobotInput> input = open_robot_input(fresh, config, mapping, rig, signals);
-  if (!input) return std::nullopt;
-  const auto speed =
-      playing_speed(*std::get<std::unique_ptr<DatasetReader>>(input->source), config, mapping);
-  const double rate = rate_for(speed);
-  if (speed)
-    log::info("robot") << "beside its other work this computer can play the recording at "
-                       << fixed(*speed, 2) << " times real time: --rate " << fixed(rate, 2);
-  return rate;
-}
-
 std::optional<ImageSources> sources_of(const RobotOptions& options,
                                        const std::optional<PartialRig>& rig) {
   if (rig) return image_sources(rig->rig.topics, options.rig);
@@ -557,9 +535,7 @@ int run_robot(const RobotOptions& asked, SignalWatch& signals,
   ResultWriter results(options.fallback);
   change_output(options, results, make_output);
   log::info("robot") << "kimera_multi_robot " << built_version() << ", commit " << built_commit();
-  const std::optional<double> rate = chosen_rate(options, config, mapping, rig, signals);
-  options.rate = rate.value_or(options.rate);
-  has_urgent_work = options.is_live || std::isfinite(options.rate);
+  has_urgent_work = options.is_live || !options.pace.waits;
   const bool continues =
       options.resume && input->restored_from == RestoredFrom::kFormerProcess && input->restored;
   options.record = record_file(options, continues);

@@ -175,32 +175,25 @@ void add_skipped(const RunSummary& run, std::vector<Finding>& findings) {
                       .what = run.name + ": " + std::to_string(run.frames_skipped) +
                               " frames skipped, " + percent(share),
                       .means = "processors were short: odometry got fewer images, evenly spread",
-                      .to_do = "a lower --rate (max waits), tracker.max_features or "
+                      .to_do = "--rate auto, which waits, a lower tracker.max_features or "
                                "vio.window_keyframes, or a faster computer"});
-}
-
-void add_slowed(const RunSummary& run, std::vector<Finding>& findings) {
-  if (run.rate.value_or(1.0) >= 1.0) return;
-  findings.push_back({.id = "frames.slowed",
-                      .severity = Severity::kNote,
-                      .what = run.name + ": its recording was played at " + fixed(*run.rate, 2) +
-                              " times its speed",
-                      .means = "this computer could do no more beside its other work when the run "
-                               "began: a live robot would have left images out",
-                      .to_do = "nothing for a recording; for a live robot fewer programs on its "
-                               "computer, or a faster one"});
 }
 
 void add_paused(const RunSummary& run, std::vector<Finding>& findings) {
   if (run.paused_s <= 0.0) return;
+  const bool used_all = run.frames_skipped == 0;
   findings.push_back(
       {.id = "frames.paused",
        .severity = Severity::kNote,
        .what = run.name + ": its recording was paused for " + fixed(run.paused_s, 1) + " s in all",
-       .means = "processors were short: with every image that odometry could do "
-                "without left out, the recording still came too fast",
-       .to_do = "a lower --rate, fewer robots or programs on this computer; a "
-                "live robot would have dropped images here"});
+       .means = used_all ? "processors were short, and the recording waited for them: every image "
+                           "was used, and a live robot would have left images out"
+                         : "processors were short: with every image that odometry could do "
+                           "without left out, the recording still came too fast",
+       .to_do = used_all ? "nothing for a recording; for a live robot fewer programs on its "
+                           "computer, or a faster one"
+                         : "--rate auto, which waits, fewer robots or programs on this computer; a "
+                           "live robot would have dropped images here"});
 }
 
 void add_map_gave_way(const RunSummary& run, std::vector<Finding>& findings) {
@@ -208,14 +201,15 @@ void add_map_gave_way(const RunSummary& run, std::vector<Finding>& findings) {
   const auto left_out = static_cast<double>(run.mapping->dropped_under_load);
   const double share = left_out / (left_out + static_cast<double>(run.mapping->frames));
   constexpr double kFew = 0.05;
-  findings.push_back({.id = "map.dropped_under_load",
-                      .severity = share < kFew ? Severity::kNote : Severity::kWarning,
-                      .what = run.name + ": " + std::to_string(run.mapping->dropped_under_load) +
-                              " frames were left out of the map, " + percent(share),
-                      .means = "processors were short, and the map gives way to odometry: it may "
-                               "have holes",
-                      .to_do = "a lower --rate, mapping.rate_hz or stereo_depth.downscale, or a "
-                               "faster computer"});
+  findings.push_back(
+      {.id = "map.dropped_under_load",
+       .severity = share < kFew ? Severity::kNote : Severity::kWarning,
+       .what = run.name + ": " + std::to_string(run.mapping->dropped_under_load) +
+               " frames were left out of the map, " + percent(share),
+       .means = "processors were short, and the map gives way to odometry: it may "
+                "have holes",
+       .to_do = "--rate auto, which waits, a lower mapping.rate_hz or stereo_depth.downscale, or a "
+                "faster computer"});
 }
 
 void add_noisy_odometry(const RunSummary& run, std::vector<Finding>& findings) {
@@ -294,7 +288,7 @@ void add_holes(const RunSummary& run, std::vector<Finding>& findings) {
                       .means = "how it went there is not known: charts leave the line out, and "
                                "the poses behind it are known less well",
                       .to_do = run.frames_skipped > 0
-                                   ? "frames were skipped: a lower --rate (max waits), or fewer "
+                                   ? "frames were skipped: --rate auto, which waits, or fewer "
                                      "robots on this computer"
                                    : "see sensor_faults in summary.json for images that are "
                                      "missing, and the log for when odometry started again"});
@@ -466,7 +460,6 @@ std::vector<Finding> findings_of(std::span<const RunFacts> runs) {
     add_unseen(run.summary, findings);
     add_localization(run.summary, findings);
     add_skipped(run.summary, findings);
-    add_slowed(run.summary, findings);
     add_paused(run.summary, findings);
     add_map_gave_way(run.summary, findings);
     add_noisy_odometry(run.summary, findings);

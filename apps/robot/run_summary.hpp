@@ -284,7 +284,6 @@ struct RunSummary {
   std::uint64_t keypoints = 0;       ///< Number in all keyframes.
   std::uint64_t frames = 0;          ///< Stereo pairs played.
   std::uint64_t frames_skipped = 0;  ///< Pairs left out because processors were short.
-  std::optional<double> rate;        ///< Chosen by --rate auto; absent otherwise.
   double paused_s = 0.0;  ///< Time for which the recording's clock paused for the same reason.
   /// By kind, the number of faults of the recording or the live topics: see ReaderFault.
   std::map<std::string, std::uint64_t> sensor_faults;
@@ -321,7 +320,6 @@ struct RunSummary {
     visitor.field("keypoints", keypoints);
     visitor.field("frames", frames);
     visitor.field("frames_skipped", frames_skipped);
-    visitor.field("rate", rate);
     visitor.field("paused_s", paused_s);
     visitor.field("sensor_faults", sensor_faults);
     visitor.field("peer_keyframes", peer_keyframes);

@@ -85,9 +85,9 @@ Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput 
   bridge_ = bridge.get();
   const std::optional<Camera> camera = left_camera_of(input);
   if (auto* reader = std::get_if<std::unique_ptr<DatasetReader>>(&input.source))
-    add_sensing(config, options.rate, std::move(*reader), mapping, std::move(input.map));
+    add_sensing(config, options.pace, std::move(*reader), mapping, std::move(input.map));
   else if (auto* graph = std::get_if<RecordedGraph>(&input.source))
-    add_playback(config, options.rate, std::move(*graph));
+    add_playback(config, options.pace.rate, std::move(*graph));
   else
     add_past();
   if (!std::holds_alternative<RecordedGraph>(input.source)) add_place_recognition(config);
@@ -192,12 +192,12 @@ void Robot::add_odometry(Arguments&&... arguments) {
   node.continue_from(checkpoint);
 }
 
-void Robot::add_sensing(const RobotConfig& config, double rate,
+void Robot::add_sensing(const RobotConfig& config, const PlaybackPace& pace,
                         std::unique_ptr<DatasetReader> reader,
                         const std::optional<MappingPlan>& mapping, std::optional<ResumedMap> map) {
   const SensorRig rig = reader->rig();
   const bool gives_poses = reader->gives_poses();
-  sensors_ = &add<SensorsNode>(true, config.sensors, rate, std::move(reader),
+  sensors_ = &add<SensorsNode>(true, config.sensors, pace, std::move(reader),
                                SensorsTopics{.processed = topics_.processed_frames,
                                              .packets = topics_.packets,
                                              .load = topics_.shed_load,
@@ -214,7 +214,7 @@ void Robot::add_sensing(const RobotConfig& config, double rate,
     add_odometry<ExternalOdometryNode>(rig.stereo.depth_source, config.vio, odometry);
   else
     add_odometry<VioNode>(rig, config.tracker, config.vio, odometry);
-  if (mapping) add_mapping(config, rate, rig.stereo, *mapping, std::move(map));
+  if (mapping) add_mapping(config, pace, rig.stereo, *mapping, std::move(map));
   std::optional<ImageDescriber> describer;
   if (const std::string& network = config.place_recognition.network; !network.empty())
     describer.emplace(network_file("place_recognition.network", network));

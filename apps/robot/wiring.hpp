@@ -212,8 +212,9 @@ class Robot {
   [[nodiscard]] const std::vector<const Node*>& nodes() const { return nodes_; }
 
  private:
-  void add_sensing(const RobotConfig& config, double rate, std::unique_ptr<DatasetReader> reader,
-                   const std::optional<MappingPlan>& mapping, std::optional<ResumedMap> map);
+  void add_sensing(const RobotConfig& config, const PlaybackPace& pace,
+                   std::unique_ptr<DatasetReader> reader, const std::optional<MappingPlan>& mapping,
+                   std::optional<ResumedMap> map);
   template <typename OdometryNode, typename... Arguments>
   void add_odometry(Arguments&&... arguments);
   void add_place_recognition(const RobotConfig& config);
@@ -224,7 +225,7 @@ class Robot {
   void add_team(RobotSample& sample) const;
   void add_restore();
   void add_journal(const RobotOptions& options, const RobotInput& input, ResultWriter& results);
-  void add_mapping(const RobotConfig& config, double rate, const StereoRig& rig,
+  void add_mapping(const RobotConfig& config, const PlaybackPace& pace, const StereoRig& rig,
                    const MappingPlan& plan, std::optional<ResumedMap> before);
   void add_mesh_correction(const RobotConfig& config);
   void add_mesh_files(const std::filesystem::path& folder, ResultWriter& results);

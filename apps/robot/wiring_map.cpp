@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "apps/robot/map_results.hpp"
@@ -11,11 +10,11 @@
 
 namespace km {
 
-// A mapper that is too slow skips frames. At --rate max no frame is late, and the mapper holds the
-// other nodes up, so that the map does not depend on the machine.
-void Robot::add_mapping(const RobotConfig& config, double rate, const StereoRig& rig,
+// A mapper that is too slow skips frames. If the recording waits, no frame is late, and the mapper
+// holds the other nodes up, so that the map does not depend on the machine.
+void Robot::add_mapping(const RobotConfig& config, const PlaybackPace& pace, const StereoRig& rig,
                         const MappingPlan& plan, std::optional<ResumedMap> before) {
-  const Overflow overflow = std::isinf(rate) ? Overflow::kBlock : Overflow::kDropOldest;
+  const Overflow overflow = pace.waits ? Overflow::kBlock : Overflow::kDropOldest;
   SemanticMappingConfig map = config.semantic_mapping;
   map.max_range_m =
       std::min(map.max_range_m, usable_range_m(rig, config.mapping.max_depth_error_m));

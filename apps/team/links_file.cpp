@@ -92,7 +92,7 @@ std::vector<TimedPosition> path_of(const RobotPlan& robot, const std::string& ra
                       ": give its truth in the team file, or --truth");
   if (rate == "max")
     throw ConfigError(file + ": range_m needs a run in real time: give a --rate that is not max");
-  const double speed = std::strtod(rate.c_str(), nullptr);
+  const double speed = rate == "auto" ? 1.0 : std::strtod(rate.c_str(), nullptr);
   const std::vector<StampedPose> poses = read_trajectory(robot.truth);
   const auto window = recorded_window(robot);
   const Stamp start = window ? window->from : poses.front().stamp;

@@ -67,7 +67,7 @@ void define(km::Command app, TeamOptions& options) {
   app.add_option("--dataset", options.dataset, "Value of ${DATASET} in the team file");
   app.add_option(
          "--rate", options.rate,
-         "Times real time, max, or auto, see kimera_multi_robot --help (default: the file's, 1.0)")
+         "Times real time, max, or auto, see kimera_multi_robot --help (default: the file's, auto)")
       .check([](const std::string& text) {
         return km::is_rate(text) ? "" : text + " is neither a positive number nor max nor auto";
       });

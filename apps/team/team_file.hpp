@@ -53,7 +53,7 @@ struct RobotPlan {
 /// A team to start on this host.
 struct TeamPlan {
   std::vector<std::filesystem::path> configs;
-  std::string rate = "1.0";
+  std::string rate = "auto";
   std::optional<std::uint32_t> domain;
   std::filesystem::path output;
   std::optional<double> time_limit_s;

@@ -220,21 +220,18 @@ std::string skipped_remark(const RobotResult& robot) {
   const auto skipped = static_cast<double>(summary.frames_skipped);
   const auto used = static_cast<double>(summary.frames);
   std::string text;
-  if (summary.rate.value_or(1.0) < 1.0)
-    text += "note: the recording of " + name + " was played at " + fixed(*summary.rate, 2) +
-            " times its speed, all that this computer could do\n";
-  else if (summary.paused_s > 0.0)
+  if (summary.paused_s > 0.0)
     text += "note: the recording of " + name + " was paused for " + fixed(summary.paused_s, 1) +
-            " s in all, as processors were short: use a lower --rate\n";
+            " s in all, as processors were short\n";
   if (skipped > kManySkipped * (skipped + used))
     text += "note: " + name + " skipped " + percent(skipped, used) +
-            " of its frames: use a lower --rate, or max, which waits, or fewer robots\n";
+            " of its frames: use --rate auto, which waits, or fewer robots\n";
   if (!summary.mapping) return text;
   const auto in_map = static_cast<double>(summary.mapping->frames);
   const auto not_in_map = static_cast<double>(summary.mapping->dropped_under_load);
   if (not_in_map > kManySkipped * (not_in_map + in_map))
     text += "note: the map of " + name + " lacks " + percent(not_in_map, in_map) +
-            " of its frames: use a lower --rate, or max, which waits\n";
+            " of its frames: use --rate auto, which waits\n";
   return text;
 }
 

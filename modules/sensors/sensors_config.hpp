@@ -27,7 +27,8 @@ struct SensorsConfig {
         "max_lag_s", max_lag_s, {0.0, 1e6},
         "[s] bound on the delay of odometry. At half of it the map gets no new frames. At this "
         "delay odometry gets every second image, then every third and fourth. At twice this delay "
-        "a recording's clock waits, and live images are dropped. Inertial samples are kept");
+        "a recording's clock waits, and live images are dropped. Inertial samples are kept. At "
+        "--rate auto a recording only waits, at twice this delay");
     visitor.field("imu", imu,
                   "use the inertial sensor; false, or without one: odometry by images alone");
     visitor.field(

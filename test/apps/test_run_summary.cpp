@@ -67,7 +67,7 @@ TEST_CASE("summary.json has the keys that others read", "[robot][summary]") {
   for (const auto& [key, value] : json.items()) keys += key + ' ';
   CHECK(keys ==
         "/robot /name /version /commit "
-        "/keyframes /keypoints /frames /frames_skipped /rate /paused_s "
+        "/keyframes /keypoints /frames /frames_skipped /paused_s "
         "/sensor_faults/x /peer_keyframes/keyframes /peer_keyframes/keypoints "
         "/closures/candidates /closures/verified /closures/inliers "
         "/pgo/rounds /pgo/seconds /pgo/cost /pgo/gradient_norm /pgo/anchor /pgo/settled "

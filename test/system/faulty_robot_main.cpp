@@ -3,7 +3,6 @@
 #include <cstdlib>
 #include <functional>
 #include <iostream>
-#include <limits>
 #include <map>
 #include <stdexcept>
 #include <string>
@@ -56,7 +55,7 @@ int main(int argc, char** argv) try {
   options.output = argv[3];
   options.domain = std::stoi(argv[4]);
   (std::filesystem::is_directory(input) ? options.dataset : options.graph) = input;
-  options.rate = std::numeric_limits<double>::infinity();
+  options.pace = km::PlaybackPace::fastest();
   if (!options.dataset.empty()) options.configs = {"config/datasets/euroc.yaml"};
   options.settings.assign(argv + 6, argv + argc);
   km::SignalWatch signals;

@@ -1,6 +1,5 @@
 #include "modules/sensors/node/sensors_node.hpp"
 
-#include <cmath>
 #include <optional>
 #include <sstream>
 #include <string>
@@ -19,14 +18,14 @@ void log_lines(const std::string& text, std::string_view name) {
 
 }  // namespace
 
-SensorsNode::SensorsNode(const SensorsConfig& config, double rate,
+SensorsNode::SensorsNode(const SensorsConfig& config, const PlaybackPace& pace,
                          std::unique_ptr<DatasetReader> reader, const SensorsTopics& topics)
     : reader_(std::move(reader)),
       listed_(reader_->pair_count()),
       is_live_(reader_->is_live()),
-      in_real_time_(is_live_ || std::isfinite(rate)),
+      leaves_out_(is_live_ || !pace.waits),
       shedding_(checked(config).max_lag_s),
-      clock_(rate),
+      clock_(pace.rate),
       topics_(topics),
       worker_(
           static_cast<std::size_t>(config.read_ahead), Overflow::kBlock,
@@ -101,23 +100,31 @@ void SensorsNode::take_faults() {
 }
 
 FrameUse SensorsNode::choose_use(Stamp stamp, Stamp arrival) {
-  if (!in_real_time_) return FrameUse::kAll;
-  const double due_s =
-      is_live_ ? 1e-9 * static_cast<double>(arrival) : clock_.due_s(stamp).value_or(0.0);
-  return choose_use(stamp, due_s, is_live_ ? wall_now_s() : steady_now_s());
+  if (is_live_) return choose_use(stamp, 1e-9 * static_cast<double>(arrival), wall_now_s());
+  const std::optional<double> due_s = clock_.due_s(stamp);
+  if (!due_s) return FrameUse::kAll;
+  const double now_s = steady_now_s();
+  const double paused_s = wait_for_odometry(*due_s, now_s);
+  return leaves_out_ ? choose_use(stamp, *due_s + paused_s, now_s) : FrameUse::kAll;
+}
+
+// Pauses the clock of the recording if the image that is due at `due_s`, or odometry, is late.
+// Returns the pause [s].
+double SensorsNode::wait_for_odometry(double due_s, double now_s) {
+  const std::lock_guard lock(shedding_mutex_);
+  const double pause_s = shedding_.pause_s(due_s, now_s);
+  if (pause_s <= 0.0) return 0.0;
+  clock_.pause(pause_s);
+  shedding_.pause(pause_s);
+  paused_s_ += pause_s;
+  log::limited(log::Level::kWarn, name(), "pause")
+      << "processors are short: the recording has been paused for " << fixed(paused_s_, 1)
+      << " s in all";
+  return pause_s;
 }
 
 FrameUse SensorsNode::choose_use(Stamp stamp, double due_s, double now_s) {
   std::unique_lock lock(shedding_mutex_);
-  if (const double pause_s = is_live_ ? 0.0 : shedding_.pause_s(due_s, now_s); pause_s > 0.0) {
-    clock_.pause(pause_s);
-    shedding_.pause(pause_s);
-    due_s += pause_s;
-    paused_s_ += pause_s;
-    log::limited(log::Level::kWarn, name(), "pause")
-        << "processors are short: the recording has been paused for " << fixed(paused_s_, 1)
-        << " s in all";
-  }
   const ShedLoad before = shedding_.load();
   const FrameUse use = shedding_.use_next(stamp, due_s, now_s);
   const ShedLoad now = shedding_.load();

@@ -14,6 +14,7 @@
 
 #include "modules/core/frame.hpp"
 #include "modules/sensors/dataset_reader.hpp"
+#include "modules/sensors/playback_pace.hpp"
 #include "modules/sensors/sensors_config.hpp"
 #include "runtime/clock.hpp"
 #include "runtime/metrics.hpp"
@@ -42,14 +43,14 @@ struct SensorsTopics {
 
 /// Plays a recording, or publishes live measurements. One thread decodes ahead. Another thread
 /// publishes each packet when it is due; a live packet is due at once. A consumer with a full queue
-/// (kBlock) delays publication. For live sensors, and at a finite rate, LoadShedding chooses which
-/// frames are decoded. The inertial samples of all frames are kept.
+/// (kBlock) delays publication. For live sensors, and at a PlaybackPace that does not wait,
+/// LoadShedding chooses which frames are decoded. The inertial samples of all frames are kept.
 class SensorsNode final : public Node {
  public:
-  /// `rate`: dataset seconds per second; infinity: as fast as consumers take it. Throws ConfigError
-  /// if `config` is out of bounds and std::invalid_argument for a bad rate.
-  SensorsNode(const SensorsConfig& config, double rate, std::unique_ptr<DatasetReader> reader,
-              const SensorsTopics& topics);
+  /// Throws ConfigError if `config` is out of bounds, and std::invalid_argument unless the rate of
+  /// `pace` is positive.
+  SensorsNode(const SensorsConfig& config, const PlaybackPace& pace,
+              std::unique_ptr<DatasetReader> reader, const SensorsTopics& topics);
   ~SensorsNode() override { stop(); }
 
   std::string_view name() const override { return "sensors"; }
@@ -90,6 +91,7 @@ class SensorsNode final : public Node {
   void take_faults();
   [[nodiscard]] FrameUse choose_use(Stamp stamp, Stamp arrival);
   [[nodiscard]] FrameUse choose_use(Stamp stamp, double due_s, double now_s);
+  [[nodiscard]] double wait_for_odometry(double due_s, double now_s);
   void report_load(const ShedLoad& before, const ShedLoad& now);
   void step(const Packet& packet);
   void step(const EndOfData& end);
@@ -98,7 +100,7 @@ class SensorsNode final : public Node {
   std::unique_ptr<DatasetReader> reader_;
   const std::size_t listed_;
   const bool is_live_;
-  const bool in_real_time_;  // live, or a recording at a finite rate
+  const bool leaves_out_;  // true if images are left out when processors are short
   mutable std::mutex shedding_mutex_;
   LoadShedding shedding_;
   double paused_s_ = 0.0;

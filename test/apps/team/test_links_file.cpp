@@ -137,6 +137,8 @@ TEST_CASE("Range follows the true poses at the rate of the run", "[links]") {
   CHECK(script.paths[1][0].time_s == 0.0);
   CHECK(script.paths[1][1].time_s == 5.0);
   CHECK(script.paths[1][1].p_world == Eigen::Vector3d(8.0, 0.0, 0.0));
+  team.plan.rate = "auto";
+  CHECK(team.script("range_m: 5\n").paths[1][1].time_s == 10.0);
   team.plan.rate = "max";
   CHECK_THAT(team.problems("range_m: 5\n"),
              Catch::Contains("links.yaml: range_m") && Catch::Contains("--rate that is not max"));

@@ -143,7 +143,7 @@ TEST_CASE("The command line of a robot has the options of its plan", "[team]") {
         std::vector<std::string>{
             "/bin/robot", "--config", "/c.yaml",   "--config", "/d.yaml", "--robot", "4",
             "--name",     "x",        "--dataset", "/data",    "--from",  "7.5",     "--rate",
-            "1.0",        "--domain", "9",         "--output", "out/x",   "--set",   "a.b=1"});
+            "auto",       "--domain", "9",         "--output", "out/x",   "--set",   "a.b=1"});
 }
 
 TEST_CASE("Every problem of a team file is reported with its line", "[team]") {

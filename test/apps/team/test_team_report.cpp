@@ -165,15 +165,12 @@ TEST_CASE("A robot that skipped many frames is reported", "[team]") {
   CHECK_THAT(to_table(team), !Contains("of its frames"));
   team.robots[0].summary->frames = 20;
   team.robots[0].summary->frames_skipped = 80;
-  CHECK_THAT(
-      to_table(team),
-      Contains(
-          "note: a skipped 80 % of its frames: use a lower --rate, or max, which waits, or fewer "
-          "robots"));
-  // Also beside a note on its speed.
-  team.robots[0].summary->rate = 0.5;
+  CHECK_THAT(to_table(team), Contains("note: a skipped 80 % of its frames: use --rate auto, which "
+                                      "waits, or fewer robots"));
+  // Also beside a note on pauses.
+  team.robots[0].summary->paused_s = 0.5;
   team.robots[0].summary->mapping = MappingSummary{.frames = 4, .dropped_under_load = 6};
-  CHECK_THAT(to_table(team), Contains("was played at 0.50 times its speed") &&
+  CHECK_THAT(to_table(team), Contains("was paused for 0.5 s in all") &&
                                  Contains("note: a skipped 80 % of its frames") &&
                                  Contains("note: the map of a lacks 60 % of its frames"));
 }

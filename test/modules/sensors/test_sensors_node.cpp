@@ -2,7 +2,6 @@
 #include <chrono>
 #include <cmath>
 #include <future>
-#include <limits>
 #include <stdexcept>
 #include <thread>
 #include <utility>
@@ -12,8 +11,6 @@
 
 namespace km {
 namespace {
-
-constexpr double kMax = std::numeric_limits<double>::infinity();
 
 // `count` packets `period_s` apart without pixels; then the end, or an exception.
 class FakeReader final : public DatasetReader {
@@ -73,11 +70,12 @@ struct Run {
 }  // namespace
 
 TEST_CASE("Every packet is published in order, then the end", "[sensors]") {
-  const double rate = GENERATE(as<double>{}, kMax, 1000.0);
+  const PlaybackPace pace =
+      GENERATE(PlaybackPace::fastest(), PlaybackPace{1000.0, true}, PlaybackPace{1000.0, false});
   Run run;
   SensorsConfig config;
   config.max_lag_s = 1e6;
-  SensorsNode node(config, rate, std::make_unique<FakeReader>(100), run.topics());
+  SensorsNode node(config, pace, std::make_unique<FakeReader>(100), run.topics());
   node.start();
   const SensorsEnd end = run.ended.get_future().get();
   node.stop();
@@ -101,7 +99,7 @@ TEST_CASE("Images that come too fast are dropped evenly after the map", "[sensor
   run.packets.subscribe([&](const auto&) { std::this_thread::sleep_for(kCost); });
   SensorsConfig config;
   config.max_lag_s = 0.1;
-  SensorsNode node(config, kRate, std::make_unique<FakeReader>(1000), run.topics());
+  SensorsNode node(config, {kRate, false}, std::make_unique<FakeReader>(1000), run.topics());
   node.start();
   const SensorsEnd end = run.ended.get_future().get();
   node.stop();
@@ -124,7 +122,7 @@ TEST_CASE("The clock of a recording pauses as the last resort", "[sensors]") {
   SensorsConfig config;
   config.max_lag_s = 0.02;
   // An image every 0.5 ms: even one of four takes 2.5 times the available time.
-  SensorsNode node(config, 100.0, std::make_unique<FakeReader>(1000), run.topics());
+  SensorsNode node(config, {100.0, false}, std::make_unique<FakeReader>(1000), run.topics());
   node.start();
   const SensorsEnd end = run.ended.get_future().get();
   CHECK(end.paused_s > 0.1);
@@ -132,12 +130,33 @@ TEST_CASE("The clock of a recording pauses as the last resort", "[sensors]") {
   CHECK(end.published >= 250);
 }
 
+TEST_CASE("A recording that waits loses no image and no frame of the map", "[sensors]") {
+  constexpr double kRate = 10.0;  // an image every 5 ms
+  constexpr auto kCost = std::chrono::milliseconds(15);
+  Run run;
+  int loads = 0;
+  run.load.subscribe([&](const auto&) { ++loads; });
+  run.packets.subscribe([&](const auto&) { std::this_thread::sleep_for(kCost); });
+  SensorsConfig config;
+  config.max_lag_s = 0.1;
+  SensorsNode node(config, {kRate, true}, std::make_unique<FakeReader>(100), run.topics());
+  node.start();
+  const SensorsEnd end = run.ended.get_future().get();
+  node.stop();
+  CHECK(end.published == 100);
+  CHECK(end.skipped == 0);
+  CHECK(loads == 0);
+  // 92 images take 1.38 s before the last one is read, which is due after 0.495 s and may be late
+  // by twice max_lag_s.
+  CHECK(end.paused_s > 0.5);
+}
+
 TEST_CASE("A node that waits for the next packet stops at once", "[sensors]") {
   Run run;
   std::promise<void> first;
   run.packets.subscribe([&](const auto&) { first.set_value(); });
   // The second packet is due in an hour; the reader is not exhausted either.
-  SensorsNode node({}, 1.0, std::make_unique<FakeReader>(1000, 3600.0), run.topics());
+  SensorsNode node({}, {}, std::make_unique<FakeReader>(1000, 3600.0), run.topics());
   node.start();
   first.get_future().get();
   node.stop();
@@ -148,7 +167,8 @@ TEST_CASE("A node that waits for the next packet stops at once", "[sensors]") {
 
 TEST_CASE("A reader that throws ends the node with its exception", "[sensors]") {
   Run run;
-  SensorsNode node({}, kMax, std::make_unique<FakeReader>(3, 0.05, true), run.topics());
+  SensorsNode node({}, PlaybackPace::fastest(), std::make_unique<FakeReader>(3, 0.05, true),
+                   run.topics());
   node.start();
   while (node.error() == nullptr) std::this_thread::yield();
   node.stop();
@@ -160,9 +180,9 @@ TEST_CASE("Invalid parameters of the node are refused", "[sensors]") {
   Run run;
   SensorsConfig config;
   config.read_ahead = 0;
-  CHECK_THROWS_AS(SensorsNode(config, 1.0, std::make_unique<FakeReader>(1), run.topics()),
+  CHECK_THROWS_AS(SensorsNode(config, {}, std::make_unique<FakeReader>(1), run.topics()),
                   ConfigError);
-  CHECK_THROWS_AS(SensorsNode({}, 0.0, std::make_unique<FakeReader>(1), run.topics()),
+  CHECK_THROWS_AS(SensorsNode({}, {0.0, true}, std::make_unique<FakeReader>(1), run.topics()),
                   std::invalid_argument);
 }
 
