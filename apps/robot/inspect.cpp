@@ -178,9 +178,8 @@ std::string inspect_recording(const fs::path& path) {
       return text_of(folder_topics(path, layout));
     const auto topics = euroc_topics(is_folder(path / "mav0") ? path / "mav0" : path);
     if (topics.empty())
-      throw InputFileError(path.string() +
-                           ": neither .db3 or .mcap files nor a recording in the layout of EuRoC, "
-                           "KITTI, TUM RGB-D or 7-Scenes");
+      throw InputFileError(path.string() + ": neither .db3 or .mcap files nor a recording in " +
+                           kKnownLayouts);
     return text_of(topics);
   }
   const auto reader = open_bag(path);

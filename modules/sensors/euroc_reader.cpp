@@ -11,6 +11,7 @@
 
 #include "modules/core/imu_limits.hpp"
 #include "modules/core/input_file.hpp"
+#include "modules/sensors/image_folder.hpp"
 #include "modules/sensors/text_file.hpp"
 
 namespace km {
@@ -70,7 +71,7 @@ std::filesystem::path find_mav0(const std::filesystem::path& folder) {
   for (const char* sensor : {"cam0", "cam1"})
     if (!has(sensor) && !(sensor == std::string_view("cam1") && has("depth0")))
       throw DatasetError(folder.string() + ": neither a folder mav0 nor " + sensor +
-                         " in it: not a EuRoC recording" + recordings_below(folder));
+                         " in it: not a recording in " + kKnownLayouts + recordings_below(folder));
   return folder;
 }
 

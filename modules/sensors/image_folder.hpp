@@ -20,6 +20,9 @@ enum class FolderLayout {
   kSevenScenes,  ///< Microsoft 7-Scenes: frame-NNNNNN.color and .depth, camera-intrinsics.txt.
 };
 
+/// For messages on a folder that has none of them.
+inline constexpr const char* kKnownLayouts = "the layout of EuRoC, KITTI, TUM RGB-D or 7-Scenes";
+
 /// The layout of `folder`, by the names of its files; kEuroc if it is none of the others.
 [[nodiscard]] FolderLayout layout_of(const std::filesystem::path& folder);
 

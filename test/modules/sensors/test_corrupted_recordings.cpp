@@ -238,7 +238,7 @@ TEST_CASE("A file of a recording that is not a file is refused by name", "[senso
 TEST_CASE("A folder that is a loop is refused by name", "[sensors]") {
   const TemporaryFolder folder;
   fs::create_symlink("mav0", folder.path() / "mav0");
-  CHECK_THROWS_WITH(open_euroc(folder.path()), Catch::Contains("not a EuRoC recording"));
+  CHECK_THROWS_WITH(open_euroc(folder.path()), Catch::Contains("not a recording in the layout"));
   CHECK_THROWS_WITH(open_euroc(folder.path() / "mav0"), Catch::Contains("no such folder"));
 }
 

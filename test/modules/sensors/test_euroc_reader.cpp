@@ -162,7 +162,9 @@ TEST_CASE("Missing files and folders are refused by name", "[sensors]") {
   CHECK_THROWS_WITH(open_euroc(folder.root()), Catch::Contains("cam1/sensor.yaml: no such file") &&
                                                    Catch::Contains("nor depth0"));
   fs::remove_all(folder.mav0());
-  CHECK_THROWS_WITH(open_euroc(folder.root()), Catch::EndsWith("not a EuRoC recording"));
+  CHECK_THROWS_WITH(open_euroc(folder.root()),
+                    Catch::EndsWith("neither a folder mav0 nor cam0 in it: not a recording in the "
+                                    "layout of EuRoC, KITTI, TUM RGB-D or 7-Scenes"));
   for (const char* robot : {"robot1", "robot0", "robot2/none"})
     fs::create_directories(folder.root() / robot / (robot[5] < '2' ? "mav0" : "cam0"));
   CHECK_THROWS_WITH(open_euroc(folder.root()), Catch::EndsWith("in it are robot0, robot1"));
