@@ -112,7 +112,7 @@ Line::~Line() {
   if (!key_.empty()) {
     const auto verdict = c.rate_limit.ask(tag_ + '/' + key_, steady_now_s());
     if (!verdict.pass) return;
-    if (verdict.held_back > 0) text_ << " (" << verdict.held_back << " more held back before)";
+    if (verdict.held_back > 0) text_ << " (" << verdict.held_back << " more such lines before)";
   }
   erase_status(c);
   *c.log_output << time_of_day() + ' ' + name_of(level_) + ' ' + tag_ + ": " + text_.str() + '\n'

@@ -78,8 +78,8 @@ Examination examine_packets(DatasetReader& reader, const RobotConfig& config, do
   result.add(examine_images(sample));
   result.add(examine_stereo(sample, rig));
   result.add(examine_inertial(sample, rig));
-  result.add(
-      examine_words(sample.descriptors, load_vocabulary(find_shipped_file(config.run.vocabulary))));
+  result.add(examine_words(sample.descriptors, load_vocabulary(find_shipped_file(
+                                                   config.run.vocabulary, "run.vocabulary"))));
   sort_by_severity(result.findings);
   return result;
 }

@@ -23,7 +23,7 @@ std::string chosen_link(const RobotOptions& options) {
 
 fs::path link_profile(const std::string& link) {
   const bool is_name = link.find('/') == std::string::npos && !link.ends_with(".yaml");
-  return find_shipped_file(is_name ? "qos/" + link + ".yaml" : link);
+  return find_shipped_file(is_name ? "qos/" + link + ".yaml" : link, "run.link");
 }
 
 void apply_options(const RobotOptions& options, ConfigLayers& layers) {
@@ -41,7 +41,9 @@ void apply_options(const RobotOptions& options, ConfigLayers& layers) {
 
 }  // namespace
 
-fs::path find_shipped_file(const std::string& name) {
+fs::path find_shipped_file(const std::string& name, const char* key) {
+  const std::string start = std::string(key) + ": ";
+  if (name.empty()) throw ConfigError(start + "names no file");
   const fs::path program = program_folder();
   const std::array<fs::path, 4> places = {fs::path(name), fs::path("config") / name,
                                           program / "../../config" / name,
@@ -53,7 +55,7 @@ fs::path find_shipped_file(const std::string& name) {
     if (fs::is_directory(place)) tried += " (a folder)";
     if (place.is_absolute() && place == name) break;
   }
-  throw ConfigError("no file " + name + "; looked for" + tried);
+  throw ConfigError(start + "no file " + name + "; looked for" + tried);
 }
 
 RobotConfig load_robot_config(const RobotOptions& options) {

@@ -119,8 +119,8 @@ struct RobotConfig {
 
 /// Path of a file that comes with the program, such as "vocabulary/indoor.kmvoc" or
 /// "qos/wifi.yaml". Tries `name` as it is, then below config/ of the source tree or of the
-/// installation from which this program runs. Throws ConfigError that names all places that were
-/// tried.
-[[nodiscard]] std::filesystem::path find_shipped_file(const std::string& name);
+/// installation from which this program runs. Throws ConfigError that names `key`, whose value
+/// `name` is, and all places that were tried.
+[[nodiscard]] std::filesystem::path find_shipped_file(const std::string& name, const char* key);
 
 }  // namespace km

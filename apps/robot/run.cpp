@@ -456,9 +456,14 @@ int conclude(const RobotOptions& options, const RobotConfig& config, Robot& robo
     (peer.why == Absence::kSilent ? summary.lost_peers : summary.apart_peers)[peer.name] =
         peer.missed_s;
   const std::map<RobotId, std::string> names = peer_names(robot);
-  for (const auto& [peer, keyframes] : record.other_vocabulary())
-    summary.other_vocabulary[names.contains(peer) ? names.at(peer) : std::to_string(peer)] =
-        keyframes;
+  const auto by_name = [&names](const std::map<RobotId, std::uint64_t>& counts) {
+    std::map<std::string, std::uint64_t> result;
+    for (const auto& [peer, count] : counts)
+      result[names.contains(peer) ? names.at(peer) : std::to_string(peer)] = count;
+    return result;
+  };
+  summary.other_vocabulary = by_name(record.other_vocabulary());
+  summary.other_network = by_name(record.other_network());
   watch.reset();  // ends the status line before the last log lines
   if (summary.fixes && !summary.fixes->located)
     log::warn("robot") << "not located in the frame of absolute_fixes: the poses are those of "

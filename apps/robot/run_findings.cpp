@@ -180,7 +180,8 @@ void add_skipped(const RunSummary& run, std::vector<Finding>& findings) {
 }
 
 void add_paused(const RunSummary& run, std::vector<Finding>& findings) {
-  if (run.paused_s <= 0.0) return;
+  constexpr double kNoticed_s = 1.0;
+  if (run.paused_s < kNoticed_s) return;
   const bool used_all = run.frames_skipped == 0;
   findings.push_back(
       {.id = "frames.paused",
@@ -300,14 +301,14 @@ void add_rejected(const RunFacts& run, std::vector<Finding>& findings) {
   if (all.rejected == 0) return;
   const double share = static_cast<double>(all.rejected) / static_cast<double>(all.verified);
   constexpr double kMany = 0.3;
-  findings.push_back({.id = "closures.rejected",
-                      .severity = share < kMany ? Severity::kNote : Severity::kWarning,
-                      .what = run.summary.name + ": " + std::to_string(all.rejected) + " of " +
-                              std::to_string(all.verified) +
-                              " verified closures were rejected by the optimiser",
-                      .means = "the others contradict them: places that look alike, or odometry "
-                               "worse than its covariances state",
-                      .to_do = share < kMany ? "" : "check odometry; see loop_closures.csv"});
+  findings.push_back(
+      {.id = "closures.rejected",
+       .severity = share < kMany ? Severity::kNote : Severity::kWarning,
+       .what = run.summary.name + ": " + std::to_string(all.rejected) + " of " +
+               std::to_string(all.verified) + " verified closures were rejected by the optimiser",
+       .means = "other measurements contradict them: places that look alike, or odometry "
+                "worse than its covariances state",
+       .to_do = share < kMany ? "" : "check odometry; see loop_closures.csv"});
 }
 
 void add_cameras(const RunSummary& run, std::vector<Finding>& findings) {
@@ -368,6 +369,17 @@ void add_vocabularies(const RunSummary& run, std::vector<Finding>& findings) {
                                 name + " are described by another vocabulary",
                         .means = "none of them can be compared: these robots never join",
                         .to_do = "the same run.vocabulary on all robots"});
+}
+
+void add_networks(const RunSummary& run, std::vector<Finding>& findings) {
+  for (const auto& [name, keyframes] : run.other_network)
+    findings.push_back({.id = "network.other",
+                        .severity = Severity::kWarning,
+                        .what = run.name + ": " + std::to_string(keyframes) + " keyframes of " +
+                                name + " were matched by ORB",
+                        .means = "their keypoints are described by another network, or by none: "
+                                 "fewer closures are found",
+                        .to_do = "the same keyframe_features.network on all robots"});
 }
 
 void add_budget(const RunSummary& run, std::vector<Finding>& findings) {
@@ -456,6 +468,7 @@ std::vector<Finding> findings_of(std::span<const RunFacts> runs) {
   add_tentative(runs, names, findings);
   for (const RunFacts& run : runs) {
     add_vocabularies(run.summary, findings);
+    add_networks(run.summary, findings);
     add_lost(run.summary, findings);
     add_unseen(run.summary, findings);
     add_localization(run.summary, findings);

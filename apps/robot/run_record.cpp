@@ -51,12 +51,16 @@ void RunRecord::add(const KeyframeOdometry& keyframe) {
 
 void RunRecord::add(const Keyframe& keyframe) {
   keypoints_ += keyframe.features.keypoints.size();
+  network_ = keyframe.features.network;
   if (const auto depth_m = km::median_depth_m(keyframe.features))
     median_depths_m_[keyframe.odometry.id.index] = *depth_m;
 }
 
 void RunRecord::add(const KeyframeReply& reply) {
   if (!reply.found) return;
+  // A reply is by ORB if the other robot has another network, or none.
+  if (reply.keyframe.features.network != network_)
+    ++other_network_[reply.keyframe.odometry.id.robot];
   ++peer_keyframes_.keyframes;
   peer_keyframes_.keypoints += reply.keyframe.features.keypoints.size() + reply.descriptors.size();
 }
@@ -139,6 +143,7 @@ void RunRecord::add(const PeerEvent& event) {
   std::erase_if(rejected_, [&](const ClosureId& id) { return touches(id, peer); });
   std::erase_if(judgements_, of_peer);
   inlier_sets_.erase(std::minmax(robot_, peer));
+  other_network_.erase(peer);
   other_vocabulary_.erase(peer);
 }
 

@@ -146,6 +146,12 @@ class RunRecord {
   /// Closures that this robot found, by stage, and by the reason why they went no further.
   [[nodiscard]] std::map<RobotId, ClosureTally> closure_tallies() const;
 
+  /// By robot, the number of its keyframes that were compared by ORB, because its keypoints are
+  /// described by another network than those of this robot.
+  [[nodiscard]] const std::map<RobotId, std::uint64_t>& other_network() const {
+    return other_network_;
+  }
+
   /// By robot, the number of its keyframes that could not be compared because of its vocabulary.
   [[nodiscard]] const std::map<RobotId, std::uint64_t>& other_vocabulary() const {
     return other_vocabulary_;
@@ -170,7 +176,8 @@ class RunRecord {
   std::map<ClosureId, ClosureJudgement> judgements_;  // by inlier_sets_ and rejected_
   std::set<ClosureId> rejected_;  // closures of the inlier sets that the optimiser rejected
   std::map<ClosureId, ClosureOutcome> outcomes_;
-  std::map<RobotId, std::uint64_t> other_vocabulary_;
+  std::uint16_t network_ = 0;  // that of the newest own keyframe
+  std::map<RobotId, std::uint64_t> other_network_, other_vocabulary_;
   std::optional<Trajectory> trajectory_;
   StatedPoses stated_poses_;
   bool trajectory_is_stated_ = false;

@@ -308,6 +308,9 @@ struct RunSummary {
   /// By name, robots with another vocabulary, with the number of keyframes that could not be
   /// compared.
   std::map<std::string, std::uint64_t> other_vocabulary;
+  /// By name, robots that describe keypoints by another network, with the number of keyframes that
+  /// were compared by ORB for this reason.
+  std::map<std::string, std::uint64_t> other_network;
   std::string exit_reason;
   std::vector<Finding> findings;  ///< Findings, the gravest first: see findings_of().
 
@@ -338,6 +341,7 @@ struct RunSummary {
     visitor.field("lost_peers", lost_peers);
     visitor.field("apart_peers", apart_peers);
     visitor.field("other_vocabulary", other_vocabulary);
+    visitor.field("other_network", other_network);
     visitor.field("exit_reason", exit_reason);
     visitor.field("findings", findings);
   }

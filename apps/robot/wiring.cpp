@@ -60,12 +60,6 @@ std::optional<Camera> left_camera_of(const RobotInput& input) {
   return reader != nullptr ? std::optional((*reader)->rig().stereo.cameras[0]) : std::nullopt;
 }
 
-std::filesystem::path network_file(const char* key, const std::string& name) try {
-  return find_shipped_file(name);
-} catch (const ConfigError& error) {
-  throw ConfigError(std::string(key) + ": " + error.what());
-}
-
 std::optional<KeyframeId> keyframe_of(const KeyframeReply& reply) {
   return reply.found ? std::optional(reply.keyframe.odometry.id) : std::nullopt;
 }
@@ -217,10 +211,10 @@ void Robot::add_sensing(const RobotConfig& config, const PlaybackPace& pace,
   if (mapping) add_mapping(config, pace, rig.stereo, *mapping, std::move(map));
   std::optional<ImageDescriber> describer;
   if (const std::string& network = config.place_recognition.network; !network.empty())
-    describer.emplace(network_file("place_recognition.network", network));
+    describer.emplace(find_shipped_file(network, "place_recognition.network"));
   std::optional<KeypointDescriber> keypoint_describer;
   if (const std::string& network = config.keyframe_features.network; !network.empty())
-    keypoint_describer.emplace(network_file("keyframe_features.network", network));
+    keypoint_describer.emplace(find_shipped_file(network, "keyframe_features.network"));
   auto& features =
       add<KeyframeFeaturesNode>(true, config.keyframe_features, rig.stereo,
                                 KeyframeFeaturesTopics{.odometry = topics_.keyframe_odometry,
@@ -232,8 +226,8 @@ void Robot::add_sensing(const RobotConfig& config, const PlaybackPace& pace,
 }
 
 void Robot::add_place_recognition(const RobotConfig& config) {
-  vocabulary_ =
-      std::make_shared<const Vocabulary>(load_vocabulary(find_shipped_file(config.run.vocabulary)));
+  vocabulary_ = std::make_shared<const Vocabulary>(
+      load_vocabulary(find_shipped_file(config.run.vocabulary, "run.vocabulary")));
   add<PlaceRecognitionNode>(false, config.place_recognition, identity_.robot, vocabulary_,
                             PlaceRecognitionTopics{.keyframes = topics_.keyframes,
                                                    .peer_bows = topics_.peer_bows,

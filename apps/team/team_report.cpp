@@ -220,7 +220,8 @@ std::string skipped_remark(const RobotResult& robot) {
   const auto skipped = static_cast<double>(summary.frames_skipped);
   const auto used = static_cast<double>(summary.frames);
   std::string text;
-  if (summary.paused_s > 0.0)
+  constexpr double kNoticed_s = 1.0;
+  if (summary.paused_s >= kNoticed_s)
     text += "note: the recording of " + name + " was paused for " + fixed(summary.paused_s, 1) +
             " s in all, as processors were short\n";
   if (skipped > kManySkipped * (skipped + used))
@@ -235,6 +236,17 @@ std::string skipped_remark(const RobotResult& robot) {
   return text;
 }
 
+// The gravest findings of a robot that has ended in order, with the remedy. failures() has the
+// others.
+std::string faults(const RobotResult& robot) {
+  std::string text;
+  if (!robot.run.exit.ok()) return text;
+  for (const Finding& finding : robot.summary.value_or(RunSummary{}).findings)
+    if (finding.severity == Severity::kError)
+      text += "error: " + finding.what + ": " + finding.to_do + "\n";
+  return text;
+}
+
 // Notes on the team and on robots with results. failures() has the reasons of the other robots.
 std::string notes(const TeamResult& team) {
   std::string text;
@@ -243,7 +255,7 @@ std::string notes(const TeamResult& team) {
     if (robot.left_nothing()) continue;
     for (const std::string& note : robot.notes)
       text.append("note: ").append(robot.plan.name).append(": ").append(note).append("\n");
-    text += skipped_remark(robot);
+    text += skipped_remark(robot) + faults(robot);
   }
   return text;
 }

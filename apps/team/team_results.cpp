@@ -256,7 +256,8 @@ void find_team_frame(std::vector<RobotResult>& robots) {
     robot.in_team_frame = false;
     robot.notes.push_back(
         (*frame == robot.plan.id && sizes[*frame] == 1
-             ? std::string("never joined the others")
+             ? std::string(robots.size() == 2 ? "never joined the other robot"
+                                              : "never joined the others")
              : "ended in the frame of robot " + std::to_string(*frame)) +
         ": left out of the optimised errors, the report's trajectories and the team's map");
   }

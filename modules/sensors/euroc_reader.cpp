@@ -37,9 +37,9 @@ std::variant<ImuSample, RowFault> parse_imu(const TextRow& row) {
 
 ImuStream read_imu(const std::filesystem::path& file, ReaderReport& report) {
   ImuStream stream;
-  for (const auto& row : read_ordered_rows<ImuSample>(file, 7, report, parse_imu))
+  for (const auto& row :
+       read_ordered_rows<ImuSample>(file, 7, "holds no inertial sample", report, parse_imu))
     stream.add({row.stamp, row.value.gyro, row.value.accel});
-  if (stream.is_empty()) throw DatasetError(file.string() + ": holds no inertial sample");
   return stream;
 }
 
@@ -67,12 +67,10 @@ std::string recordings_below(const std::filesystem::path& folder) {
 std::filesystem::path find_mav0(const std::filesystem::path& folder) {
   if (!is_folder(folder)) throw DatasetError(folder.string() + ": no such folder");
   if (is_folder(folder / "mav0")) return folder / "mav0";
-  const auto has = [&folder](const char* sensor) { return is_folder(folder / sensor); };
-  for (const char* sensor : {"cam0", "cam1"})
-    if (!has(sensor) && !(sensor == std::string_view("cam1") && has("depth0")))
-      throw DatasetError(folder.string() + ": neither a folder mav0 nor " + sensor +
-                         " in it: not a recording in " + kKnownLayouts + recordings_below(folder));
-  return folder;
+  if (is_folder(folder / "cam0")) return folder;
+  throw DatasetError(folder.string() +
+                     ": neither a folder mav0 nor cam0 in it: not a recording in " + kKnownLayouts +
+                     recordings_below(folder));
 }
 
 EurocReader::EurocReader(const std::filesystem::path& folder, EurocCalibration calibration,
@@ -86,6 +84,7 @@ EurocReader::EurocReader(const std::filesystem::path& folder, EurocCalibration c
       imu_(reads_imu_ ? read_imu(mav0_ / "imu0" / "data.csv", report_) : ImuStream()) {
   side_images_.list(options.stereo_tolerance_s.value_or(Synchrony().tolerance_s), files_.pairs,
                     report_);
+  check_depth_images(mav0_, rig_.stereo, files_.pairs);
   for (StereoPairFile& pair : files_.pairs) pair.stamp += nanoseconds(options.correction.offset_s);
   recording_start_ = files_.pairs.front().stamp;
   keep_part({options.from_s, options.to_s, options.not_before}, mav0_, files_.pairs);

@@ -51,7 +51,7 @@ class EurocReader final : public DatasetReader {
  public:
   /// `folder` as for find_mav0(). Reads the lists, but no image yet. Depth images are read if the
   /// rig has a depth range. Throws DatasetError for missing or unusable files, including requested
-  /// labels, and for a window without a frame.
+  /// labels, for an RGB-D recording without any depth image, and for a window without a frame.
   /// Throws std::invalid_argument for a window that is empty or not a number.
   EurocReader(const std::filesystem::path& folder, EurocCalibration calibration,
               const EurocOptions& options = {});

@@ -1,5 +1,6 @@
 #include "modules/sensors/frame_files.hpp"
 
+#include <cmath>
 #include <memory>
 #include <sstream>
 #include <stdexcept>
@@ -8,6 +9,7 @@
 #include <variant>
 
 #include "modules/core/input_file.hpp"
+#include "modules/core/text_table.hpp"
 #include "modules/sensors/dataset_reader.hpp"
 #include "modules/sensors/image_file.hpp"
 #include "modules/sensors/text_file.hpp"
@@ -28,9 +30,9 @@ std::vector<ListedImage> list_images(const std::filesystem::path& camera, Reader
   const auto file_of = [&](const TextRow& row) -> Parsed {
     return camera / "data" / row.fields[1];
   };
-  for (auto& row : read_ordered_rows<std::filesystem::path>(list, 2, report, file_of))
+  for (auto& row :
+       read_ordered_rows<std::filesystem::path>(list, 2, "lists no image", report, file_of))
     images.push_back({row.stamp, row.line, std::move(row.value)});
-  if (images.empty()) throw DatasetError(list.string() + ": lists no image");
   return images;
 }
 
@@ -55,9 +57,8 @@ LabelPalette read_palette(const std::filesystem::path& file) {
 void keep_part(const RecordingPart& part, const std::filesystem::path& recording,
                std::vector<StereoPairFile>& frames) {
   if (!(part.from_s < part.to_s))
-    throw std::invalid_argument(recording.string() + ": the window from " +
-                                std::to_string(part.from_s) + " s to " + std::to_string(part.to_s) +
-                                " s is empty");
+    throw std::invalid_argument(recording.string() + ": the window from " + fixed(part.from_s, 3) +
+                                " s to " + fixed(part.to_s, 3) + " s is empty");
   const Stamp start = frames.front().stamp;
   const double end_s = seconds_between(start, frames.back().stamp);
   std::erase_if(frames, [&](const StereoPairFile& frame) {
@@ -67,9 +68,24 @@ void keep_part(const RecordingPart& part, const std::filesystem::path& recording
   });
   if (!frames.empty()) return;
   std::ostringstream message;
-  message << recording.string() << ": no stereo pair from " << part.from_s << " s to " << part.to_s
-          << " s; the recording has them from 0 s to " << end_s << " s";
+  message << recording.string() << ": no stereo pair from " << part.from_s << " s to "
+          << (std::isinf(part.to_s) ? "the end" : fixed(part.to_s, 3) + " s")
+          << "; the recording has them from 0 s to " << end_s << " s";
   throw DatasetError(message.str());
+}
+
+void check_depth_images(const std::filesystem::path& recording, const StereoRig& rig,
+                        const std::vector<StereoPairFile>& frames) {
+  if (rig.depth_source != DepthSource::kDepthImage) return;
+  const StereoPairFile* first = nullptr;  // first frame whose depth image is missing
+  for (const StereoPairFile& frame : frames) {
+    if (is_file(frame.depth)) return;
+    if (first == nullptr && !frame.depth.empty()) first = &frame;
+  }
+  throw DatasetError(recording.string() + ": no depth image for any of " +
+                     std::to_string(frames.size()) + " images" +
+                     (first != nullptr ? ", first: " + first->depth.string() + ": no such image"
+                                       : ": the stamps of depth images are too far away"));
 }
 
 StereoPairFiles list_euroc_pairs(const std::filesystem::path& mav0,
@@ -136,9 +152,9 @@ std::vector<StereoPairFile> list_keyframe_pairs(const std::filesystem::path& fol
   const auto files_of = [&](const TextRow& row) -> std::variant<Files, RowFault> {
     return Files(folder / row.fields[1], folder / row.fields[2]);
   };
-  for (const auto& [stamp, line, files] : read_ordered_rows<Files>(list, 3, report, files_of))
+  for (const auto& [stamp, line, files] :
+       read_ordered_rows<Files>(list, 3, "lists no stereo pair", report, files_of))
     pairs.push_back({stamp, files.first, files.second, line, {}, {}});
-  if (pairs.empty()) throw DatasetError(list.string() + ": lists no stereo pair");
   return pairs;
 }
 

@@ -43,6 +43,11 @@ struct RecordingPart {
 void keep_part(const RecordingPart& part, const std::filesystem::path& recording,
                std::vector<StereoPairFile>& frames);
 
+/// Throws DatasetError if `rig` needs depth images and no frame has one on disk. `recording`: path
+/// for messages.
+void check_depth_images(const std::filesystem::path& recording, const StereoRig& rig,
+                        const std::vector<StereoPairFile>& frames);
+
 /// The stereo pairs of a EuRoC folder: rows `stamp [ns], file` of cam0/data.csv and cam1/data.csv,
 /// matched by stamps at most `tolerance_s` apart. Without a tolerance find_synchrony() determines
 /// it. Faulty rows and images without a partner are counted in `report`. Throws DatasetError if a

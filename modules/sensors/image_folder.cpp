@@ -28,17 +28,20 @@ constexpr double kStructuredLightRange_m = 8.0;
 struct ListedFile {
   Stamp stamp = 0;
   int line = 0;
+  int row = 0;  // index of the row: faulty rows count, blank lines do not
   std::string name;
 };
 
 // The rows `time [s] ...` of a list. Faulty rows are counted.
 std::vector<ListedFile> read_times(const fs::path& file, std::size_t fields, ReaderReport& report) {
   constexpr double kMost_s = 4e9;
+  ReaderReport faults;
   std::vector<ListedFile> rows;
   std::vector<Stamp> stamps;
   std::vector<int> lines;
   const std::string text = read_file(file);
-  for (const TextRow& row : split_rows(text)) {
+  for (int index = -1; const TextRow& row : split_rows(text)) {
+    ++index;
     const auto seconds = number_in(row, 0);
     std::string why;
     if (row.fields.size() < fields)
@@ -46,19 +49,18 @@ std::vector<ListedFile> read_times(const fs::path& file, std::size_t fields, Rea
     else if (!seconds || !(*seconds >= 0.0 && *seconds < kMost_s))
       why = readable(row.fields[0], 40) + " is no time in seconds";
     if (!why.empty()) {
-      report.add(ReaderFault::kMalformedRow, at_line(file, row.line) + ": " + why);
+      faults.add(ReaderFault::kMalformedRow, at_line(file, row.line) + ": " + why);
       continue;
     }
     stamps.push_back(nanoseconds(*seconds));
     lines.push_back(row.line);
-    rows.push_back({stamps.back(), row.line, fields > 1 ? std::string(row.fields[1]) : ""});
+    rows.push_back({stamps.back(), row.line, index, fields > 1 ? std::string(row.fields[1]) : ""});
   }
-  const std::vector<bool> counts = in_order(stamps, lines, file, report);
+  const std::vector<bool> counts = in_order(stamps, lines, file, faults);
   std::size_t row = 0;
   std::erase_if(rows, [&](const ListedFile&) { return !counts[row++]; });
-  if (rows.empty())
-    throw DatasetError(file.string() + ": no time in it" +
-                       (report.empty() ? "" : "; " + to_string(report)));
+  if (rows.empty()) refuse_list(file, "no time in it", faults);
+  report.add(faults);
   return rows;
 }
 
@@ -162,17 +164,26 @@ const ListedFile* nearest(const std::vector<ListedFile>& files, Stamp stamp) {
   return std::abs(seconds_between(after->stamp, stamp)) <= kDepthTolerance_s ? &*after : nullptr;
 }
 
-// The number N of a file frame-N.color.png or .jpg.
-std::optional<int> frame_number(const fs::path& file) {
+// The number N of a file frame-N.color.png or .jpg, if `kind` is ".color.".
+std::optional<int> frame_number(const fs::path& file, std::string_view kind) {
   const std::string name = file.filename();
   constexpr std::string_view kBegin = "frame-";
-  const std::size_t end = name.find(".color.");
+  const std::size_t end = name.find(kind);
   if (!name.starts_with(kBegin) || end == name.npos) return std::nullopt;
   const auto number =
       parse_int64(std::string_view(name).substr(kBegin.size(), end - kBegin.size()));
   constexpr std::int64_t kMost = 100'000'000;
   return number && *number >= 0 && *number < kMost ? std::optional(static_cast<int>(*number))
                                                    : std::nullopt;
+}
+
+bool has_numbered_frames(const fs::path& folder) {
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error))
+    if (frame_number(entry->path(), ".color.") || frame_number(entry->path(), ".depth."))
+      return true;
+  return false;
 }
 
 Camera read_seven_scenes_camera(const fs::path& file) {
@@ -196,7 +207,8 @@ FolderLayout layout_of(const fs::path& folder) {
   if (is_there(folder / "mav0") || is_there(folder / "cam0")) return FolderLayout::kEuroc;
   if (is_file(folder / "rgb.txt")) return FolderLayout::kTum;
   if (is_folder(folder / "image_0") || is_folder(folder / "image_2")) return FolderLayout::kKitti;
-  if (is_file(folder / "camera-intrinsics.txt")) return FolderLayout::kSevenScenes;
+  if (is_file(folder / "camera-intrinsics.txt") || has_numbered_frames(folder))
+    return FolderLayout::kSevenScenes;
   return FolderLayout::kEuroc;
 }
 
@@ -214,9 +226,8 @@ std::string to_string(FolderLayout layout) {
   return "a folder";
 }
 
-// Counts the images whose numbers follow that of the last row of the times.
-void count_images_without_time(const fs::path& images, ImageFolder& recording) {
-  int number = recording.frames.back().line;  // numbers begin at 0, lines at 1
+// Counts the images from `number` on, which follow the last row of the times.
+void count_images_without_time(const fs::path& images, int number, ImageFolder& recording) {
   for (fs::path image; is_file(image = image_file(images, six_digits(number))); ++number)
     recording.report.add(ReaderFault::kImageWithoutTime,
                          image.string() + ": no time in " + recording.list.string());
@@ -232,8 +243,9 @@ ImageFolder read_kitti_folder(const fs::path& folder) {
                        ": no such folder: one camera does not measure how far things are");
   ImageFolder result;
   result.list = folder / "times.txt";
-  for (const ListedFile& row : read_times(result.list, 1, result.report)) {
-    const std::string stem = six_digits(row.line - 1);
+  const std::vector<ListedFile> times = read_times(result.list, 1, result.report);
+  for (const ListedFile& row : times) {
+    const std::string stem = six_digits(row.row);
     result.frames.push_back({.stamp = row.stamp,
                              .left = image_file(images[0], stem),
                              .right = image_file(images[1], stem),
@@ -241,7 +253,7 @@ ImageFolder read_kitti_folder(const fs::path& folder) {
                              .depth = {},
                              .labels = {}});
   }
-  count_images_without_time(images[0], result);
+  count_images_without_time(images[0], times.back().row + 1, result);
   const fs::path calib = folder / "calib.txt";
   const std::array<ListedProjection, 2> P = {read_projection(calib, "P" + numbers[0]),
                                              read_projection(calib, "P" + numbers[1])};
@@ -310,7 +322,7 @@ ImageFolder read_seven_scenes_folder(const fs::path& folder) {
   std::error_code error;
   for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
        entry.increment(error)) {
-    const auto number = frame_number(entry->path());
+    const auto number = frame_number(entry->path(), ".color.");
     if (!number) continue;
     const std::string stem = "frame-" + six_digits(*number);
     result.frames.push_back({.stamp = nanoseconds(*number / kSevenScenesRate_hz),
@@ -331,6 +343,7 @@ ImageFolder read_seven_scenes_folder(const fs::path& folder) {
 ImageFolderReader::ImageFolderReader(ImageFolder folder, const RecordingPart& part)
     : folder_(std::move(folder)),
       depth_(folder_.list, folder_.rig.depth, folder_.depth_scale_m, false) {
+  check_depth_images(folder_.list, folder_.rig.stereo, folder_.frames);
   keep_part(part, folder_.list, folder_.frames);
 }
 

@@ -48,10 +48,10 @@ struct ImageFolder {
 };
 
 /// KITTI odometry. Row k of times.txt is the time [s] of image k in image_0 and image_1, whose name
-/// has six digits (image_2 and image_3 without a folder image_0). calib.txt has the projections of
-/// the rectified cameras: `P0: ` and 12 numbers, row by row. Throws DatasetError with file, line
-/// and value for a calibration or list that cannot be used. Faulty rows of times.txt are counted,
-/// and images after the last row.
+/// has six digits (image_2 and image_3 without a folder image_0). Faulty rows count as rows,
+/// blank lines do not. calib.txt has the projections of the rectified cameras: `P0: ` and 12
+/// numbers, row by row. Throws DatasetError with file, line and value for a calibration or list
+/// that cannot be used. Faulty rows of times.txt are counted, and images after the last row.
 [[nodiscard]] ImageFolder read_kitti_folder(const std::filesystem::path& folder);
 
 /// TUM RGB-D. Rows of rgb.txt and depth.txt are `time [s], file`. An image has the depth image that
@@ -70,7 +70,8 @@ struct ImageFolder {
 /// Reads the frames of an ImageFolder.
 class ImageFolderReader final : public DatasetReader {
  public:
-  /// Throws DatasetError for a part without a frame.
+  /// Throws DatasetError for a part without a frame, and for an RGB-D recording without any depth
+  /// image.
   ImageFolderReader(ImageFolder folder, const RecordingPart& part);
 
   [[nodiscard]] const SensorRig& rig() const override { return folder_.rig; }

@@ -22,8 +22,6 @@ class ImuStream {
   /// Stamps must ascend.
   void add(const ImuSample& sample);
 
-  [[nodiscard]] bool is_empty() const { return samples_.empty(); }
-
   /// starts_by(): a sample at or before the stamp has been added. reaches(): a sample at or after
   /// the stamp has been added.
   [[nodiscard]] bool starts_by(Stamp stamp) const { return first_ && *first_ <= stamp; }

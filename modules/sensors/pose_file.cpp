@@ -51,12 +51,10 @@ std::variant<MeasuredPose, RowFault> parse_pose(const TextRow& row) {
 
 PoseStream read_pose_file(const std::filesystem::path& file, ReaderReport& report) {
   PoseStream poses;
-  const auto rows =
-      read_ordered_rows<MeasuredPose>(file, kPose, report, parse_pose, stamp_of_seconds);
-  for (const auto& row : rows) poses.add(row.stamp, row.value);
-  if (rows.empty())
-    throw DatasetError(file.string() + ": no pose in it: t[s] x y z qx qy qz qw\n" +
-                       to_string(report));
+  for (const auto& row :
+       read_ordered_rows<MeasuredPose>(file, kPose, "no pose in it: t[s] x y z qx qy qz qw", report,
+                                       parse_pose, stamp_of_seconds))
+    poses.add(row.stamp, row.value);
   return poses;
 }
 

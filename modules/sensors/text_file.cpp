@@ -1,6 +1,7 @@
 #include "modules/sensors/text_file.hpp"
 
 #include <cctype>
+#include <sstream>
 
 #include "modules/core/input_file.hpp"
 #include "modules/sensors/dataset_reader.hpp"
@@ -30,6 +31,14 @@ std::string read_file(const std::filesystem::path& file) try {
 
 std::string at_line(const std::filesystem::path& file, int line) {
   return file.string() + " line " + std::to_string(line);
+}
+
+void refuse_list(const std::filesystem::path& file, const std::string& problem,
+                 const ReaderReport& faults) {
+  std::string message = file.string() + ": " + problem;
+  std::istringstream lines(to_string(faults));
+  for (std::string line; std::getline(lines, line);) message += "; " + line;
+  throw DatasetError(message);
 }
 
 std::vector<TextRow> rows_below_header(const std::string& text) {

@@ -25,6 +25,10 @@ struct RowFault {
   std::string why;
 };
 
+/// Throws DatasetError "FILE: PROBLEM; FAULTS" for a list without a valid row.
+[[noreturn]] void refuse_list(const std::filesystem::path& file, const std::string& problem,
+                              const ReaderReport& faults);
+
 /// A valid row with its parsed value.
 template <typename Value>
 struct StampedRow {
@@ -47,18 +51,21 @@ struct StampedRow {
 
 /// The valid rows of `file` with their values. A valid row starts with a stamp (`stamp_of` reads
 /// it), has at least `fields` fields, is in order of time, and `parse(row)` returns a Value and not
-/// a RowFault. All other rows are counted in `report`. Throws DatasetError if `file` is missing.
+/// a RowFault. All other rows are counted in `report`. Throws DatasetError if `file` is missing,
+/// and with `problem` and the faults of the rows if no row is valid.
 template <typename Value, typename Parse>
 [[nodiscard]] std::vector<StampedRow<Value>> read_ordered_rows(
-    const std::filesystem::path& file, std::size_t fields, ReaderReport& report, const Parse& parse,
+    const std::filesystem::path& file, std::size_t fields, const std::string& problem,
+    ReaderReport& report, const Parse& parse,
     std::variant<Stamp, RowFault> (*stamp_of)(const TextRow&, std::size_t) = km::stamp_of) {
   const std::string text = read_file(file);
+  ReaderReport faults;
   std::vector<StampedRow<Value>> rows;
   std::vector<Stamp> stamps;
   std::vector<int> lines;
   for (const TextRow& row : rows_below_header(text)) {
     const auto count = [&](const RowFault& fault) {
-      report.add(fault.fault, at_line(file, row.line) + ": " + fault.why);
+      faults.add(fault.fault, at_line(file, row.line) + ": " + fault.why);
     };
     const std::variant<Stamp, RowFault> stamp = stamp_of(row, fields);
     if (const auto* fault = std::get_if<RowFault>(&stamp)) {
@@ -74,9 +81,11 @@ template <typename Value, typename Parse>
     lines.push_back(row.line);
     rows.push_back({stamps.back(), row.line, std::get<Value>(std::move(value))});
   }
-  const std::vector<bool> counts = in_order(stamps, lines, file, report);
+  const std::vector<bool> counts = in_order(stamps, lines, file, faults);
   std::size_t row = 0;
   std::erase_if(rows, [&](const auto&) { return !counts[row++]; });
+  if (rows.empty()) refuse_list(file, problem, faults);
+  report.add(faults);
   return rows;
 }
 

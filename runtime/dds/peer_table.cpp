@@ -154,13 +154,17 @@ void PeerTable::twin_received(const Guid& guid, double its_uptime_s, double own_
     const bool is_new = own_uptime_s <= kNew_s;
     const bool yields = is_new && older_by_s > kYounger_s;
     twin.twin = {.met_s = own_uptime_s, .decided = yields || !is_new || older_by_s < -kOlder_s};
-    return emit(yields ? PeerEventKind::kConflict : PeerEventKind::kRefused, *twin.identity,
-                claim + (yields ? "; it had it first" : "; this one keeps it"));
+    return emit(
+        yields ? PeerEventKind::kConflict : PeerEventKind::kRefused, *twin.identity,
+        claim + (yields               ? "; it had the id first, and this robot ends"
+                 : twin.twin->decided ? "; this robot had the id first, and keeps it"
+                                      : "; both began at about one time, and one will end"));
   }
   if (twin.twin->decided || own_uptime_s - twin.twin->met_s < kDecided_s) return;
   twin.twin->decided = true;
   if (twin.identity->boot < self_.boot)
-    emit(PeerEventKind::kConflict, *twin.identity, claim + "; both began at the same time");
+    emit(PeerEventKind::kConflict, *twin.identity,
+         claim + "; both began at about one time, and this robot ends");
 }
 
 std::vector<Peer> PeerTable::peers() const {

@@ -208,9 +208,9 @@ TEST_CASE("The demo names the missing map, and lists the other results", "[demo]
   const CommandResult result = demo.run("--map");
   CAPTURE(result.output);
   CHECK(result.exit_code == 1);
-  CHECK_THAT(result.output,
-             Catch::Contains("report.html") && !Catch::Contains("team_mesh.png ") &&
-                 Catch::EndsWith("demo: the team built no mesh: see robot0/robot.log\n"));
+  CHECK_THAT(result.output, Catch::Contains("report.html") && !Catch::Contains("team_mesh.png ") &&
+                                Catch::EndsWith("demo: the team built no mesh: the notes above and "
+                                                "robot0/robot.log have the reason\n"));
 }
 
 TEST_CASE("The demo needs the evaluation program for a map", "[demo]") {

@@ -174,6 +174,8 @@ TEST_CASE("A finding on a run is reported with its number", "[robot][findings]")
     check_finding("odometry.broken", Severity::kWarning, "2 steps of its odometry are wrong");
   }
   SECTION("a recording that was paused") {
+    summary.paused_s = 0.75;
+    CHECK(findings_of_one(run).empty());
     summary.paused_s = 3.25;
     check_finding("frames.paused", Severity::kNote, "paused for 3.2 s in all");
     CHECK_THAT(the_finding_of(run).means, Catch::Contains("every image was used"));
@@ -236,6 +238,10 @@ TEST_CASE("A finding on a run is reported with its number", "[robot][findings]")
   SECTION("another vocabulary") {
     summary.other_vocabulary["bob"] = 77;
     check_finding("vocabulary.other", Severity::kError, "77 keyframes of bob");
+  }
+  SECTION("another network") {
+    summary.other_network["bob"] = 5;
+    check_finding("network.other", Severity::kWarning, "5 keyframes of bob were matched by ORB");
   }
   SECTION("held back") {
     summary.held_back.emplace().delayed.messages["pgo"] = 12;

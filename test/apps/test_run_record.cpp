@@ -128,6 +128,26 @@ TEST_CASE("keyframes that another vocabulary keeps from being compared are count
   CHECK(record.other_vocabulary().empty());
 }
 
+TEST_CASE("keyframes that were compared by ORB because of another network are counted", "[robot]") {
+  RunRecord record(1);
+  KeyframeReply by_orb{.number = 1, .found = true, .keyframe = {}};
+  by_orb.keyframe.odometry.id = {2, 7};
+  record.add(by_orb);  // this robot has no network, either
+  CHECK(record.other_network().empty());
+  Keyframe own;
+  own.features.network = 0x1234;
+  record.add(own);
+  record.add(by_orb);
+  KeyframeReply by_network = by_orb;
+  by_network.keyframe.features.network = 0x1234;
+  record.add(by_network);
+  CHECK(record.other_network() == std::map<RobotId, std::uint64_t>{{2, 1}});
+  PeerEvent event{PeerEventKind::kRestarted, {}, {}};
+  event.identity.robot = 2;
+  record.add(event);
+  CHECK(record.other_network().empty());
+}
+
 TEST_CASE("closures to one robot are recorded up to a bound", "[robot]") {
   RunRecord record(1);
   constexpr auto kMost = static_cast<KeyframeIndex>(OwnGraph::kMaxClosures);

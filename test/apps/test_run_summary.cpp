@@ -103,7 +103,8 @@ TEST_CASE("summary.json has the keys that others read", "[robot][summary]") {
         "/process/system_s /process/page_faults /process/peak_memory_bytes "
         "/process/memory_at_start_bytes "
         "/process/memory_at_end_bytes /process/memory_growth_bytes_per_minute "
-        "/seconds /lost_peers/x /apart_peers/x /other_vocabulary/x /exit_reason "
+        "/seconds /lost_peers/x /apart_peers/x /other_vocabulary/x /other_network/x "
+        "/exit_reason "
         "/findings/0/id /findings/0/severity /findings/0/what /findings/0/means /findings/0/to_do "
         "/findings/1/id /findings/1/severity /findings/1/what /findings/1/means "
         "/findings/1/to_do ");

@@ -145,7 +145,7 @@ TEST_CASE("A team in two parts ends in two frames and its table of links gives t
     CHECK(run.summary(robot).pgo.members == std::vector<RobotId>{robot});
     CHECK(run.summary(robot).pgo.anchor == robot);
   }
-  CHECK_THAT(run.team.result.output, Catch::Contains("never joined the others"));
+  CHECK_THAT(run.team.result.output, Catch::Contains("never joined the other robot"));
   REQUIRE(run.links.size() == 2);
   for (const auto& [pair, link] : run.links) {
     CHECK(link.at("frames_in") > 0);

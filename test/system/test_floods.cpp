@@ -432,7 +432,7 @@ TEST_CASE("A flood of places costs little, too", "[floods]") {
   if (!images) return;
   log::set_level(log::Level::kError);
   const std::uint64_t vocabulary =
-      load_vocabulary(find_shipped_file("vocabulary/indoor.kmvoc")).id();
+      load_vocabulary(find_shipped_file("vocabulary/indoor.kmvoc", "run.vocabulary")).id();
   print_head();
   check({.name = "bags of words",
          .send = [vocabulary](

@@ -302,7 +302,7 @@ function showImages(section, all) {
       element('span', `badge ${c[4] === KEPT ? 'good' : 'warn'}`, caption, STAGES[c[4]]);
       element('b', '', caption, ` ${sides.map(([id, k]) => `${nameOf(id)} ${k}`).join(' – ')} `);
       caption.append(
-          `${c[5]} matches, ${c[6]} inliers found by their pose`,
+          `${c[5]} matches of descriptors; ${c[6]} points agree with the pose`,
           run.reasons[c[7]] && `; ${run.reasons[c[7]]}`);
     }
     more.textContent = `${waiting.length} more`;

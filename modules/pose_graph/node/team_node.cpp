@@ -104,17 +104,18 @@ void TeamNode::take_peer_event(const PeerEvent& event) {
   }
 }
 
-void TeamNode::publish(TeamOutput output) const {
+void TeamNode::publish(TeamOutput output) {
   for (TeamMessage& message : output.messages) topics_.messages.publish(std::move(message));
   for (const std::string& notice : output.notices)
     log::limited(log::Level::kWarn, name(), notice) << notice;
   if (output.trajectory) topics_.trajectory.publish(std::move(*output.trajectory));
   if (output.progress) topics_.progress.publish(std::move(*output.progress));
   if (!output.verdicts) return;
-  if (const std::size_t rejected = output.verdicts->rejected(); rejected > 0)
+  const std::size_t rejected = output.verdicts->rejected();
+  if (std::exchange(rejected_, rejected) != rejected)
     log::limited(log::Level::kInfo, name(), "verdicts")
         << rejected << " of this robot's " << output.verdicts->closures.size()
-        << " closures rejected: the others contradict them";
+        << " closures rejected: other measurements contradict them";
   topics_.verdicts.publish(std::move(*output.verdicts));
 }
 

@@ -80,12 +80,13 @@ class TeamNode final : public Node {
  private:
   void take(const Input& input);
   void take_peer_event(const PeerEvent& event);
-  void publish(TeamOutput output) const;
+  void publish(TeamOutput output);
 
   const TeamPeer self_;
   const TeamTopics topics_;
   const std::function<std::uint64_t()> sent_bytes_;
   TeamAgent agent_;
+  std::size_t rejected_ = 0;  // closures of this robot that are rejected, as last logged
   Worker<Input> worker_;
   Periodic ticks_;  // last member: stops before the worker it posts to
 };

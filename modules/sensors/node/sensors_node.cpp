@@ -117,8 +117,8 @@ double SensorsNode::wait_for_odometry(double due_s, double now_s) {
   clock_.pause(pause_s);
   shedding_.pause(pause_s);
   paused_s_ += pause_s;
-  log::limited(log::Level::kWarn, name(), "pause")
-      << "processors are short: the recording has been paused for " << fixed(paused_s_, 1)
+  log::limited(leaves_out_ ? log::Level::kWarn : log::Level::kInfo, name(), "pause")
+      << "processors are short: the recording has waited for " << fixed(paused_s_, 1)
       << " s in all";
   return pause_s;
 }
@@ -139,7 +139,10 @@ void SensorsNode::report_load(const ShedLoad& before, const ShedLoad& now) {
   const bool is_more = now.stride > before.stride || (now.map && !before.map);
   auto line = log::limited(is_more ? log::Level::kWarn : log::Level::kInfo, name(),
                            is_more ? "shed" : "restored");
-  line << (is_more ? "processors are short: " : "processors are free again: ");
+  const bool is_over = now == ShedLoad{};
+  line << (is_more   ? "processors are short: "
+           : is_over ? "processors are free again: "
+                     : "processors are less short: ");
   if (now.stride > 1)
     line << (now.map && !before.map ? "the map gets no new frames, " : "")
          << "odometry gets one of " << now.stride << " images";

@@ -29,7 +29,7 @@ try {
 
   // Images of the closure that was kept; not of one that was not verified.
   assert.equal(await count('#images img'), 2);
-  assert.equal(await textOf('#images figcaption'), 'kept r0 0 – r1 1 80 matches, 60 inliers found by their pose');
+  assert.equal(await textOf('#images figcaption'), 'kept r0 0 – r1 1 80 matches of descriptors; 60 points agree with the pose');
   await page.until(
       `[...document.querySelectorAll('#images img')].every((e) => e.naturalWidth === 1)`);
 

@@ -159,8 +159,9 @@ TEST_CASE("Missing files and folders are refused by name", "[sensors]") {
                       Catch::StartsWith((corrupted.mav0() / file).string() + ": no such file"));
   }
   fs::remove_all(folder.mav0() / "cam1");
-  CHECK_THROWS_WITH(open_euroc(folder.root()), Catch::Contains("cam1/sensor.yaml: no such file") &&
-                                                   Catch::Contains("nor depth0"));
+  for (const fs::path& path : {folder.root(), folder.mav0()})
+    CHECK_THROWS_WITH(open_euroc(path), Catch::Contains("cam1/sensor.yaml: no such file") &&
+                                            Catch::Contains("nor depth0"));
   fs::remove_all(folder.mav0());
   CHECK_THROWS_WITH(open_euroc(folder.root()),
                     Catch::EndsWith("neither a folder mav0 nor cam0 in it: not a recording in the "
@@ -219,7 +220,25 @@ TEST_CASE("Lists without a usable row are refused", "[sensors]") {
   }
   SECTION("inertial samples") {
     folder.write("imu0/data.csv", "nonsense\n1,2,3\n");
-    CHECK_THROWS_WITH(open_euroc(folder.root()), Catch::EndsWith("holds no inertial sample"));
+    CHECK_THROWS_WITH(open_euroc(folder.root()),
+                      Catch::Contains("holds no inertial sample; 1 malformed rows, first: ") &&
+                          Catch::EndsWith("line 2: 3 fields, expected 7"));
+  }
+  SECTION("inertial samples whose values are not numbers") {
+    folder.write("cam0/data.csv", folder.read("cam0/data.csv") + "nonsense,a\n");
+    folder.write("imu0/data.csv", "10,nan,0,0,0,0,9.8\n20,0,0,0,0,0,inf\n0.5,0,0,0,0,0,9.8\n");
+    const std::string list = (folder.mav0() / "imu0/data.csv").string();
+    CHECK_THROWS_WITH(open_euroc(folder.root()),
+                      list + ": holds no inertial sample; 1 malformed rows, first: " + list +
+                          " line 3: 0.5 is not a stamp in nanoseconds; 2 inertial samples with "
+                          "NaN or infinity, first: " +
+                          list + " line 1: not finite");
+  }
+  SECTION("images with stamps in seconds") {
+    folder.write("cam1/data.csv", "10.05,a.png\n10.1,b.png\n");
+    CHECK_THROWS_WITH(open_euroc(folder.root()),
+                      Catch::Contains("cam1/data.csv: lists no image; 2 malformed rows, first: ") &&
+                          Catch::EndsWith("line 1: 10.05 is not a stamp in nanoseconds"));
   }
   SECTION("no pairs") {
     folder.write("cam1/data.csv", "55,55.png\n");

@@ -118,6 +118,10 @@ TEST_CASE("Faulty times and images of a folder in KITTI's layout are left out an
     folder.write("times.txt", "nan\n0.1\n0.2\n0.3\n");
     check(ReaderFault::kMalformedRow, "times.txt line 1: nan is no time in seconds", 3);
   }
+  SECTION("NaN after a blank line") {
+    folder.write("times.txt", "0.0\n\nnan\n0.2\n0.3\n");
+    check(ReaderFault::kMalformedRow, "times.txt line 3: nan is no time in seconds", 3);
+  }
   SECTION("out of order") {
     folder.write("times.txt", "0.0\n0.15\n0.12\n0.3\n");
     check(ReaderFault::kUnorderedStamp, "times.txt line", 3);
@@ -139,8 +143,28 @@ TEST_CASE("Faulty times and images of a folder in KITTI's layout are left out an
   }
   SECTION("no time at all") {
     folder.write("times.txt", "\n");
-    CHECK_THROWS_WITH(open_folder(folder.path()), Catch::Contains("times.txt: no time in it"));
+    CHECK_THROWS_WITH(open_folder(folder.path()), Catch::EndsWith("times.txt: no time in it"));
+    folder.write("times.txt", "nan\n");
+    CHECK_THROWS_WITH(open_folder(folder.path()),
+                      Catch::Contains("times.txt: no time in it; 1 malformed rows, first: ") &&
+                          Catch::EndsWith("times.txt line 1: nan is no time in seconds"));
   }
+}
+
+TEST_CASE("Blank lines and comments of KITTI's times do not change the stamps of images",
+          "[sensors][folder]") {
+  const TemporaryFolder folder;
+  write_kitti(folder);
+  folder.write("times.txt", "# seconds\n0.0\n\n0.1\n \t\n\n0.2\n0.3\n\n");
+  const auto reader = open_folder(folder.path());
+  const auto packets = packets_of(*reader);
+  REQUIRE(packets.size() == kFrames);
+  for (std::size_t k = 0; k < packets.size(); ++k) {
+    CHECK(packets[k].frame->stamp == static_cast<Stamp>(k) * 100'000'000);
+    CHECK(packets[k].frame->left.pixels[0] == 10 * k);
+    CHECK(packets[k].frame->right.pixels[0] == 10 * k);
+  }
+  CHECK(reader->report().empty());
 }
 
 TEST_CASE("A folder in the layout of TUM RGB-D has the camera of its name", "[sensors][folder]") {
@@ -183,18 +207,27 @@ TEST_CASE("The camera of a folder in the layout of TUM RGB-D can be described",
   CHECK_THAT(faulty->report().entries().at(ReaderFault::kMalformedRow).first,
              Catch::Contains("rgb.txt line 2: 1 fields, expected 2"));
   CHECK(faulty->report().count(ReaderFault::kMalformedRow) == 2);
+  std::ofstream(root / "depth.txt") << "1305031109.0 depth/0.png\n";
+  CHECK_THROWS_WITH(open_folder(root, {}, camera),
+                    Catch::EndsWith("rgb.txt: no depth image for any of 1 images: the stamps of "
+                                    "depth images are too far away"));
   fs::remove(root / "depth.txt");
   CHECK_THROWS_WITH(open_folder(root, {}, camera), Catch::Contains("depth.txt: no such file"));
 }
 
-TEST_CASE("A folder in the layout of 7-Scenes is read at 30 Hz", "[sensors][folder]") {
-  const TemporaryFolder folder;
+// Frames 0, 4 and 12 of a recording; the grey value of an image is its number.
+void write_seven_scenes(const TemporaryFolder& folder) {
   folder.write("camera-intrinsics.txt", "30 0 16\n0 30 12\n0 0 1\n");
   for (const int k : {0, 4, 12}) {
     const std::string stem = "frame-0000" + std::string(k < 10 ? "0" : "") + std::to_string(k);
     write_image(folder.path() / (stem + ".color.png"), CV_8UC3, k);
     write_image(folder.path() / (stem + ".depth.png"), CV_16UC1, 1500);
   }
+}
+
+TEST_CASE("A folder in the layout of 7-Scenes is read at 30 Hz", "[sensors][folder]") {
+  const TemporaryFolder folder;
+  write_seven_scenes(folder);
   const auto reader = open_folder(folder.path());
   const auto packets = packets_of(*reader);
   REQUIRE(packets.size() == 3);
@@ -204,6 +237,35 @@ TEST_CASE("A folder in the layout of 7-Scenes is read at 30 Hz", "[sensors][fold
   folder.write("camera-intrinsics.txt", "30 0 16\n0 30 inf\n0 0 1\n");
   CHECK_THROWS_WITH(open_folder(folder.path()),
                     Catch::Contains("camera-intrinsics.txt line 2: inf is not a number"));
+}
+
+TEST_CASE("The names of frames show the layout of 7-Scenes without a calibration",
+          "[sensors][folder]") {
+  const TemporaryFolder folder;
+  write_seven_scenes(folder);
+  fs::remove(folder.path() / "camera-intrinsics.txt");
+  const std::string missing = GENERATE("", ".color.", ".depth.");
+  CAPTURE(missing);
+  for (const char* frame : {"frame-000000", "frame-000004", "frame-000012"})
+    if (!missing.empty()) fs::remove(folder.path() / (frame + missing + "png"));
+  CHECK(layout_of(folder.path()) == FolderLayout::kSevenScenes);
+  CHECK_THROWS_WITH(open_folder(folder.path()),
+                    Catch::EndsWith("camera-intrinsics.txt: no such file"));
+}
+
+TEST_CASE("A folder in the layout of 7-Scenes without any depth image is refused",
+          "[sensors][folder]") {
+  const TemporaryFolder folder;
+  write_seven_scenes(folder);
+  fs::remove(folder.path() / "frame-000000.depth.png");
+  fs::remove(folder.path() / "frame-000004.depth.png");
+  CHECK(packets_of(*open_folder(folder.path())).size() == 3);
+  CHECK(open_folder(folder.path(), {.to_s = 0.2})->pair_count() == 2);  // a part without depth
+  fs::remove(folder.path() / "frame-000012.depth.png");
+  const std::string root = folder.path().string();
+  CHECK_THROWS_WITH(open_folder(folder.path()),
+                    root + ": no depth image for any of 3 images, first: " + root +
+                        "/frame-000000.depth.png: no such image");
 }
 
 }  // namespace

@@ -156,6 +156,21 @@ TEST_CASE("A recording without requested depth or labels is refused", "[sensors]
   CHECK_THROWS_WITH(open_euroc(folder.root()), Catch::EndsWith("depth0/data.csv: no such file"));
 }
 
+TEST_CASE("An RGB-D recording without any depth image is refused", "[sensors]") {
+  const EurocFolder folder;
+  folder.add_depth();
+  fs::remove_all(folder.mav0() / "depth0/data");
+  EurocReader stereo = open_euroc(folder.root(), {.depth = true});
+  CHECK(packets_of(stereo).size() == EurocFolder::kPairs);
+  fs::remove_all(folder.mav0() / "cam1");
+  CHECK_THROWS_WITH(open_euroc(folder.root()),
+                    Catch::Contains("mav0: no depth image for any of 8 images, first: ") &&
+                        Catch::EndsWith(".png: no such image"));
+  folder.write("depth0/data.csv", "55,55.png\n");
+  CHECK_THROWS_WITH(open_euroc(folder.root()),
+                    Catch::EndsWith("the stamps of depth images are too far away"));
+}
+
 TEST_CASE("A depth or label image that cannot be used loses only itself", "[sensors]") {
   struct Case {
     const char* sensor;
