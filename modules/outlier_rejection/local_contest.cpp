@@ -39,11 +39,13 @@ void LocalContest::weigh(Entry& added) {
     if (test_.consistent(added.closure, entry.closure)) {
       added.support += entry.inliers;
       entry.support += added.inliers;
+      most_support_ = std::max(most_support_, entry.support);
     } else {
       added.against.push_back(other->first);
       entry.against.push_back(id);
     }
   }
+  most_support_ = std::max(most_support_, added.support);
 }
 
 void LocalContest::keep(const std::set<ClosureId>& kept) {

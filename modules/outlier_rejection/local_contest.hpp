@@ -36,6 +36,9 @@ class LocalContest {
   /// Removes all closures but those of `kept`.
   void keep(const std::set<ClosureId>& kept);
 
+  /// Largest support of a closure so far; 0 without one.
+  [[nodiscard]] double most_support() const { return most_support_; }
+
   /// False for closures that were not added.
   [[nodiscard]] bool is_overruled(const ClosureId& closure) const;
 
@@ -50,6 +53,7 @@ class LocalContest {
 
   CycleTest test_;
   std::map<ClosureId, Entry> entries_;
+  double most_support_ = 0.0;
 };
 
 }  // namespace km

@@ -27,7 +27,7 @@ struct PcmConfig {
   ClosureSelection selection = ClosureSelection::kWitness;
   int min_witnesses = 2;
   double witness_wait_s = 30.0;
-  int min_lone_inliers = 40;
+  int min_lone_support = 150;
   CycleCriterion criterion = CycleCriterion::kMahalanobis;
   double confidence = 0.99;
   double odometry_noise_scale = 1.0;
@@ -52,9 +52,10 @@ struct PcmConfig {
     visitor.field("witness_wait_s", witness_wait_s, {0.0, 1e6},
                   "[s of keyframe stamps since the first closure] witness: time after which a pair "
                   "is joined without witnesses, tentatively");
-    visitor.field("min_lone_inliers", min_lone_inliers, {0, 10000},
-                  "witness: least inliers of the best closure of a pair that is joined without "
-                  "witnesses");
+    visitor.field(
+        "min_lone_support", min_lone_support, {0, 10000},
+        "witness: least inliers of a closure and of those beside it that agree, together, "
+        "in a pair that is joined without witnesses");
     visitor.field(
         "criterion", criterion,
         {{"mahalanobis", CycleCriterion::kMahalanobis}, {"bounds", CycleCriterion::kBounds}},

@@ -40,8 +40,7 @@ PcmAddResult WitnessedPair::add(const Closure& closure) {
     return PcmAddResult::kAgainstOdometry;
   added_.insert(id);
   contest_.add(closure);
-  const bool is_stated = closure.inliers != 0;
-  strongest_ = std::max(strongest_, is_stated ? closure.inliers : config_.min_lone_inliers);
+  has_unstated_ |= closure.inliers == 0;
   const std::size_t before = witnesses();
   if (!is_witnessed()) test(oriented);
   return witnesses() > before ? PcmAddResult::kGrew : PcmAddResult::kAdded;

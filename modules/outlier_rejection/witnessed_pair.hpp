@@ -38,11 +38,14 @@ class WitnessedPair {
   [[nodiscard]] std::size_t witnesses() const { return clique_.clique().size(); }
   /// True if there are PcmConfig::min_witnesses.
   [[nodiscard]] bool is_witnessed() const;
-  /// True if a closure has PcmConfig::min_lone_inliers, or does not state its inliers (0, as in
-  /// recorded graphs). Without witnesses, a place with fewer may be one that only looks alike.
-  [[nodiscard]] bool is_strong() const { return strongest_ >= config_.min_lone_inliers; }
-  /// Most inliers of a closure so far.
-  [[nodiscard]] int strongest() const { return strongest_; }
+  /// True if the support() reaches PcmConfig::min_lone_support, or a closure does not state its
+  /// inliers (0, as in recorded graphs). Without witnesses, a place with less may be one that only
+  /// looks alike.
+  [[nodiscard]] bool is_strong() const {
+    return has_unstated_ || support() >= config_.min_lone_support;
+  }
+  /// Most inliers of a closure and of those beside it that agree, see LocalContest.
+  [[nodiscard]] int support() const { return static_cast<int>(contest_.most_support()); }
 
  private:
   void test(const OrientedClosure& closure);
@@ -53,8 +56,8 @@ class WitnessedPair {
   CycleTest test_;
   std::set<ClosureId> known_;  // added closures, and those refused by the odometry gate
   std::set<ClosureId> added_;
-  int strongest_ = 0;     // most inliers of an added closure
-  LocalContest contest_;  // among added closures
+  bool has_unstated_ = false;  // true if an added closure does not state its inliers
+  LocalContest contest_;       // among added closures
   std::vector<PreparedClosure> tested_;
   MaxClique clique_;  // over `tested_`; closures that share a neighbourhood are not connected
 };

@@ -149,8 +149,8 @@ bool PcmNode::is_joined(RobotId other, Pair& pair) const {
   if (!no_more_ && waited_s < config_.witness_wait_s) return false;
   if (!closures.is_strong()) {
     log::limited(log::Level::kWarn, name(), "weak " + text_of(self_, other))
-        << text_of(self_, other) << "not joined: their best closure has " << closures.strongest()
-        << " inliers of pcm.min_lone_inliers " << config_.min_lone_inliers
+        << text_of(self_, other) << "not joined: at their best place closures have "
+        << closures.support() << " inliers of pcm.min_lone_support " << config_.min_lone_support
         << ", and none at another place agrees";
     return false;
   }

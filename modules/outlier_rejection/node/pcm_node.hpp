@@ -38,7 +38,7 @@ struct PcmTopics {
 /// PcmConfig::selection states the rule. By default all closures are optimised, because the
 /// optimiser weighs them. Two robots are joined only when independent closures agree
 /// (WitnessedPair), when PcmConfig::witness_wait_s is over, or when no witness can arrive any more.
-/// A join without witnesses is logged, and needs a closure with PcmConfig::min_lone_inliers. The
+/// A join without witnesses is logged, and needs PcmConfig::min_lone_support. The
 /// wait is in sensor time, by the stamps of the robot's keyframes, so results do not depend on the
 /// speed of a replay. Closures inside the robot join nothing and are published at once.
 class PcmNode final : public Node {

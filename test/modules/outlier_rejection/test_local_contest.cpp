@@ -82,6 +82,26 @@ TEST_CASE("Errors that stated covariances allow threefold overrule nothing", "[c
   CHECK_FALSE(contest_of({close, row.at(10, 11, 0.0, 100)}).is_overruled(close.id()));
 }
 
+TEST_CASE("The support is the inliers of closures at one place that agree", "[contest][witness]") {
+  const TentRow row;
+  // Two agree, a third beside them is shifted by a tent, and a fourth is at another place.
+  std::vector<Closure> closures = {row.at(10, 10, 0.0, 70), row.at(12, 12, 0.0, 79),
+                                   row.at(11, 11, 6.0, 90), row.at(40, 40, 6.0, 80)};
+  std::mt19937 rng(GENERATE(1U, 2U, 3U));
+  std::ranges::shuffle(closures, rng);
+  CHECK(contest_of(closures).most_support() == 149.0);
+  CHECK(contest_of({}).most_support() == 0.0);
+
+  PcmConfig config;
+  config.min_witnesses = 3;
+  WitnessedPair pair(0, 1, config);
+  for (const Closure& closure : closures) (void)pair.add(closure);
+  CHECK(pair.support() == 149);
+  CHECK_FALSE(pair.is_strong());
+  (void)pair.add(row.at(13, 13, 0.0, 1));
+  CHECK(pair.is_strong());
+}
+
 TEST_CASE("A closure whose stronger neighbours are dropped is not overruled any more",
           "[contest]") {
   const TentRow row;
