@@ -180,8 +180,7 @@ void add_skipped(const RunSummary& run, std::vector<Finding>& findings) {
 }
 
 void add_paused(const RunSummary& run, std::vector<Finding>& findings) {
-  constexpr double kNoticed_s = 1.0;
-  if (run.paused_s < kNoticed_s) return;
+  if (run.paused_s < kNoticedPause_s) return;
   const bool used_all = run.frames_skipped == 0;
   findings.push_back(
       {.id = "frames.paused",
@@ -202,15 +201,15 @@ void add_map_gave_way(const RunSummary& run, std::vector<Finding>& findings) {
   const auto left_out = static_cast<double>(run.mapping->dropped_under_load);
   const double share = left_out / (left_out + static_cast<double>(run.mapping->frames));
   constexpr double kFew = 0.05;
-  findings.push_back(
-      {.id = "map.dropped_under_load",
-       .severity = share < kFew ? Severity::kNote : Severity::kWarning,
-       .what = run.name + ": " + std::to_string(run.mapping->dropped_under_load) +
-               " frames were left out of the map, " + percent(share),
-       .means = "processors were short, and the map gives way to odometry: it may "
-                "have holes",
-       .to_do = "--rate auto, which waits, a lower mapping.rate_hz or stereo_depth.downscale, or a "
-                "faster computer"});
+  findings.push_back({.id = "map.dropped_under_load",
+                      .severity = share < kFew ? Severity::kNote : Severity::kWarning,
+                      .what = run.name + ": " + std::to_string(run.mapping->dropped_under_load) +
+                              " frames were left out of the map, " + percent(share),
+                      .means = "processors were short, and the map gives way to odometry: it may "
+                               "have holes",
+                      .to_do = "--rate auto, which waits, a lower mapping.rate_hz, a higher "
+                               "stereo_depth.downscale, or a "
+                               "faster computer"});
 }
 
 void add_noisy_odometry(const RunSummary& run, std::vector<Finding>& findings) {

@@ -58,8 +58,8 @@ void RunRecord::add(const Keyframe& keyframe) {
 
 void RunRecord::add(const KeyframeReply& reply) {
   if (!reply.found) return;
-  // A reply is by ORB if the other robot has another network, or none.
-  if (reply.keyframe.features.network != network_)
+  // The other robot answers by ORB if it has another network than this one, or none.
+  if (network_ != 0 && reply.keyframe.features.network == 0)
     ++other_network_[reply.keyframe.odometry.id.robot];
   ++peer_keyframes_.keyframes;
   peer_keyframes_.keypoints += reply.keyframe.features.keypoints.size() + reply.descriptors.size();

@@ -272,6 +272,9 @@ struct HolesSummary {
   bool operator==(const HolesSummary&) const = default;
 };
 
+/// Shorter pauses of a recording are not reported: an ordinary computer has them, too.
+inline constexpr double kNoticedPause_s = 1.0;
+
 /// Totals of a robot's run: summary.json, and the robot's part of a team's --json. The names in
 /// visit_fields are the keys, which are written and read in this order. An absent optional has no
 /// key; NaN is written as null.

@@ -220,8 +220,7 @@ std::string skipped_remark(const RobotResult& robot) {
   const auto skipped = static_cast<double>(summary.frames_skipped);
   const auto used = static_cast<double>(summary.frames);
   std::string text;
-  constexpr double kNoticed_s = 1.0;
-  if (summary.paused_s >= kNoticed_s)
+  if (summary.paused_s >= kNoticedPause_s)
     text += "note: the recording of " + name + " was paused for " + fixed(summary.paused_s, 1) +
             " s in all, as processors were short\n";
   if (skipped > kManySkipped * (skipped + used))

@@ -229,6 +229,13 @@ TEST_CASE("The demo refuses unusable input", "[demo]") {
     return result.output;
   };
   CHECK_THAT(refusal("/no/such/folder"), Catch::Contains("no such folder: /no/such/folder"));
+  const TemporaryFolder recordings;
+  const std::filesystem::path one = recordings.path() / "one";
+  std::filesystem::create_directories(one / "mav0");
+  CHECK_THAT(
+      refusal(recordings.path().string()),
+      Catch::Contains("is a folder of recordings: name one, such as " + one.string() + "\n"));
+  CHECK_THAT(refusal(one.string()), Catch::Contains("cam0/data.csv is missing"));
   CHECK_THAT(refusal("--robots none"), Catch::Contains("--robots none is not a number"));
   for (const std::string rate : {"fast", "0", "-1", "1.0x", ""})
     CHECK_THAT(refusal("--rate '" + rate + "'"),

@@ -132,14 +132,17 @@ TEST_CASE("keyframes that were compared by ORB because of another network are co
   RunRecord record(1);
   KeyframeReply by_orb{.number = 1, .found = true, .keyframe = {}};
   by_orb.keyframe.odometry.id = {2, 7};
-  record.add(by_orb);  // this robot has no network, either
+  KeyframeReply by_network = by_orb;
+  by_network.keyframe.features.network = 0x1234;
+  // Without a keyframe of its own, the robot does not know its network: a finished run that serves
+  // others has none in this process.
+  record.add(by_orb);
+  record.add(by_network);
   CHECK(record.other_network().empty());
   Keyframe own;
   own.features.network = 0x1234;
   record.add(own);
   record.add(by_orb);
-  KeyframeReply by_network = by_orb;
-  by_network.keyframe.features.network = 0x1234;
   record.add(by_network);
   CHECK(record.other_network() == std::map<RobotId, std::uint64_t>{{2, 1}});
   PeerEvent event{PeerEventKind::kRestarted, {}, {}};

@@ -112,7 +112,7 @@ void TeamNode::publish(TeamOutput output) {
   if (output.progress) topics_.progress.publish(std::move(*output.progress));
   if (!output.verdicts) return;
   const std::size_t rejected = output.verdicts->rejected();
-  if (std::exchange(rejected_, rejected) != rejected)
+  if (std::exchange(rejected_, rejected) != rejected && rejected > 0)
     log::limited(log::Level::kInfo, name(), "verdicts")
         << rejected << " of this robot's " << output.verdicts->closures.size()
         << " closures rejected: other measurements contradict them";

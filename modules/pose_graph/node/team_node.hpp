@@ -86,7 +86,7 @@ class TeamNode final : public Node {
   const TeamTopics topics_;
   const std::function<std::uint64_t()> sent_bytes_;
   TeamAgent agent_;
-  std::size_t rejected_ = 0;  // closures of this robot that are rejected, as last logged
+  std::size_t rejected_ = 0;  // closures of this robot that the last verdicts reject
   Worker<Input> worker_;
   Periodic ticks_;  // last member: stops before the worker it posts to
 };
