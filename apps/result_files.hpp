@@ -35,14 +35,12 @@ inline constexpr const char* kObjectsFile = "objects.json";
 
 /// Results of a robot in its output folder.
 inline constexpr std::array kResultFiles = {
-    "odometry.tum",   "optimized.tum",      "optimized_keyframes.tum",
-    "pose_graph.g2o", "keyframes.csv",      "loop_closures.csv",
-    "optimizer.csv",  "traffic.csv",        "process.csv",
-    "timing.csv",     "config.yaml",        kSummary,
-    "mesh.ply",       "mesh_optimized.ply", kLabelPalette,
-    kTeamMesh,        kObjectsFile,         kMap2dImage,
-    kMap2d,           kDistanceSlice,       kTeamMap2d,
-    kTeamMap2dImage};
+    "odometry.tum",   "live.tum",      "optimized.tum",      "optimized_keyframes.tum",
+    "pose_graph.g2o", "keyframes.csv", "loop_closures.csv",  "optimizer.csv",
+    "traffic.csv",    "process.csv",   "timing.csv",         "config.yaml",
+    kSummary,         "mesh.ply",      "mesh_optimized.ply", kLabelPalette,
+    kTeamMesh,        kObjectsFile,    kMap2dImage,          kMap2d,
+    kDistanceSlice,   kTeamMap2d,      kTeamMap2dImage};
 
 /// Results that grow during the run, and continue when it is resumed.
 inline constexpr std::array kGrowingFiles = {"optimizer.csv", "traffic.csv", "process.csv"};

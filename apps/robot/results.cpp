@@ -207,6 +207,7 @@ void write_results(const fs::path& folder, const RunRecord& record, ResultWriter
     });
   };
   write("odometry.tum", write_poses, record.odometry());
+  write("live.tum", write_poses, record.live());
   write("optimized.tum", write_poses, record.optimized());
   write("optimized_keyframes.tum", write_keyframe_poses, record);
   results.write(folder / "pose_graph.g2o",

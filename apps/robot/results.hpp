@@ -8,8 +8,8 @@
 
 namespace km {
 
-/// Writes odometry.tum, optimized.tum, optimized_keyframes.tum, pose_graph.g2o, keyframes.csv and
-/// loop_closures.csv to `folder`.
+/// Writes odometry.tum, live.tum, optimized.tum, optimized_keyframes.tum, pose_graph.g2o,
+/// keyframes.csv and loop_closures.csv to `folder`.
 void write_results(const std::filesystem::path& folder, const RunRecord& record,
                    ResultWriter& results);
 

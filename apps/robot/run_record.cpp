@@ -36,10 +36,20 @@ void append_in_parts(const Event& whole, std::vector<Element> Event::*list,
 void RunRecord::add(const OdometryState& state) {
   while (!odometry_.empty() && odometry_.back().stamp >= state.stamp) odometry_.pop_back();
   odometry_.push_back({state.stamp, state.T_odom_body});
+  add_live(state);
+}
+
+// Before the first solution `world` is the robot's own odometry frame.
+void RunRecord::add_live(const OdometryState& state) {
+  frames_.add(state);
+  while (!live_.empty() && live_.back().stamp >= state.stamp) live_.pop_back();
+  if (!trajectory_is_restored_)
+    live_.push_back({state.stamp, frames_.T_map_odom() * state.T_odom_body});
 }
 
 void RunRecord::add(const KeyframeOdometry& keyframe) {
   ++activity_;
+  frames_.add(keyframe);
   calibration_ = keyframe.calibration;
   keyframes_.push_back({.id = keyframe.id,
                         .stamp = keyframe.stamp,
@@ -129,7 +139,10 @@ void RunRecord::judge(const ClosureId& id) {
 
 void RunRecord::add(const Trajectory& trajectory) {
   if (trajectory.robot != robot_) return;
+  if (trajectory.anchor != (trajectory_ ? trajectory_->anchor : robot_)) live_.clear();
+  frames_.add(trajectory);
   trajectory_ = trajectory;
+  trajectory_is_restored_ = false;
   trajectory_is_stated_ = false;
 }
 
@@ -164,6 +177,7 @@ void RunRecord::add(const OptimizedMesh& mesh) {
 
 void RunRecord::add(const TeamSolution& solution) {
   add(solution.trajectory);
+  trajectory_is_restored_ = true;
   add(solution.verdicts);
 }
 

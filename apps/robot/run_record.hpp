@@ -25,6 +25,7 @@
 #include "modules/mesh/map_mesh.hpp"
 #include "modules/mesh_deformation/mesh_corrector.hpp"
 #include "modules/place_recognition/place_database.hpp"
+#include "modules/ros_dds/live_frames.hpp"
 #include "modules/semantic_mapping/semantic_mapper.hpp"
 #include "modules/vio/vio_statistics.hpp"
 #include "runtime/dds/peer_table.hpp"
@@ -139,6 +140,10 @@ class RunRecord {
   [[nodiscard]] std::vector<StampedPose> optimized() const;
   /// The last optimised keyframes.
   [[nodiscard]] std::vector<StampedPose> optimized_keyframes() const;
+  /// Poses of images in the team's frame as they were known when odometry estimated them: odometry
+  /// since the last keyframe that was optimised by then, on its pose by then. Only those in the
+  /// present frame of the team, which begin when the robot joins it, and none of a former process.
+  [[nodiscard]] const std::vector<StampedPose>& live() const { return live_; }
 
   /// Closures that this robot found, by the other robot (or itself).
   [[nodiscard]] std::map<RobotId, ClosureCounts> closures_per_peer() const;
@@ -160,9 +165,12 @@ class RunRecord {
  private:
   [[nodiscard]] bool is_inlier(const ClosureId& id) const;
   void judge(const ClosureId& id);
+  void add_live(const OdometryState& state);
 
   RobotId robot_;
   std::vector<StampedPose> odometry_;
+  std::vector<StampedPose> live_;
+  LiveFrames frames_;
   std::vector<RecordedKeyframe> keyframes_;
   std::optional<UncertainCalibration> calibration_;
   std::optional<VioStatistics> odometry_statistics_;
@@ -179,6 +187,7 @@ class RunRecord {
   std::uint16_t network_ = 0;  // that of the newest own keyframe
   std::map<RobotId, std::uint64_t> other_network_, other_vocabulary_;
   std::optional<Trajectory> trajectory_;
+  bool trajectory_is_restored_ = false;  // it is that of a former process
   StatedPoses stated_poses_;
   bool trajectory_is_stated_ = false;
   MeshCells stated_cells_;  // all of them, ascending

@@ -80,7 +80,8 @@ std::string drift_remark(const TeamResult& team) {
     text << length_m << (--left == 0 ? " m.\n" : left == 1 ? " and " : ", ");
   text
       << "Odometry is aligned with the truth robot by robot, the optimised trajectories all by one "
-         "transform: that\nof a robot can be off as a whole.\n";
+         "transform: that\nof a robot can be off as a whole. Live: the poses as known when each "
+         "image came, from the time at which\nthe robots joined.\n";
   return text.str();
 }
 
@@ -94,6 +95,8 @@ std::string trajectory_table(const TeamResult& team) {
   }
   rows.push_back({"team, one frame", "", "", "", ""});
   append(rows.back(), error_cells(team.optimized ? &team.optimized->joint : nullptr));
+  rows.push_back({"live, one frame", "", "", "", ""});
+  append(rows.back(), error_cells(team.live ? &team.live->joint : nullptr));
   return align_columns(rows) + drift_remark(team);
 }
 
@@ -321,6 +324,7 @@ void to_json(Json& json, const TeamResult& team) {
   json = {{"robots", Json::array()}};
   for (const RobotResult& robot : team.robots) json["robots"].push_back(to_json(robot));
   if (team.optimized) json["optimized"] = *team.optimized;
+  if (team.live) json["live"] = *team.live;
   if (team.closures) json["closures"] = *team.closures;
   if (team.meshes.errors) {
     json["meshes"] = to_json(team.meshes.errors->before, {});

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <exception>
 #include <filesystem>
+#include <functional>
 #include <iostream>
 #include <map>
 #include <utility>
@@ -149,15 +150,29 @@ void judge_odometry(const TrajectoryInput& input, RobotResult& robot) {
   robot.paths.truth = beside(input.truth, input.estimate);
 }
 
-// Compares the optimised poses of the robots in the team's frame with the truth, and moves them to
-// the frame of the truth.
-void judge_optimized(TeamResult& team, Trajectories& trajectories) {
+// Error of `file` of the robots in the team's frame under one alignment; nullopt if there is
+// nothing to compare. `notes_of` has the notes that say why poses of a robot are missing.
+std::optional<TeamError> joint_error(
+    std::vector<RobotResult>& robots, Trajectories& trajectories, const char* file,
+    const std::function<std::vector<std::string>&(RobotResult&)>& notes_of) {
   std::vector<TrajectoryInput> inputs;
-  for (RobotResult& robot : team.robots)
+  for (RobotResult& robot : robots)
     if (robot.in_team_frame)
-      if (const auto input = trajectories.input(robot.plan, "optimized.tum", robot.notes))
+      if (const auto input = trajectories.input(robot.plan, file, notes_of(robot)))
         inputs.push_back(*input);
-  if (!inputs.empty()) team.optimized = trajectory_error(inputs);
+  return inputs.empty() ? std::nullopt : std::optional(trajectory_error(inputs));
+}
+
+// Compares the live and the optimised poses of the robots in the team's frame with the truth, and
+// moves the optimised ones to the frame of the truth.
+void judge_in_team_frame(TeamResult& team, Trajectories& trajectories) {
+  team.optimized = joint_error(
+      team.robots, trajectories, "optimized.tum",
+      [](RobotResult & robot) -> auto& { return robot.notes; });
+  // A robot that joined in the end has no live poses in the team's frame.
+  std::vector<std::string> not_reported;
+  team.live = joint_error(
+      team.robots, trajectories, "live.tum", [&](RobotResult&) -> auto& { return not_reported; });
   const Alignment alignment = team.optimized ? team.optimized->alignment : Alignment{};
   for (RobotResult& robot : team.robots) {
     if (!robot.in_team_frame || robot.left_nothing()) continue;
@@ -296,7 +311,7 @@ TeamResult collect_results(const TeamPlan& plan, std::vector<RobotRun> runs) {
   joined.robots.clear();
   for (const RobotResult& robot : result.robots)
     if (robot.in_team_frame) joined.robots.push_back(robot.plan);
-  judge_optimized(result, trajectories);
+  judge_in_team_frame(result, trajectories);
   if (plan.truth_mesh.empty() || result.optimized)
     result.meshes = collect_meshes(
         joined, result.optimized ? result.optimized->alignment.T_truth_estimate : SE3::Identity(),

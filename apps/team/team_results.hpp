@@ -51,6 +51,8 @@ struct TeamResult {
   std::vector<RobotResult> robots;
   std::optional<TeamError>
       optimized;  ///< Error of the robots in the team's frame, under one alignment.
+  std::optional<TeamError>
+      live;  ///< Like `optimized`, of the poses as known when each image came (live.tum).
   std::optional<ClosureScores>
       closures;       ///< Scores for robots with cameras; absent if the truth is unknown.
   TeamMeshes meshes;  ///< Meshes of the robots that built a map.

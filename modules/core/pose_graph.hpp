@@ -93,7 +93,7 @@ struct Trajectory {
   RobotId anchor = 0;  ///< Robot whose odometry frame is `world`; `robot` itself if it is alone.
   std::vector<SE3> T_world_kf;
   /// Covariances of T_world_kf relative to the first keyframe of the anchor, see covariance.hpp;
-  /// empty while they are unknown.
+  /// empty while they are unknown, and without the keyframes after the last session.
   std::vector<Matrix6> covariances = {};
   /// Standard deviation of the factor by which all distances in `world` may be wrong, not contained
   /// in `covariances`: see with_scale_error().

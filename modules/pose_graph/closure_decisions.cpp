@@ -77,10 +77,19 @@ void ClosureDecisions::count_places(EdgeSetOffer& offer, std::span<const PoseEdg
                                     std::span<const AlignedOdometry> all) {
   const auto [entry, is_new] = counted_.try_emplace({offer.peer, offer.id}, offer);
   if (is_new) {
+    // Once a session has weighed the pair, its solution places the robots by the kept closures:
+    // undecided ones wait for the next session.
+    const bool weighed = std::ranges::any_of(closures, [this](const PoseEdge& closure) {
+      return decided_.contains(closure.id()) || times_reconsidered_.contains(closure.id());
+    });
     std::vector<PoseEdge> accepted, rejected;
     std::vector<ClosureId> kept;
-    for (const PoseEdge& closure : closures)
-      (is_rejected(closure.id()) ? rejected : accepted).push_back(closure);
+    for (const PoseEdge& closure : closures) {
+      if (is_rejected(closure.id()))
+        rejected.push_back(closure);
+      else if (!weighed || decided_.contains(closure.id()))
+        accepted.push_back(closure);
+    }
     std::ranges::transform(accepted, std::back_inserter(kept), &PoseEdge::id);
     const std::vector<std::size_t> rivals = find_places(rejected).sizes;
     const std::size_t places = find_places(accepted).sizes.size();

@@ -53,8 +53,8 @@ class ClosureDecisions {
   /// All verdicts of the present session, if there are new ones since the last call.
   [[nodiscard]] std::optional<ClosureVerdicts> take_verdicts();
 
-  /// Sets `places` and `contradicted` of an offer of these closures. `all` are all closures with
-  /// the same robot, offered or not.
+  /// Sets `places` and `contradicted` of an offer of these closures, by the kept ones; by all of
+  /// them if none has been weighed. `all` are all closures with the same robot, offered or not.
   void count_places(EdgeSetOffer& offer, std::span<const PoseEdge> closures,
                     std::span<const AlignedOdometry> all);
 

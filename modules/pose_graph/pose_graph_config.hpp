@@ -22,6 +22,7 @@ struct PoseGraphConfig {
   double exchange_budget_kb_s = 20.0;
   double session_growth = 1.0;
   double session_wait_s = 60.0;
+  double refinement_period_s = 5.0;
   double min_relative_decrease = 1e-7;
   int max_newton_steps = 3;
   int max_cg_iterations = 50;
@@ -65,6 +66,10 @@ struct PoseGraphConfig {
                   "[s] longest wait for the next session, whatever exchange_budget_kb_s and "
                   "session_growth demand; four times as long while no closure between robots is "
                   "new");
+    visitor.field(
+        "refinement_period_s", refinement_period_s, {0.0, 3600.0},
+        "[s] newton: shortest time between refinements of the own poses between sessions, "
+        "by new closures and without a message; 0: none");
     visitor.field("min_relative_decrease", min_relative_decrease, {0.0, 0.1},
                   "rbcd: relative decrease of the team cost in a round below which the session has "
                   "converged");

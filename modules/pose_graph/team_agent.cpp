@@ -21,7 +21,8 @@ TeamAgent::TeamAgent(const PoseGraphConfig& config, TeamPeer self, MemberSolverF
       status_schedule_(config_.status_period_s),
       notices_(self.robot),
       schedule_(config_),
-      frame_(self) {
+      frame_(self),
+      refinement_(config_.refinement_period_s) {
   roster_.connect(links_.links);
 }
 
@@ -187,9 +188,12 @@ TeamOutput TeamAgent::step(double now_s, std::uint64_t sent_bytes) {
     coordinate(output);
     advance(output);
     reconsider();
+    refine_alone();
   }
   send_status(output);
-  if (is_complete) publish(output);
+  // The plan says which robots the last decisions tie to this one.
+  if (is_complete && !plan_outdated_) publish(output);
+  output.more |= plan_outdated_ && publish_due_;
   output.verdicts = decisions_.take_verdicts();
   output.notices = notices_.take();
   return output;

@@ -19,6 +19,7 @@
 #include "modules/pose_graph/own_graph.hpp"
 #include "modules/pose_graph/own_poses.hpp"
 #include "modules/pose_graph/pose_graph_config.hpp"
+#include "modules/pose_graph/refinement_schedule.hpp"
 #include "modules/pose_graph/session_part.hpp"
 #include "modules/pose_graph/session_schedule.hpp"
 #include "modules/pose_graph/status_schedule.hpp"
@@ -49,7 +50,9 @@ struct [[nodiscard]] TeamOutput {
 /// has changed, and ends it. A robot without partners coordinates its own sessions. SessionPart
 /// implements a session of one member; a factory supplies the solver of its graph.
 ///
-/// New measurements do not interrupt a session; see SessionSchedule for the time of the next one. A
+/// New measurements do not interrupt a session; see SessionSchedule for the time of the next one.
+/// Until then each robot refines its poses alone: without a message, it solves its own graph with
+/// its new closures and the poses that the other robots have last sent. A
 /// session ends early when links to a member no longer exist. Links that return at once do no
 /// harm, because messages are repeated and find other ways. The members of the interrupted
 /// session return to the last round that all have completed, and the next session begins there.
@@ -180,12 +183,16 @@ class TeamAgent {
   // The session that this robot is in.
   bool join(const Session& session);
   [[nodiscard]] std::optional<FrozenPart> freeze(const Session& session) const;
+  void extend_poses();
+  void set_start(SessionGraph& graph) const;
   [[nodiscard]] AlignmentTolerance tolerance() const {
     return {config_.alignment_rotation_rad, config_.alignment_translation_m};
   }
   [[nodiscard]] bool expects_false() const {
     return config_.robust && config_.method == PgoMethod::kNewton;
   }
+  [[nodiscard]] std::size_t known_closures() const;
+  void refine_alone();
   void advance(TeamOutput& output);
   void enter_stage(TeamOutput& output);
   void publish_poses(TeamOutput& output);
@@ -243,6 +250,7 @@ class TeamAgent {
   OwnPoses poses_;
   FixPlacement placement_;  // in the present or last session
   ClosureDecisions decisions_;
+  RefinementSchedule refinement_;
   std::optional<SessionPart> part_;
   SessionState state_ = SessionState::kNone;  // state of the session of part_
   bool reconsider_due_ = false;               // once all members have sent the solution

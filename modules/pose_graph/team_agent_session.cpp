@@ -212,17 +212,14 @@ bool TeamAgent::join(const Session& session) {
     rounds_before_ += part_->state().round;
     optimising_s_ += part_->last_activity_s() - part_->started_s();
   }
-  poses_.extend(graph_);
-  poses_.correct(graph_.odometry_breaks());
-  poses_.place_runs(graph_, self_.robot, tolerance());
+  extend_poses();
   if (alone && part->graph.to_absent.empty())
     poses_.improve_alone(graph_, self_.robot, !expects_false());
   place_first_by_fixes(session.upright);
   if (placement_.state.located)
     part->graph.fixes = fix_edges(graph_.fixes(), placement_.kept, poses_.T_frame_kf());
-  part->graph.start = poses_.T_frame_kf();
-  part->graph.decided = decisions_.decided();
-  part->graph.noise = decisions_.noise();
+  set_start(part->graph);
+  refinement_.used(known_closures());
   if (!alone && expects_false())
     part->graph.start =
         relaxed_start(part->graph, known_poses(session.plan.frame), {.barc = config_.barc});
@@ -233,6 +230,51 @@ bool TeamAgent::join(const Session& session) {
   state_ = SessionState::kRunning;
   reconsider_due_ = false;
   return true;
+}
+
+void TeamAgent::extend_poses() {
+  poses_.extend(graph_);
+  poses_.correct(graph_.odometry_breaks());
+  poses_.place_runs(graph_, self_.robot, tolerance());
+}
+
+void TeamAgent::set_start(SessionGraph& graph) const {
+  graph.start = poses_.T_frame_kf();
+  graph.decided = decisions_.decided();
+  graph.noise = decisions_.noise();
+}
+
+// Number of closures of this robot in the newest sets of edges.
+std::size_t TeamAgent::known_closures() const {
+  std::size_t closures = 0;
+  const auto count = [&](RobotId robot) {
+    if (const auto* edges = graph_.newest_edges(robot)) closures += edges->size();
+  };
+  count(self_.robot);
+  for (const auto& [robot, peer] : roster_.peers()) count(robot);
+  return closures;
+}
+
+// Odometry since the last session drifts, and the next session may be minutes away. The graph is
+// that of a session without the other robots, whose last poses are held. Nothing is decided: the
+// next session weighs the new closures. Fixes wait for it, because it places their frame.
+void TeamAgent::refine_alone() {
+  const std::size_t closures = known_closures();
+  if (!refinement_.is_due(closures, now_s_) || state_ != SessionState::kSolved ||
+      part_->members().size() == 1 || !expects_false() || !graph_.fixes().empty())
+    return;
+  Session alone;
+  alone.plan.frame = frame_.frame();
+  alone.plan.members.emplace_back().peer = self_;
+  alone.upright = part_->session().upright;
+  alone.anchor = self_.robot;
+  auto part = freeze(alone);
+  if (!part) return;
+  refinement_.began(closures, now_s_);
+  extend_poses();
+  set_start(part->graph);
+  poses_.set(relaxed_start(std::move(part->graph), {}, {.barc = config_.barc}));
+  publish_due_ = true;
 }
 
 // The poses that other robots have last sent in `frame`, if this robot is in it as well.

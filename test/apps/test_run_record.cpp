@@ -65,6 +65,55 @@ TEST_CASE("the keypoints of received keyframes are counted, descriptors of word 
   CHECK(summary_of(record).peer_keyframes == PeerKeyframeCounts{2, 170});
 }
 
+TEST_CASE("live poses follow the last keyframe that was optimised when the image came", "[robot]") {
+  const auto at = [](double x, double y = 0.0) {
+    return make_pose(Eigen::Matrix3d::Identity(), {x, y, 0.0});
+  };
+  const auto state = [&](Stamp stamp, double x) {
+    OdometryState made;
+    made.stamp = stamp;
+    made.T_odom_body = at(x);
+    return made;
+  };
+  const auto keyframe = [&](KeyframeIndex index, Stamp stamp) {
+    KeyframeOdometry made;
+    made.id = {1, index};
+    made.stamp = stamp;
+    made.T_odom_kf = at(99.0);  // odometry has refined its recent past since
+    return made;
+  };
+  RunRecord record(1);
+  record.add(state(1, 0.0));
+  record.add(keyframe(0, 1));
+  record.add(state(2, 1.0));
+  record.add(keyframe(1, 2));
+  REQUIRE(record.live().size() == 2);  // alone: odometry
+  CHECK(record.live()[1].T.translation().x() == 1.0);
+
+  // Into the frame of robot 0, which has another origin. Keyframe 2 is not optimised yet.
+  record.add(Trajectory{1, 0, {at(0.0, 5.0), at(1.2, 5.0)}});
+  CHECK(record.live().empty());
+  record.add(state(3, 2.0));
+  record.add(keyframe(2, 3));
+  record.add(Trajectory{1, 0, {at(0.0, 5.0), at(1.0, 5.0), at(2.0, 5.0)}});
+  record.add(state(4, 3.0));
+  REQUIRE(record.live().size() == 2);
+  CHECK(record.live()[0].T.translation().isApprox(Eigen::Vector3d(2.2, 5.0, 0.0)));
+  CHECK(record.live()[1].T.translation().isApprox(Eigen::Vector3d(3.0, 5.0, 0.0)));
+
+  record.add(state(4, 3.1));  // replaces that of this stamp
+  REQUIRE(record.live().size() == 2);
+  CHECK(record.live()[1].T.translation().isApprox(Eigen::Vector3d(3.1, 5.0, 0.0)));
+}
+
+TEST_CASE("states of a former process are not live", "[robot]") {
+  RunRecord record(1);
+  record.add(TeamSolution{.trajectory = {1, 0, {SE3::Identity()}}, .verdicts = {}, .peers = {}});
+  record.add(OdometryState{});
+  CHECK(record.live().empty());
+  CHECK(record.odometry().size() == 1);
+}
+
 TEST_CASE("changes of decisions, poses and cells become events, each once", "[robot]") {
   const ClosureId kept{{1, 2}, {2, 3}}, doubted{{1, 4}, {2, 5}};
   RunRecord record(1);

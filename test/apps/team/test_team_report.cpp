@@ -74,6 +74,7 @@ struct Team {
              double optimized_lift_m = 0.0) const {
     folder.write(robot + "/summary.json", json_text(summary));
     folder.write(robot + "/odometry.tum", straight_line(odometry_lift_m));
+    folder.write(robot + "/live.tum", straight_line(odometry_lift_m));
     folder.write(robot + "/optimized.tum", straight_line(optimized_lift_m));
   }
   void leave(const std::string& robot, const char* file, const LabelledMesh& mesh) const {
@@ -120,6 +121,8 @@ TEST_CASE("A robot without results leaves a note, the others are judged", "[team
   CHECK(team.robots[0].odometry->position_m.rmse < 1e-9);
   REQUIRE(team.optimized);
   CHECK(team.optimized->robots.size() == 1);
+  REQUIRE(team.live);
+  CHECK(team.live->joint.poses == 50);
   CHECK(team.robots[1].notes.size() == 3);
   CHECK_FALSE(team.robots[1].odometry);
 }
@@ -127,7 +130,7 @@ TEST_CASE("A robot without results leaves a note, the others are judged", "[team
 TEST_CASE("The tables show results, failures and last words, in 120 columns", "[team]") {
   const std::string text = to_table(HalfTeam().collect());
   for (const char* expected :
-       {"team, one frame", "100.0%", "FAILED, exit code 3",
+       {"team, one frame", "live, one frame", "100.0%", "FAILED, exit code 3",
         "b failed, exit code 3; its last words:\n  error: no luck", "2.0 kB", "3.0 MB", "400 B",
         "2 robots", "aligned with the truth robot by robot"}) {
     CAPTURE(text, expected);

@@ -158,7 +158,10 @@ TEST_CASE("Robots are not joined if as many places agree on another relative pos
 
 TEST_CASE("Robots whose closures are all rejected publish in two frames, until others join them",
           "[pose_graph][tentative]") {
-  const TeamProblem problem = team_of_three(3, {8, 9, 30, 31});
+  const TeamProblem problem = team_of_three(3, {8, 9, 30, 31, 40, 50});
+  std::set<ClosureId> later;  // at three places
+  for (const PoseEdge& e : problem.edges)
+    if (e.from.robot == 2 && e.to.robot == 4 && e.from.index >= 30) later.insert(e.id());
   bool rejects = true;
   const MemberSolverFactory factory = [&](const Session&, SessionGraph graph, TreePlace place) {
     ScriptedSolver::Options options;
@@ -168,7 +171,7 @@ TEST_CASE("Robots whose closures are all rejected publish in two frames, until o
     return std::make_unique<ScriptedSolver>(std::move(graph), std::move(place), options);
   };
   TeamNetwork network;
-  add_robots(network, problem, factory);
+  add_robots(network, without(problem, later), factory);
   REQUIRE(settle(network));
   (void)network.run(5.0);
   CHECK(progress_of(network, 2).not_joined == Robots{4, 6});
@@ -182,6 +185,25 @@ TEST_CASE("Robots whose closures are all rejected publish in two frames, until o
   // The frame of an anchor is that of its odometry.
   CHECK(network.robots.at(4).trajectory->T_world_kf.front().isApprox(SE3::Identity(), 1e-6));
 
+  // Closures that no session has weighed do not move robot 4 into the frame in which those before
+  // were rejected.
+  std::set<RobotId> anchors;
+  network.on_step = [&](const TeamNetwork::Robot& robot) {
+    if (robot.peer.robot != 2 && !network.agent(4).in_session())
+      anchors.insert(robot.trajectory->anchor);
+  };
+  for (const RobotId robot : {RobotId{2}, RobotId{4}}) {
+    for (const PoseEdge& e : problem.edges)
+      if (later.contains(e.id())) (void)network.agent(robot).add(closure_of(e, &problem));
+    (void)network.agent(robot).add(inlier_set(problem, 2, 4, 2));
+  }
+  (void)network.run(1.0);  // the next session waits for two seconds at rest
+  CHECK_FALSE(network.agent(2).in_session());
+  CHECK(progress_of(network, 4).not_joined == Robots{2});
+  REQUIRE(settle(network));
+  CHECK(anchors == std::set<RobotId>{4});
+  network.on_step = {};
+
   network.kill(2);
   (void)network.run(10.0);
   REQUIRE(settle(network));
@@ -192,7 +214,7 @@ TEST_CASE("Robots whose closures are all rejected publish in two frames, until o
 
   rejects = false;
   for (const RobotId robot : {RobotId{2}, RobotId{4}})
-    (void)network.agent(robot).add(inlier_set(problem, 2, 4, 2));
+    (void)network.agent(robot).add(inlier_set(problem, 2, 4, 3));
   (void)network.run(1.0);
   REQUIRE(settle(network));
   (void)network.run(5.0);
