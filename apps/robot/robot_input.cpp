@@ -10,6 +10,7 @@
 
 #include "apps/result_files.hpp"
 #include "modules/core/input_file.hpp"
+#include "modules/core/text_table.hpp"
 #include "modules/mesh/map_file.hpp"
 #include "modules/recordings/open_bag.hpp"
 #include "modules/recordings/ros_messages.hpp"
@@ -76,11 +77,30 @@ std::optional<RestoredRun> restore(const RobotOptions& options, const std::strin
   return run;
 }
 
+// The map is written less often than the journal. Names the keyframes of which a former process has
+// left no surface.
+void report_lost_surface(const fs::path& file, const MapMesh& map, const RestoredRun& run) {
+  std::size_t mapped = 0;
+  for (const auto& [first, last] : map.seen_by)
+    mapped = std::max<std::size_t>(mapped, std::size_t{last} + 1);
+  if (mapped >= run.keyframes.size()) return;
+  const double lost_s = seconds_between(run.odometry[std::max<std::size_t>(mapped, 1) - 1].stamp,
+                                        run.odometry.back().stamp);
+  log::warn("journal") << file.string() << ": has the surface of the first " << mapped << " of "
+                       << run.keyframes.size() << " keyframes: the map lacks what only the last "
+                       << fixed(lost_s, 1) << " s before the end of that process saw";
+}
+
 // The map of the former process; nullopt if the file is missing or damaged.
 std::optional<ResumedMap> restore_map(const fs::path& folder, const RestoredRun& run) try {
   const fs::path file = folder / kMapFile;
-  if (is_absent(file)) return std::nullopt;
-  return ResumedMap(read_map_file(file), static_cast<KeyframeIndex>(run.keyframes.size()));
+  if (is_absent(file)) {
+    log::warn("journal") << file.string() << ": there is none: the map starts from the beginning";
+    return std::nullopt;
+  }
+  MapMesh map = read_map_file(file);
+  report_lost_surface(file, map, run);
+  return ResumedMap(std::move(map), static_cast<KeyframeIndex>(run.keyframes.size()));
 } catch (const InputFileError& error) {
   log::warn("journal") << error.what() << ": the map starts from the beginning";
   return std::nullopt;

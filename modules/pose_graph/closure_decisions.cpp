@@ -77,11 +77,11 @@ void ClosureDecisions::count_places(EdgeSetOffer& offer, std::span<const PoseEdg
                                     std::span<const AlignedOdometry> all) {
   const auto [entry, is_new] = counted_.try_emplace({offer.peer, offer.id}, offer);
   if (is_new) {
-    // Once a session has weighed the pair, its solution places the robots by the kept closures:
-    // undecided ones wait for the next session.
-    const bool weighed = std::ranges::any_of(closures, [this](const PoseEdge& closure) {
-      return decided_.contains(closure.id()) || times_reconsidered_.contains(closure.id());
-    });
+    // Once a session has weighed closures of the pair, offered now or not, its solution places the
+    // robots by the kept ones: undecided ones wait for the next session.
+    const auto is_of_pair = [&](const auto& entry) { return touches(entry.first, offer.peer); };
+    const bool weighed = std::ranges::any_of(decided_, is_of_pair) ||
+                         std::ranges::any_of(times_reconsidered_, is_of_pair);
     std::vector<PoseEdge> accepted, rejected;
     std::vector<ClosureId> kept;
     for (const PoseEdge& closure : closures) {

@@ -30,9 +30,16 @@ std::set<RobotId> reached(RobotId self, std::span<const RobotTie> ties, const Co
   return robots;
 }
 
+// True if both are members of the session, and it has no closures between them. a < b.
+bool lacks_pair(const SessionPlan& plan, RobotId a, RobotId b) {
+  const auto is_pair = [&](const SessionPair& pair) { return pair.a == a && pair.b == b; };
+  return plan.has_member(a) && plan.has_member(b) && std::ranges::none_of(plan.pairs, is_pair);
+}
+
 }  // namespace
 
-std::vector<RobotTie> find_ties(const std::map<RobotId, TeamStatus>& statuses) {
+std::vector<RobotTie> find_ties(const std::map<RobotId, TeamStatus>& statuses,
+                                const SessionPlan* solved) {
   std::vector<RobotTie> ties;
   for (auto one = statuses.begin(); one != statuses.end(); ++one)
     for (auto other = std::next(one); other != statuses.end(); ++other) {
@@ -40,6 +47,7 @@ std::vector<RobotTie> find_ties(const std::map<RobotId, TeamStatus>& statuses) {
         ties.push_back({one->first, other->first, kPlacesOfDatum, false});
         continue;
       }
+      if (solved != nullptr && lacks_pair(*solved, one->first, other->first)) continue;
       const EdgeSetOffer* ours = newest_offer(one->second, other->first);
       const EdgeSetOffer* theirs = newest_offer(other->second, one->first);
       if (ours == nullptr || theirs == nullptr) continue;

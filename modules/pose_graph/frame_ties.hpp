@@ -23,8 +23,11 @@ struct RobotTie {
 
 /// The ties between all robots of `statuses` (by robot), ascending. Both robots of a pair report
 /// the number of places of their closures in their statuses. While the two numbers differ, the
-/// lower one counts.
-[[nodiscard]] std::vector<RobotTie> find_ties(const std::map<RobotId, TeamStatus>& statuses);
+/// lower one counts. With `solved`, the plan of the last session with a solution: a pair of its
+/// members that has found its first closures since is not tied. The solution lacks these closures
+/// and may place the two robots anywhere, until the next session.
+[[nodiscard]] std::vector<RobotTie> find_ties(const std::map<RobotId, TeamStatus>& statuses,
+                                              const SessionPlan* solved = nullptr);
 
 /// Robots whose pose relative to one robot is not certain.
 struct FrameTies {

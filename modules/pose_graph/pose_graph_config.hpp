@@ -20,8 +20,8 @@ struct PoseGraphConfig {
   int rank = 5;
   int max_rounds = 0;
   double exchange_budget_kb_s = 20.0;
-  double session_growth = 1.0;
-  double session_wait_s = 60.0;
+  double session_growth = 3.0;
+  double session_wait_s = 240.0;
   double refinement_period_s = 5.0;
   double min_relative_decrease = 1e-7;
   int max_newton_steps = 3;
@@ -58,14 +58,15 @@ struct PoseGraphConfig {
                   "[kB/s] mean rate at which a robot may send for sessions, counted per receiver "
                   "and with forwarded messages; the next session waits until the bytes of the "
                   "busiest member in the last one fit this rate");
-    visitor.field("session_growth", session_growth, {0.0, 100.0},
-                  "relative growth of the number of closures between robots for which the next "
-                  "session waits; a new member, or two seconds without new measurements, also end "
-                  "the wait");
+    visitor.field(
+        "session_growth", session_growth, {0.0, 100.0},
+        "relative growth of the number of closures between robots for which the next "
+        "session waits; a quarter of it while the place of a member is not certain; a new "
+        "member, or two seconds without new measurements, also end the wait");
     visitor.field("session_wait_s", session_wait_s, {0.0, 3600.0},
                   "[s] longest wait for the next session, whatever exchange_budget_kb_s and "
-                  "session_growth demand; four times as long while no closure between robots is "
-                  "new");
+                  "session_growth demand; a quarter of it while the place of a member is not "
+                  "certain; four times as long while no closure between robots is new");
     visitor.field(
         "refinement_period_s", refinement_period_s, {0.0, 3600.0},
         "[s] newton: shortest time between refinements of the own poses between sessions, "

@@ -9,6 +9,9 @@ namespace {
 constexpr double kAtRest_s = 2.0;
 // Factor on the longest wait while no closure between robots is new.
 constexpr double kIdle = 4.0;
+// Factor on the waits while the place of a member in the team's frame is not certain. A session may
+// join it, or correct a frame that is wrong as a whole.
+constexpr double kNotJoined = 0.25;
 
 }  // namespace
 
@@ -17,8 +20,12 @@ bool SessionSchedule::is_within_budget(std::uint64_t bytes, double ended_s, doub
   return now_s - ended_s >= std::min(price_s, config_.session_wait_s);
 }
 
+double SessionSchedule::patience() const {
+  return all_joined_ ? 1.0 : kNotJoined;
+}
+
 double SessionSchedule::longest_wait_s() const {
-  return (has_new() ? 1.0 : kIdle) * config_.session_wait_s;
+  return (has_new() ? 1.0 : kIdle) * patience() * config_.session_wait_s;
 }
 
 // The first closures between robots connect the maps; each further closure changes them less.
@@ -26,8 +33,9 @@ double SessionSchedule::longest_wait_s() const {
 // them all the time, so they can wait. Odometry alone changes nothing, so new odometry can wait
 // until the team is at rest.
 bool SessionSchedule::is_worthwhile(double ended_s, double now_s) const {
-  const bool grown = has_new() && static_cast<double>(closures_) >=
-                                      (1.0 + config_.session_growth) * static_cast<double>(used_);
+  const bool grown =
+      has_new() && static_cast<double>(closures_) >=
+                       (1.0 + patience() * config_.session_growth) * static_cast<double>(used_);
   return grown || now_s - changed_s_ >= kAtRest_s || now_s - ended_s >= longest_wait_s();
 }
 

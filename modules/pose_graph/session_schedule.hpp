@@ -13,11 +13,12 @@ class SessionSchedule {
  public:
   explicit SessionSchedule(const PoseGraphConfig& config) : config_(config) {}
 
-  /// Takes the present plan: whether its graph has changed, and the number of its closures between
-  /// robots.
-  void update(bool graph_changed, std::uint64_t closures, double now_s) {
+  /// Takes the present plan: whether its graph has changed, the number of its closures between
+  /// robots, and whether closures at several places join all members.
+  void update(bool graph_changed, std::uint64_t closures, bool all_joined, double now_s) {
     if (graph_changed) changed_s_ = now_s;
     closures_ = closures;
+    all_joined_ = all_joined;
   }
   /// Number for the next session; every call returns a new one.
   [[nodiscard]] std::uint32_t take_number() { return ++opened_; }
@@ -32,6 +33,7 @@ class SessionSchedule {
 
  private:
   [[nodiscard]] bool has_new() const { return closures_ != used_; }
+  [[nodiscard]] double patience() const;
   [[nodiscard]] double longest_wait_s() const;
 
   PoseGraphConfig config_;
@@ -39,6 +41,7 @@ class SessionSchedule {
   std::uint64_t closures_ = 0;  // between robots, in the present plan
   std::uint64_t used_ = 0;      // between robots, in the last session
   std::uint32_t opened_ = 0;
+  bool all_joined_ = true;
 };
 
 }  // namespace km

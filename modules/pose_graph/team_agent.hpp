@@ -244,7 +244,8 @@ class TeamAgent {
   SessionPlan plan_;  // from the present knowledge
   bool plan_outdated_ = true;
   SessionSchedule schedule_;
-  FrameTies ties_;  // between the members of the plan
+  FrameTies ties_;                     // between the members of the plan
+  std::optional<SessionPlan> solved_;  // plan of the last session of several robots with a solution
 
   OwnFrame frame_;
   OwnPoses poses_;

@@ -26,7 +26,8 @@ void TeamAgent::make_plan() {
   SessionPlan plan = plan_session(statuses, self_.robot);
   // If the anchor leaves while no closure ties this robot to it, it stays in another frame.
   if (frame_.world() && !plan.has_member(frame_.world()->anchor)) frame_.set_world(tied_world());
-  schedule_.update(!same_graph(plan, plan_), closures_between(plan, statuses), now_s_);
+  const bool graph_changed = !same_graph(plan, plan_);
+  const std::uint64_t closures = closures_between(plan, statuses);
   plan_ = std::move(plan);
   for (const auto& [robot, status] : statuses)
     if (const auto own = datum_of(self_.robot);
@@ -35,7 +36,9 @@ void TeamAgent::make_plan() {
   std::vector<RobotId> members;
   for (const SessionMember& member : plan_.members) members.push_back(member.peer.robot);
   std::ranges::sort(members);
-  ties_ = frame_ties(self_.robot, members, find_ties(statuses));
+  ties_ = frame_ties(self_.robot, members,
+                     find_ties(statuses, solved_ && expects_false() ? &*solved_ : nullptr));
+  schedule_.update(graph_changed, closures, ties_ == FrameTies{}, now_s_);
   // While a session decides, the ties are not yet judged.
   if (state_ == SessionState::kSolved) notices_.ties(ties_);
 }
@@ -445,6 +448,7 @@ void TeamAgent::leave(bool with_solution) {
   publish_due_ = true;
   plan_outdated_ = true;
   if (!with_solution) return;
+  if (session.plan.members.size() > 1) solved_ = session.plan;
   decide(part_->verdicts().closures);
   for (const RobotId member : part_->members())
     if (const MemberPoses* published = poses_of(member, MemberStage::kSolved);

@@ -19,15 +19,14 @@ constexpr double kNoticedAgain = 1.5;
 // invent.
 constexpr std::size_t kReasons = 1000;
 
-// The robots of `now` that `before` lacks; both ascending.
+// "robot 1", or "robots 1, 2": the robots of `now` that `before` lacks; both ascending. Empty if
+// there are none.
 std::string added(const std::vector<RobotId>& now, const std::vector<RobotId>& before) {
   std::vector<RobotId> robots;
   std::ranges::set_difference(now, before, std::back_inserter(robots));
-  std::string text;
-  for (const RobotId robot : robots) {
-    if (!text.empty()) text += ", ";
-    text += std::to_string(robot);
-  }
+  std::string text = robots.empty() ? "" : robots.size() == 1 ? "robot" : "robots";
+  for (const RobotId robot : robots)
+    text += (robot == robots.front() ? " " : ", ") + std::to_string(robot);
   return text;
 }
 
@@ -96,17 +95,15 @@ void TeamNotices::other_datum(RobotId robot) {
 void TeamNotices::ties(const FrameTies& ties) {
   if (ties == ties_) return;
   if (const std::string robots = added(ties.tentative, ties_.tentative); !robots.empty())
-    add("joined tentatively with robots " + robots +
-        ": closures at a single place tie them to this robot; closures at a second place will "
-        "confirm or correct it");
+    add("joined tentatively with " + robots +
+        ", by closures at a single place; closures at a second place will confirm or correct it");
   if (const std::string robots = added(ties.not_joined, ties_.not_joined); !robots.empty())
-    add("no accepted closure ties robots " + robots +
-        " to this robot without a contradiction: they are in another frame");
+    add("no accepted closure ties " + robots +
+        " to this robot without a contradiction: their frames differ");
   std::vector<RobotId> uncertain;
   std::ranges::set_union(ties.tentative, ties.not_joined, std::back_inserter(uncertain));
   if (const std::string robots = added(ties_.tentative, uncertain); !robots.empty())
-    add("robots " + robots +
-        " are no longer tentative: closures at several places tie them to this robot");
+    add("no longer joined tentatively, but by closures at several places: with " + robots);
   ties_ = ties;
 }
 

@@ -12,6 +12,7 @@
 
 #include "modules/core/input_file.hpp"
 #include "modules/core/text_rows.hpp"
+#include "modules/journal/restored_run.hpp"
 #include "modules/mesh/map_file.hpp"
 #include "test/support/process.hpp"
 #include "test/support/shared_data.hpp"
@@ -173,8 +174,16 @@ TEST_CASE("A robot that is killed keeps its map, and continues it", "[system][re
   }
   const MapMesh before = read_map_file(map);
   REQUIRE(before.mesh.faces.size() > 100);
-  Process resumed(with(command, "--resume", output));
+  KeyframeIndex last_seen = 0;
+  for (const auto& [first, last] : before.seen_by) last_seen = std::max(last_seen, last);
+  const bool lost = last_seen + 1 < restore_run(output / "run.journal").keyframes.size();
+  CAPTURE(last_seen, lost);
+  Process resumed(logged(with(command, "--resume", output)));
   CHECK(resumed.wait() == 0);
+  const auto reports = [](const TimedLine& line) {
+    return line.text.find("run.map: has the surface of the first ") != std::string::npos;
+  };
+  CHECK(std::ranges::any_of(resumed.lines(), reports) == lost);
   const MapMesh after = read_map_file(map);
   CHECK(after.mesh.faces.size() > before.mesh.faces.size() + 100);
   // Surface that is seen again, and better, may be replaced.

@@ -6,9 +6,9 @@ namespace km {
 namespace {
 
 // Seconds after the last session until the next one, while odometry changes the graph all the time.
-double wait_s(SessionSchedule& schedule, std::uint64_t closures) {
+double wait_s(SessionSchedule& schedule, std::uint64_t closures, bool all_joined = true) {
   for (double now_s = 0.0;; now_s += 0.5) {
-    schedule.update(true, closures, now_s);
+    schedule.update(true, closures, all_joined, now_s);
     if (!schedule.is_worthwhile(0.0, now_s)) continue;
     schedule.opened();
     return now_s;
@@ -29,9 +29,23 @@ TEST_CASE("Sessions become rarer while robots find closures inside themselves on
   CHECK(wait_s(schedule, 20) == 0.0);  // twice as many
   CHECK(wait_s(schedule, 21) == 60.0);
   CHECK(wait_s(schedule, 21) == 240.0);
-  schedule.update(true, 21, 10.0);
+  schedule.update(true, 21, true, 10.0);
   CHECK_FALSE(schedule.is_worthwhile(0.0, 11.9));
   CHECK(schedule.is_worthwhile(0.0, 12.0));  // the graph rests
+}
+
+TEST_CASE("Sessions come four times as soon while the place of a robot is not certain",
+          "[pose_graph][session]") {
+  PoseGraphConfig config;
+  config.session_wait_s = 60.0;
+  config.session_growth = 2.0;
+  SessionSchedule schedule(config);
+  (void)wait_s(schedule, 10, false);
+  CHECK(wait_s(schedule, 14, false) == 15.0);
+  CHECK(wait_s(schedule, 21, false) == 0.0);  // by half of the closures before
+  CHECK(wait_s(schedule, 21, false) == 60.0);
+  CHECK(wait_s(schedule, 40, true) == 60.0);
+  CHECK(wait_s(schedule, 120, true) == 0.0);
 }
 
 }  // namespace km

@@ -81,7 +81,9 @@ TEST_CASE("Robots that closures at one place join are tentative, and report it",
   for (const RobotId robot : {RobotId{2}, RobotId{4}, RobotId{6}}) {
     CHECK(progress_of(network, robot).not_joined.empty());
     CHECK(progress_of(network, robot).anchor == 2);
-    CHECK(has_notice(network, robot, "joined tentatively"));
+    CHECK(has_notice(network, robot,
+                     robot == 2 ? "joined tentatively with robots 4, 6, by"
+                                : "joined tentatively with robot 2, by"));
   }
 }
 
@@ -116,7 +118,9 @@ TEST_CASE(
   for (const ClosureId& id : later) CHECK(network.agent(2).decided().at(id));
   for (const RobotId robot : {RobotId{2}, RobotId{4}, RobotId{6}})
     CHECK(progress_of(network, robot).tentative.empty());
-  CHECK(has_notice(network, 2, "no longer tentative"));
+  CHECK(has_notice(network, 2,
+                   "no longer joined tentatively, but by closures at several places: with "
+                   "robots 4, 6"));
   const CentralProblem whole(without(all, wrong));
   CHECK(whole.cost(network.trajectories()) ==
         Approx(whole.optimum(all.start)).epsilon(kCostTolerance));
@@ -192,10 +196,15 @@ TEST_CASE("Robots whose closures are all rejected publish in two frames, until o
     if (robot.peer.robot != 2 && !network.agent(4).in_session())
       anchors.insert(robot.trajectory->anchor);
   };
+  // Pairwise consistency may prefer them to those before.
+  const bool instead = GENERATE(true, false);
+  CAPTURE(instead);
+  InlierSet selected = inlier_set(problem, 2, 4, 2);
+  if (instead) selected.closures.assign(later.begin(), later.end());
   for (const RobotId robot : {RobotId{2}, RobotId{4}}) {
     for (const PoseEdge& e : problem.edges)
       if (later.contains(e.id())) (void)network.agent(robot).add(closure_of(e, &problem));
-    (void)network.agent(robot).add(inlier_set(problem, 2, 4, 2));
+    (void)network.agent(robot).add(selected);
   }
   (void)network.run(1.0);  // the next session waits for two seconds at rest
   CHECK_FALSE(network.agent(2).in_session());
@@ -221,6 +230,53 @@ TEST_CASE("Robots whose closures are all rejected publish in two frames, until o
   for (const RobotId robot : {RobotId{2}, RobotId{4}, RobotId{6}}) {
     CHECK(progress_of(network, robot).not_joined.empty());
     CHECK(progress_of(network, robot).anchor == 2);
+    CHECK(network.robots.at(robot).trajectory->anchor == 2);
+  }
+}
+
+TEST_CASE(
+    "A robot whose closures are all rejected is not joined by a pair that no session has seen",
+    "[pose_graph][tentative]") {
+  TeamProblem problem = team_of_three(3, {8, 9});
+  std::set<ClosureId> later;  // the first ones of robots 2 and 6, at three places
+  for (const std::uint32_t k : {30U, 40U, 50U}) {
+    const KeyframeId from{2, k}, to{6, k};
+    const SE3 T = problem.start.at(2)[k].inverse() * problem.start.at(6)[k];
+    problem.edges.push_back({from, to, T, problem.edges.front().precision});
+    later.insert(problem.edges.back().id());
+  }
+  bool rejects = true;
+  const MemberSolverFactory factory = [&](const Session&, SessionGraph graph, TreePlace place) {
+    ScriptedSolver::Options options;
+    for (const PoseEdge& e : graph.between)
+      if (rejects && e.id().from.robot == 2 && e.id().to.robot == 4) options.rejects.insert(e.id());
+    return std::make_unique<ScriptedSolver>(std::move(graph), std::move(place), options);
+  };
+  TeamNetwork network;
+  add_robots(network, without(problem, later), factory);
+  REQUIRE(settle(network));
+  (void)network.run(5.0);
+  REQUIRE(progress_of(network, 6).not_joined == Robots{2});
+
+  for (const RobotId robot : {RobotId{2}, RobotId{6}}) {
+    for (const PoseEdge& e : problem.edges)
+      if (later.contains(e.id())) (void)network.agent(robot).add(closure_of(e, &problem));
+    (void)network.agent(robot).add(inlier_set(problem, 2, 6));
+  }
+  (void)network.run(1.0);  // the next session waits for two seconds at rest
+  REQUIRE_FALSE(network.agent(2).in_session());
+  CHECK(progress_of(network, 2).not_joined == Robots{4, 6});
+  CHECK(network.robots.at(2).trajectory->anchor == 2);
+  for (const RobotId robot : {RobotId{4}, RobotId{6}}) {
+    CHECK(progress_of(network, robot).not_joined == Robots{2});
+    CHECK(network.robots.at(robot).trajectory->anchor == 4);
+  }
+
+  rejects = false;
+  REQUIRE(settle(network));
+  (void)network.run(5.0);
+  for (const RobotId robot : {RobotId{2}, RobotId{4}, RobotId{6}}) {
+    CHECK(progress_of(network, robot).not_joined.empty());
     CHECK(network.robots.at(robot).trajectory->anchor == 2);
   }
 }
