@@ -26,7 +26,7 @@ enum class RobotPhase { kRunning, kFinished, kSettled, kLeaving };
 /// "running", "finished", "settled", "leaving".
 const char* to_string(RobotPhase phase);
 
-/// State that a robot sends to the others twice a second, in teams of more than 11 less often.
+/// State that a robot sends to the others at the StatusPace.
 struct RobotStatus {
   RobotId robot = 0;
   std::string name;

@@ -9,14 +9,16 @@ namespace km {
 /// Shortest interval between statuses of a robot [s].
 inline constexpr double kStatusPeriod_s = 0.5;
 
-/// Decides at each tick, every kStatusPeriod_s, whether a robot sends its status. In a team with
-/// N other robots it is due every ceil(N / kFullRate) ticks. The statuses that a robot receives in
-/// a second then do not grow with the team. A status is also due at once if what other robots wait
-/// for has changed. In the first kNew_s every status is due: a process with the same robot id reads
-/// the uptime from their number, see PeerTable::twin_received(). Not thread-safe.
+/// Decides at each tick, every kStatusPeriod_s, whether a robot sends its status. It is due once a
+/// second, which is 2 ticks, and in a team with N other robots every ceil(N / kPerTick) ticks if
+/// that is longer. The statuses that a robot receives in a second then do not grow with a large
+/// team. A status is also due at once if what other robots wait for has changed. In the first
+/// kNew_s every status is due: a process with the same robot id reads the uptime from their number,
+/// see PeerTable::twin_received(). Not thread-safe.
 class StatusPace {
  public:
-  static constexpr std::size_t kFullRate = 10;  ///< Other robots up to which each tick is used.
+  static constexpr std::size_t kUsualTicks = 2;
+  static constexpr std::size_t kPerTick = 5;  ///< Statuses of large teams in a tick.
   static constexpr double kNew_s = 10.0;
 
   /// To be called once per tick. `awaited`: any number that changes with what others wait for.
