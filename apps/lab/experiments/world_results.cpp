@@ -168,6 +168,7 @@ WorldResults read_world_results(const WorldConfig& world, const ExperimentPaths&
   for (const RobotPlan& robot : plan.robots)
     results.robots.push_back(read_robot(team, robot, files.run));
   results.joint_error_m = number_at(team, "/optimized/joint/position_m/rmse");
+  results.live_error_m = number_at(team, "/live/joint/position_m/rmse");
   results.mesh = {mesh_numbers(part_of(team, "/meshes/merged")),
                   mesh_numbers(part_of(team, "/optimized_meshes/merged"))};
   results.closures = number_at(team, "/closures/inliers/judged");

@@ -46,6 +46,7 @@ struct RobotNumbers {
 struct WorldResults {
   std::vector<RobotNumbers> robots;
   std::optional<double> joint_error_m;            ///< As published, under one alignment.
+  std::optional<double> live_error_m;             ///< As known when each image came.
   MeshPair mesh;                                  ///< Mesh of all robots together.
   std::optional<double> closures, true_closures;  ///< Number of kept closures.
   std::string images;                             ///< "752x480, 90 s, seed 1".
