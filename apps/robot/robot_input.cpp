@@ -87,8 +87,9 @@ void report_lost_surface(const fs::path& file, const MapMesh& map, const Restore
   const double lost_s = seconds_between(run.odometry[std::max<std::size_t>(mapped, 1) - 1].stamp,
                                         run.odometry.back().stamp);
   log::warn("journal") << file.string() << ": has the surface of the first " << mapped << " of "
-                       << run.keyframes.size() << " keyframes: the map lacks what only the last "
-                       << fixed(lost_s, 1) << " s before the end of that process saw";
+                       << run.keyframes.size()
+                       << " keyframes: the map lacks what only the others saw, " << fixed(lost_s, 1)
+                       << " s (mapping.mesh_interval_s)";
 }
 
 // The map of the former process; nullopt if the file is missing or damaged.

@@ -81,7 +81,9 @@ std::string drift_remark(const TeamResult& team) {
   text
       << "Odometry is aligned with the truth robot by robot, the optimised trajectories all by one "
          "transform: that\nof a robot can be off as a whole. Live: the poses as known when each "
-         "image came, from the time at which\nthe robots joined.\n";
+         "image came, in this\nframe, which a robot enters when it joins the others. Covered: "
+         "share "
+         "of the time of the images that has poses.\n";
   return text.str();
 }
 

@@ -3,9 +3,10 @@
 #include <algorithm>
 #include <exception>
 #include <filesystem>
-#include <functional>
 #include <iostream>
 #include <map>
+#include <span>
+#include <system_error>
 #include <utility>
 
 #include "modules/core/input_file.hpp"
@@ -150,29 +151,31 @@ void judge_odometry(const TrajectoryInput& input, RobotResult& robot) {
   robot.paths.truth = beside(input.truth, input.estimate);
 }
 
-// Error of `file` of the robots in the team's frame under one alignment; nullopt if there is
-// nothing to compare. `notes_of` has the notes that say why poses of a robot are missing.
-std::optional<TeamError> joint_error(
-    std::vector<RobotResult>& robots, Trajectories& trajectories, const char* file,
-    const std::function<std::vector<std::string>&(RobotResult&)>& notes_of) {
+// Error of `file` of the `robots` under one alignment; nullopt if there is nothing to compare. The
+// notes of a robot say why its poses are missing.
+std::optional<TeamError> joint_error(std::span<RobotResult* const> robots,
+                                     Trajectories& trajectories, const char* file) {
   std::vector<TrajectoryInput> inputs;
-  for (RobotResult& robot : robots)
-    if (robot.in_team_frame)
-      if (const auto input = trajectories.input(robot.plan, file, notes_of(robot)))
-        inputs.push_back(*input);
+  for (RobotResult* robot : robots)
+    if (const auto input = trajectories.input(robot->plan, file, robot->notes))
+      inputs.push_back(*input);
   return inputs.empty() ? std::nullopt : std::optional(trajectory_error(inputs));
 }
 
 // Compares the live and the optimised poses of the robots in the team's frame with the truth, and
-// moves the optimised ones to the frame of the truth.
-void judge_in_team_frame(TeamResult& team, Trajectories& trajectories) {
-  team.optimized = joint_error(
-      team.robots, trajectories, "optimized.tum",
-      [](RobotResult & robot) -> auto& { return robot.notes; });
-  // A robot that joined in the end has no live poses in the team's frame.
-  std::vector<std::string> not_reported;
-  team.live = joint_error(
-      team.robots, trajectories, "live.tum", [&](RobotResult&) -> auto& { return not_reported; });
+// moves the optimised ones to the frame of the truth. A robot that entered this frame at the end
+// has no live poses in it, and its file is empty.
+void judge_in_team_frame(const TeamPlan& plan, TeamResult& team, Trajectories& trajectories) {
+  std::vector<RobotResult*> joined, live;
+  for (RobotResult& robot : team.robots) {
+    if (!robot.in_team_frame) continue;
+    joined.push_back(&robot);
+    std::error_code missing;
+    const auto size = fs::file_size(plan.output / robot.plan.name / "live.tum", missing);
+    if (!missing && size > 0) live.push_back(&robot);
+  }
+  team.optimized = joint_error(joined, trajectories, "optimized.tum");
+  team.live = joint_error(live, trajectories, "live.tum");
   const Alignment alignment = team.optimized ? team.optimized->alignment : Alignment{};
   for (RobotResult& robot : team.robots) {
     if (!robot.in_team_frame || robot.left_nothing()) continue;
@@ -269,12 +272,12 @@ void find_team_frame(std::vector<RobotResult>& robots) {
     const auto frame = frame_of(robot);
     if (!frame || *frame == team->first) continue;
     robot.in_team_frame = false;
-    robot.notes.push_back(
-        (*frame == robot.plan.id && sizes[*frame] == 1
-             ? std::string(robots.size() == 2 ? "never joined the other robot"
-                                              : "never joined the others")
-             : "ended in the frame of robot " + std::to_string(*frame)) +
-        ": left out of the optimised errors, the report's trajectories and the team's map");
+    robot.notes.push_back((*frame == robot.plan.id && sizes[*frame] == 1
+                               ? std::string(robots.size() == 2 ? "never joined the other robot"
+                                                                : "never joined the others")
+                               : "ended in the frame of robot " + std::to_string(*frame)) +
+                          ": left out of the live and optimised errors, the report's trajectories "
+                          "and the team's map");
   }
 }
 
@@ -311,7 +314,7 @@ TeamResult collect_results(const TeamPlan& plan, std::vector<RobotRun> runs) {
   joined.robots.clear();
   for (const RobotResult& robot : result.robots)
     if (robot.in_team_frame) joined.robots.push_back(robot.plan);
-  judge_in_team_frame(result, trajectories);
+  judge_in_team_frame(plan, result, trajectories);
   if (plan.truth_mesh.empty() || result.optimized)
     result.meshes = collect_meshes(
         joined, result.optimized ? result.optimized->alignment.T_truth_estimate : SE3::Identity(),

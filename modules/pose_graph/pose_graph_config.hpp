@@ -58,19 +58,19 @@ struct PoseGraphConfig {
                   "[kB/s] mean rate at which a robot may send for sessions, counted per receiver "
                   "and with forwarded messages; the next session waits until the bytes of the "
                   "busiest member in the last one fit this rate");
-    visitor.field(
-        "session_growth", session_growth, {0.0, 100.0},
-        "relative growth of the number of closures between robots for which the next "
-        "session waits; a quarter of it while the place of a member is not certain; a new "
-        "member, or two seconds without new measurements, also end the wait");
+    visitor.field("session_growth", session_growth, {0.0, 100.0},
+                  "relative growth of the number of closures between robots for which the next "
+                  "session waits, 3: until there are four times as many; a quarter of it while the "
+                  "place of a member is not certain; a new member, or two seconds without new "
+                  "measurements, also end the wait");
     visitor.field("session_wait_s", session_wait_s, {0.0, 3600.0},
                   "[s] longest wait for the next session, whatever exchange_budget_kb_s and "
-                  "session_growth demand; a quarter of it while the place of a member is not "
-                  "certain; four times as long while no closure between robots is new");
-    visitor.field(
-        "refinement_period_s", refinement_period_s, {0.0, 3600.0},
-        "[s] newton: shortest time between refinements of the own poses between sessions, "
-        "by new closures and without a message; 0: none");
+                  "session_growth demand, 0: none; a quarter of it while the place of a member is "
+                  "not certain; four times as long while no closure between robots is new");
+    visitor.field("refinement_period_s", refinement_period_s, {0.0, 3600.0},
+                  "[s] newton: shortest time between refinements of the own poses between "
+                  "sessions, by new closures and without a message, in at most a twentieth of the "
+                  "time; 0: no refinements");
     visitor.field("min_relative_decrease", min_relative_decrease, {0.0, 0.1},
                   "rbcd: relative decrease of the team cost in a round below which the session has "
                   "converged");

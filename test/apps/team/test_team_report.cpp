@@ -127,6 +127,22 @@ TEST_CASE("A robot without results leaves a note, the others are judged", "[team
   CHECK_FALSE(team.robots[1].odometry);
 }
 
+TEST_CASE(
+    "Damaged live poses are noted, and those of a robot that joined at the end are not missed",
+    "[team]") {
+  const HalfTeam half;
+  half.folder.write("a/live.tum", "1.0 0 0 0 0 0 0\n");
+  const TeamResult damaged = half.collect();
+  CHECK_FALSE(damaged.live);
+  REQUIRE(damaged.robots[0].notes.size() == 1);
+  CHECK_THAT(damaged.robots[0].notes[0], Contains("live.tum"));
+  half.folder.write("a/live.tum", "");
+  const TeamResult late = half.collect();
+  CHECK_FALSE(late.live);
+  CHECK(late.robots[0].notes.empty());
+  CHECK(late.optimized);
+}
+
 TEST_CASE("The tables show results, failures and last words, in 120 columns", "[team]") {
   const std::string text = to_table(HalfTeam().collect());
   for (const char* expected :
