@@ -207,9 +207,7 @@ void write_results(const fs::path& folder, const RunRecord& record, ResultWriter
     });
   };
   write("odometry.tum", write_poses, record.odometry());
-  // A finished run that is resumed to serve others has no image, and keeps its live poses.
-  if (!record.live().empty() || !fs::exists(folder / "live.tum"))
-    write("live.tum", write_poses, record.live());
+  write("live.tum", write_poses, record.live());
   write("optimized.tum", write_poses, record.optimized());
   write("optimized_keyframes.tum", write_keyframe_poses, record);
   results.write(folder / "pose_graph.g2o",
