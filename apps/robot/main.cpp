@@ -45,9 +45,9 @@ Examples
     kimera_multi_robot --config config/datasets/tunnels.yaml --robot 3 --graph robot3.csv --rate max --output results/3
 
 Files written to --output: odometry.tum, live.tum, optimized.tum, optimized_keyframes.tum, pose_graph.g2o,
-keyframes.csv, loop_closures.csv, optimizer.csv, traffic.csv, process.csv, timing.csv, config.yaml, summary.json, rig_estimated.yaml (for --rig of
-the next run), run.journal (for --resume and --session); with mapping.mode on also mesh.ply,
-mesh_optimized.ply, label_palette.csv, objects.json, map.yaml and map.pgm; with map.team also team_mesh.ply and
+keyframes.csv, loop_closures.csv, optimizer.csv, traffic.csv, process.csv, timing.csv, config.yaml, summary.json,
+rig_estimated.yaml (for --rig of the next run), run.journal (for --resume and --session); with mapping.mode on also
+mesh.ply, mesh_optimized.ply, label_palette.csv, objects.json, map.yaml and map.pgm; with map.team also team_mesh.ply and
 team_map.*; with --record record.mcap. apps/robot/README.md describes all of them.
 Ctrl-C, SIGTERM and SIGHUP end the run in order with everything written; a second Ctrl-C or SIGTERM ends it at once.
 Exit codes: 0 done; 1 bad input or configuration, a recording that gave no pose, or live sensors that gave no image;

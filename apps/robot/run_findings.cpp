@@ -208,8 +208,7 @@ void add_map_gave_way(const RunSummary& run, std::vector<Finding>& findings) {
                       .means = "processors were short, and the map gives way to odometry: it may "
                                "have holes",
                       .to_do = "--rate auto, which waits, a lower mapping.rate_hz, a higher "
-                               "stereo_depth.downscale, or a "
-                               "faster computer"});
+                               "stereo_depth.downscale, or a faster computer"});
 }
 
 void add_noisy_odometry(const RunSummary& run, std::vector<Finding>& findings) {

@@ -142,7 +142,8 @@ class RunRecord {
   [[nodiscard]] std::vector<StampedPose> optimized_keyframes() const;
   /// Poses of images in the team's frame as they were known when odometry estimated them: odometry
   /// since the last keyframe that was optimised by then, on its pose by then. Only those in the
-  /// present frame of the team, which begin when the robot joins it, and none of a former process.
+  /// present frame of the team, which begin when the robot joins it, and none of a former process
+  /// that had a solution.
   [[nodiscard]] const std::vector<StampedPose>& live() const { return live_; }
 
   /// Closures that this robot found, by the other robot (or itself).

@@ -83,7 +83,7 @@ std::string drift_remark(const TeamResult& team) {
          "transform: that\nof a robot can be off as a whole. Live: the poses as known when each "
          "image came, in this\nframe, which a robot enters when it joins the others. Covered: "
          "share "
-         "of the time of the images that has poses.\n";
+         "of the time of the images that\nhas poses.\n";
   return text.str();
 }
 

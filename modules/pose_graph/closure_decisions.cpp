@@ -79,7 +79,7 @@ void ClosureDecisions::count_places(EdgeSetOffer& offer, std::span<const PoseEdg
   if (is_new) {
     // Once a session has weighed closures of the pair, offered now or not, its solution places the
     // robots by the kept ones: undecided ones wait for the next session.
-    const auto is_of_pair = [&](const auto& entry) { return touches(entry.first, offer.peer); };
+    const auto is_of_pair = [&](const auto& of_one) { return touches(of_one.first, offer.peer); };
     const bool weighed = std::ranges::any_of(decided_, is_of_pair) ||
                          std::ranges::any_of(times_reconsidered_, is_of_pair);
     std::vector<PoseEdge> accepted, rejected;

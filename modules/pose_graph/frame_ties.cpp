@@ -47,12 +47,11 @@ std::vector<RobotTie> find_ties(const std::map<RobotId, TeamStatus>& statuses,
         ties.push_back({one->first, other->first, kPlacesOfDatum, false});
         continue;
       }
-      if (solved != nullptr && lacks_pair(*solved, one->first, other->first)) continue;
       const EdgeSetOffer* ours = newest_offer(one->second, other->first);
       const EdgeSetOffer* theirs = newest_offer(other->second, one->first);
       if (ours == nullptr || theirs == nullptr) continue;
       const std::uint32_t places = std::min(ours->places, theirs->places);
-      if (places > 0)
+      if (places > 0 && (solved == nullptr || !lacks_pair(*solved, one->first, other->first)))
         ties.push_back(
             {one->first, other->first, places, ours->contradicted || theirs->contradicted});
     }

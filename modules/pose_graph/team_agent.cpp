@@ -191,9 +191,7 @@ TeamOutput TeamAgent::step(double now_s, std::uint64_t sent_bytes) {
     refine_alone();
   }
   send_status(output);
-  // The plan says which robots the last decisions tie to this one.
-  if (is_complete && !plan_outdated_) publish(output);
-  output.more |= plan_outdated_ && publish_due_;
+  if (is_complete) publish(output);
   output.verdicts = decisions_.take_verdicts();
   output.notices = notices_.take();
   return output;
