@@ -33,7 +33,6 @@ struct VocabularyCommand {
 void add_train(Command app);
 void add_inspect(Command app);
 void add_evaluate(Command app);
-void add_bags(Command app);
 void add_describe(Command app);
 void add_patches(Command app);
 

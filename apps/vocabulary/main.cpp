@@ -16,8 +16,8 @@ constexpr const char* kAbout =
 }  // namespace
 
 int main(int argc, char** argv) {
-  return km::run_subcommands("kimera_multi_vocabulary", kAbout,
-                             {km::add_train, km::add_inspect, km::add_evaluate, km::add_bags,
-                              km::add_describe, km::add_patches},
-                             argc, argv);
+  return km::run_subcommands(
+      "kimera_multi_vocabulary", kAbout,
+      {km::add_train, km::add_inspect, km::add_evaluate, km::add_describe, km::add_patches}, argc,
+      argv);
 }

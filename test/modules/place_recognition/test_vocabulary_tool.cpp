@@ -3,12 +3,10 @@
 #include <filesystem>
 #include <opencv2/imgproc.hpp>
 #include <string>
-#include <vector>
 
 #include "modules/images/keypoint_patches.hpp"
 #include "modules/images/spread_keypoints.hpp"
 #include "modules/loop_closure/keyframe_features_config.hpp"
-#include "modules/place_recognition/bag_file.hpp"
 #include "test/support/command.hpp"
 #include "test/support/image_file.hpp"
 #include "test/support/shared_data.hpp"
@@ -52,17 +50,6 @@ TEST_CASE("The tool trains on real images and distinguishes the two places",
   // 0, 1 and 2, 3 are pairs of one place each.
   CHECK(score_of(0, 1) > score_of(0, 2));
   CHECK(score_of(2, 3) > score_of(1, 3));
-
-  const std::string bags = (folder.path() / "bags.txt").string();
-  const CommandResult written = run_tool("bags " + vocabulary + " " + left(0) + " " + left(0) +
-                                         " " + left(2) + " -o " + bags);
-  INFO(written.output);
-  REQUIRE(written.exit_code == 0);
-  const std::vector<BagOfWords> read = read_bags(bags);
-  REQUIRE(read.size() == 3);
-  CHECK(!read[0].empty());
-  CHECK(read[0] == read[1]);
-  CHECK(read[0] != read[2]);
 }
 
 // A grey image with corners everywhere.
