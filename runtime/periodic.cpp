@@ -4,8 +4,6 @@
 #include <stdexcept>
 #include <utility>
 
-#include "runtime/thread.hpp"
-
 namespace km {
 
 Periodic::Periodic(Duration period, std::function<void()> tick, std::string name)
@@ -14,7 +12,7 @@ Periodic::Periodic(Duration period, std::function<void()> tick, std::string name
 }
 
 void Periodic::start() {
-  thread_ = std::thread(&Periodic::run, this);
+  thread_.start(name_, [this] { run(); });
 }
 
 void Periodic::stop() noexcept {
@@ -23,16 +21,10 @@ void Periodic::stop() noexcept {
     stop_ = true;
   }
   wake_.notify_all();
-  if (thread_.joinable()) thread_.join();
+  thread_.join();
 }
 
-std::exception_ptr Periodic::error() const {
-  const std::lock_guard lock(mutex_);
-  return error_;
-}
-
-void Periodic::run() try {
-  name_this_thread(name_);
+void Periodic::run() {
   auto next = std::chrono::steady_clock::now();
   std::unique_lock lock(mutex_);
   while (!stop_) {
@@ -42,9 +34,6 @@ void Periodic::run() try {
     next = std::max(next + period_, std::chrono::steady_clock::now());
     wake_.wait_until(lock, next, [this] { return stop_; });
   }
-} catch (...) {
-  const std::lock_guard lock(mutex_);
-  error_ = std::current_exception();
 }
 
 }  // namespace km

@@ -6,7 +6,8 @@
 #include <functional>
 #include <mutex>
 #include <string>
-#include <thread>
+
+#include "runtime/guarded_thread.hpp"
 
 namespace km {
 
@@ -30,7 +31,7 @@ class Periodic {
   void stop() noexcept;
 
   /// The exception that ended the thread, or null. Thread-safe.
-  std::exception_ptr error() const;
+  std::exception_ptr error() const { return thread_.error(); }
 
  private:
   void run();
@@ -38,11 +39,10 @@ class Periodic {
   const Duration period_;
   const std::function<void()> tick_;
   const std::string name_;
-  mutable std::mutex mutex_;  // guards the members below
+  std::mutex mutex_;  // guards stop_
   std::condition_variable wake_;
   bool stop_ = false;
-  std::exception_ptr error_;
-  std::thread thread_;
+  GuardedThread thread_;
 };
 
 }  // namespace km

@@ -13,7 +13,6 @@
 #include <utility>
 
 #include "runtime/clock.hpp"
-#include "runtime/thread.hpp"
 
 namespace km {
 namespace {
@@ -36,14 +35,7 @@ EmulatedLinks::EmulatedLinks(LinkScript script)
   if (wake_.get() < 0) throw carry_error("eventfd");
   for (std::size_t robot = 0; robot < emulator_.robots(); ++robot) networks_.emplace_back(robot);
   start_s_ = steady_now_s();
-  carrier_ = std::thread([this] {
-    name_this_thread("links");
-    try {
-      carry();
-    } catch (...) {
-      failure_ = std::current_exception();
-    }
-  });
+  carrier_.start("links", [this] { carry(); });
 }
 
 EmulatedLinks::~EmulatedLinks() {
@@ -52,7 +44,7 @@ EmulatedLinks::~EmulatedLinks() {
 
 const LinkEmulator& EmulatedLinks::finish() {
   stop();
-  if (failure_) std::rethrow_exception(failure_);
+  if (const auto failure = carrier_.error()) std::rethrow_exception(failure);
   return emulator_;
 }
 

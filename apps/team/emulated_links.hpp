@@ -1,14 +1,13 @@
 #pragma once
 
 #include <atomic>
-#include <exception>
 #include <memory>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "apps/team/robot_network.hpp"
 #include "modules/link_emulation/link_emulator.hpp"
+#include "runtime/guarded_thread.hpp"
 
 namespace km {
 
@@ -41,8 +40,7 @@ class EmulatedLinks {
   Descriptor wake_;
   double start_s_;
   std::atomic<bool> stopped_ = false;
-  std::exception_ptr failure_;  // exception of the thread
-  std::thread carrier_;
+  GuardedThread carrier_;
 };
 
 }  // namespace km

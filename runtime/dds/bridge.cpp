@@ -6,7 +6,6 @@
 
 #include "runtime/clock.hpp"
 #include "runtime/log.hpp"
-#include "runtime/thread.hpp"
 
 namespace km {
 namespace {
@@ -160,7 +159,7 @@ void DdsBridge::start() {
   if (keys_ != nullptr) key_sender_.start();
   peers_.start();
   for (const auto& topic : incoming_) topic->start();
-  receiver_ = std::thread(&DdsBridge::receive_until_stopped, this);
+  receiver_.start("dds_receive", [this] { receive_until_stopped(); });
 }
 
 void DdsBridge::stop() noexcept {
@@ -175,12 +174,9 @@ void DdsBridge::stop() noexcept {
 }
 
 std::exception_ptr DdsBridge::error() const {
-  if (receive_failed_) return receive_error_;
-  if (const auto error = sender_.error()) return error;
-  if (const auto error = key_sender_.error()) return error;
   for (const auto& topic : incoming_)
     if (const auto error = topic->error()) return error;
-  return peers_.error();
+  return first_of({receiver_.error(), sender_.error(), key_sender_.error(), peers_.error()});
 }
 
 std::vector<Heartbeat*> DdsBridge::heartbeats() {
@@ -189,8 +185,7 @@ std::vector<Heartbeat*> DdsBridge::heartbeats() {
   return all;
 }
 
-void DdsBridge::receive_until_stopped() try {
-  name_this_thread("dds_receive");
+void DdsBridge::receive_until_stopped() {
   std::vector<dds_attach_t> triggered(incoming_.size() + 3);
   while (!stopping_) {
     const dds_return_t count =
@@ -212,9 +207,6 @@ void DdsBridge::receive_until_stopped() try {
     for (const auto& topic : incoming_) topic->recall(now_s);
     if (const auto interface = participant_.new_interface(now_s)) move_to(*interface);
   }
-} catch (...) {
-  receive_error_ = std::current_exception();
-  receive_failed_ = true;  // set after receive_error_, so that readers of the flag see the error
 }
 
 void DdsBridge::finish_receiving() noexcept {

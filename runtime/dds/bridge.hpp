@@ -9,7 +9,6 @@
 #include <optional>
 #include <span>
 #include <string_view>
-#include <thread>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -23,6 +22,7 @@
 #include "runtime/dds/peers.hpp"
 #include "runtime/dds/sender.hpp"
 #include "runtime/dds/traffic.hpp"
+#include "runtime/guarded_thread.hpp"
 #include "runtime/node.hpp"
 #include "runtime/topic.hpp"
 #include "runtime/worker.hpp"
@@ -174,9 +174,7 @@ class DdsBridge final : public Node {
   bool stopped_ = false;
   std::atomic<bool> stopping_ = false;
   Heartbeat receiving_;
-  std::exception_ptr receive_error_;
-  std::atomic<bool> receive_failed_ = false;
-  std::thread receiver_;
+  GuardedThread receiver_;
   // Separate from sender_, because the receive thread posts to it and must not wait for room.
   Worker<TeamPeer> key_sender_;
   Sender sender_;  // last members: stop first

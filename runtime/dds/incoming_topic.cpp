@@ -14,7 +14,6 @@
 #include "runtime/dds/robot_status.hpp"
 #include "runtime/dds/sealed_envelope.hpp"
 #include "runtime/log.hpp"
-#include "runtime/thread.hpp"
 
 namespace km {
 namespace {
@@ -212,7 +211,7 @@ IncomingTopic::Readable IncomingTopic::open(const km_wire_Envelope& envelope,
 
 void IncomingTopic::start() {
   started_s_ = steady_now_s();
-  delivery_ = std::thread(&IncomingTopic::deliver_until_stopped, this);
+  delivery_.start("dds_in", [this] { deliver_until_stopped(); });
 }
 
 void IncomingTopic::stop() noexcept {
@@ -221,11 +220,10 @@ void IncomingTopic::stop() noexcept {
     stopping_ = true;
     filed_changed_.notify_one();
   }
-  if (delivery_.joinable()) delivery_.join();
+  delivery_.join();
 }
 
-void IncomingTopic::deliver_until_stopped() try {
-  name_this_thread("dds_in");
+void IncomingTopic::deliver_until_stopped() {
   double retry_at_s = 0.0;
   std::unique_lock lock(mutex_);
   while (!stopping_) {
@@ -247,9 +245,6 @@ void IncomingTopic::deliver_until_stopped() try {
       filed_changed_.wait(lock);
     }
   }
-} catch (...) {
-  error_ = std::current_exception();
-  failed_ = true;  // set after error_, so that readers of the flag see the error
 }
 
 void IncomingTopic::await_key(Filed filed, double now_s) {

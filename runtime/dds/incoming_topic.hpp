@@ -2,7 +2,6 @@
 
 #include <envelope.h>
 
-#include <atomic>
 #include <condition_variable>
 #include <cstdint>
 #include <functional>
@@ -12,13 +11,13 @@
 #include <optional>
 #include <span>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "modules/core/pending_messages.hpp"
 #include "runtime/dds/fair_queue.hpp"
 #include "runtime/dds/outgoing_topic.hpp"
 #include "runtime/dds/sequence_tracker.hpp"
+#include "runtime/guarded_thread.hpp"
 #include "runtime/heartbeat.hpp"
 
 namespace km {
@@ -80,7 +79,7 @@ class IncomingTopic {
   void start();
   /// Drops all filed messages. Idempotent.
   void stop() noexcept;
-  [[nodiscard]] std::exception_ptr error() const { return failed_ ? error_ : nullptr; }
+  [[nodiscard]] std::exception_ptr error() const { return delivery_.error(); }
 
   [[nodiscard]] Heartbeat& heartbeat() { return delivering_; }
 
@@ -145,9 +144,7 @@ class IncomingTopic {
 
   std::shared_ptr<InFlight> in_flight_ = std::make_shared<InFlight>();
   Heartbeat delivering_;
-  std::exception_ptr error_;
-  std::atomic<bool> failed_ = false;
-  std::thread delivery_;
+  GuardedThread delivery_;
   DdsEntity topic_;
   DdsEntity subscriber_;
   DdsEntity reader_;

@@ -6,7 +6,6 @@
 #include "runtime/clock.hpp"
 #include "runtime/dds/envelope.hpp"
 #include "runtime/log.hpp"
-#include "runtime/thread.hpp"
 
 namespace km {
 namespace {
@@ -29,7 +28,7 @@ Sender::Sender(const BudgetConfig& budget, const DdsParticipant& participant,
 
 void Sender::stop() noexcept {
   posted_.close();
-  if (thread_.joinable()) thread_.join();
+  thread_.join();
 }
 
 void Sender::post(Outgoing message) {
@@ -52,8 +51,7 @@ std::map<const OutgoingTopic*, HeldBack> Sender::held_back() const {
   return held_;
 }
 
-void Sender::run() try {
-  name_this_thread("dds_send");
+void Sender::run() {
   std::optional<double> end_s;
   while (true) {
     if (work()) continue;
@@ -70,10 +68,6 @@ void Sender::run() try {
   }
   schedule_.drop_all();
   report();
-} catch (...) {
-  error_ = std::current_exception();
-  failed_ = true;  // set after error_, so that readers of the flag see the error
-  posted_.close();
 }
 
 // False if no message may be sent now.

@@ -9,13 +9,13 @@
 #include <mutex>
 #include <optional>
 #include <set>
-#include <thread>
 #include <vector>
 
 #include "runtime/bounded_queue.hpp"
 #include "runtime/dds/budget_config.hpp"
 #include "runtime/dds/outgoing_topic.hpp"
 #include "runtime/dds/send_schedule.hpp"
+#include "runtime/guarded_thread.hpp"
 #include "runtime/heartbeat.hpp"
 #include "runtime/metrics.hpp"
 
@@ -48,7 +48,10 @@ class Sender {
   Sender(const Sender&) = delete;
   Sender& operator=(const Sender&) = delete;
 
-  void start() { thread_ = std::thread(&Sender::run, this); }
+  void start() {
+    thread_.start(
+        "dds_send", [this] { run(); }, [this] { posted_.close(); });
+  }
 
   /// Sends the queued messages, with a budget as much as it permits within two seconds, and joins.
   /// Idempotent.
@@ -69,7 +72,7 @@ class Sender {
   [[nodiscard]] std::map<const OutgoingTopic*, HeldBack> held_back() const;
 
   /// The exception that ended the thread, or null. Thread-safe.
-  std::exception_ptr error() const { return failed_ ? error_ : nullptr; }
+  std::exception_ptr error() const { return thread_.error(); }
   Heartbeat& heartbeat() { return heartbeat_; }
   /// Durations of encoding and writing each message. Thread-safe.
   DurationHistogram timing() const { return timing_.histogram(); }
@@ -105,9 +108,7 @@ class Sender {
   std::set<RobotId> renewals_;  // robots whose writers have to be renewed
   Heartbeat heartbeat_;
   Timing timing_;
-  std::exception_ptr error_;
-  std::atomic<bool> failed_ = false;
-  std::thread thread_;
+  GuardedThread thread_;
 };
 
 }  // namespace km

@@ -2,6 +2,7 @@
 #include <unistd.h>
 
 #include <catch2/catch.hpp>
+#include <chrono>
 #include <csignal>
 #include <future>
 #include <memory>
@@ -9,6 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "runtime/guarded_thread.hpp"
+#include "runtime/periodic.hpp"
 #include "runtime/supervisor.hpp"
 #include "runtime/worker.hpp"
 #include "test/support/captured_log.hpp"
@@ -76,6 +79,51 @@ TEST_CASE("A failed node ends the run with its name and its message", "[supervis
   CHECK(result.failure->node == "odometry");
   CHECK(result.failure->message == "the reason");
   CHECK_THAT(log.text(), Catch::Contains("odometry failed: the reason"));
+}
+
+// A node with every kind of thread that a node may have; one of them fails.
+class ThreadsNode final : public Node {
+ public:
+  enum class Failing { kThread, kWorker, kPeriodic };
+  explicit ThreadsNode(Failing failing) : failing_(failing) {}
+
+  std::string_view name() const override { return "threads"; }
+  void start() override {
+    worker_.start();
+    ticks_.start();
+    receiver_.start("receiver", [this] { fail_if(Failing::kThread); });
+    worker_.post(0);
+  }
+  void stop() noexcept override {
+    receiver_.join();
+    ticks_.stop();
+    worker_.stop();
+  }
+  std::exception_ptr error() const override {
+    return first_of({worker_.error(), ticks_.error(), receiver_.error()});
+  }
+
+ private:
+  void fail_if(Failing thread) const {
+    if (failing_ == thread) throw std::runtime_error("the reason");
+  }
+
+  const Failing failing_;
+  GuardedThread receiver_;
+  Periodic ticks_{std::chrono::milliseconds(1), [this] { fail_if(Failing::kPeriodic); }};
+  Worker<int> worker_{1, Overflow::kBlock, [this](int) { fail_if(Failing::kWorker); }};
+};
+
+TEST_CASE("An exception in any thread of a node ends the run with the name of the node",
+          "[supervisor]") {
+  using Failing = ThreadsNode::Failing;
+  const Failing failing = GENERATE(Failing::kThread, Failing::kWorker, Failing::kPeriodic);
+  Run run;
+  run.supervisor.emplace<ThreadsNode>(failing);
+  const RunResult result = run.supervisor.run([] { return false; }, 0.001);
+  REQUIRE(result.failure.has_value());
+  CHECK(result.failure->node == "threads");
+  CHECK(result.failure->message == "the reason");
 }
 
 TEST_CASE("A node that fails while it finishes its work is still reported", "[supervisor]") {

@@ -170,6 +170,21 @@ TEST_CASE("The laboratory links only libraries that are installed", "[layers]") 
         std::set<std::string>{"km_b"});
 }
 
+// An exception in a std::thread ends the process without a report; GuardedThread reports it.
+TEST_CASE("Nodes and the runtime start threads only as GuardedThread", "[layers]") {
+  const std::set<std::string> own_threads = {"runtime/guarded_thread.hpp", "runtime/thread.hpp",
+                                             "runtime/unblocked_output.hpp"};
+  for (const char* root : {"modules", "runtime"})
+    for (const auto& entry : fs::recursive_directory_iterator(root)) {
+      const std::string file = entry.path().generic_string();
+      if (!is_source(entry.path()) || own_threads.contains(file)) continue;
+      std::ifstream stream(entry.path());
+      const std::string text(std::istreambuf_iterator<char>(stream), {});
+      CAPTURE(file);
+      CHECK(matches(text, R"((std::j?thread\b(?!::)|std::async\b))").empty());
+    }
+}
+
 TEST_CASE("No header of the programs includes all of JSON", "[layers]") {
   for (const char* root : {"modules", "runtime", "apps"})
     for (const auto& entry : fs::recursive_directory_iterator(root)) {

@@ -2,8 +2,6 @@
 
 #include <utility>
 
-#include "runtime/thread.hpp"
-
 namespace km {
 namespace {
 
@@ -29,12 +27,12 @@ FixesNode::FixesNode(FixInput input, const FixesTopics& topics)
 
 void FixesNode::start() {
   worker_.start();
-  if (live_ != nullptr) receiver_ = start_without_signals([this] { receive(); });
+  if (live_ != nullptr) receiver_.start("fixes_live", [this] { receive(); });
 }
 
 void FixesNode::stop() noexcept {
   if (live_ != nullptr) live_->stop();
-  if (receiver_.joinable()) receiver_.join();
+  receiver_.join();
   worker_.stop();
 }
 

@@ -6,11 +6,11 @@
 #include <mutex>
 #include <optional>
 #include <string_view>
-#include <thread>
 #include <variant>
 #include <vector>
 
 #include "modules/absolute_fixes/fix_association.hpp"
+#include "runtime/guarded_thread.hpp"
 #include "runtime/node.hpp"
 #include "runtime/topic.hpp"
 #include "runtime/worker.hpp"
@@ -43,7 +43,9 @@ class FixesNode final : public Node {
   std::string_view name() const override { return AbsoluteFixesConfig::kSection; }
   void start() override;
   void stop() noexcept override;
-  std::exception_ptr error() const override { return worker_.error(); }
+  std::exception_ptr error() const override {
+    return first_of({worker_.error(), receiver_.error()});
+  }
   std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
   DurationHistogram timing() const override { return worker_.timing(); }
 
@@ -64,7 +66,7 @@ class FixesNode final : public Node {
   FixAssociation association_;
   std::unique_ptr<BagReader> live_;
   const FixesTopics topics_;
-  std::thread receiver_;
+  GuardedThread receiver_;
   Worker<Input> worker_;  // last member: stops first
 };
 

@@ -41,7 +41,9 @@ SensorsNode::SensorsNode(const SensorsConfig& config, const PlaybackPace& pace,
 
 void SensorsNode::start() {
   worker_.start();
-  decoder_ = std::thread(&SensorsNode::decode, this);
+  // A failure of the decoder reaches the worker behind the packets that were decoded before it.
+  decoder_.start(
+      "decoder", [this] { decode(); }, [this] { worker_.post(std::current_exception()); });
 }
 
 void SensorsNode::stop() noexcept {
@@ -56,25 +58,21 @@ void SensorsNode::stop() noexcept {
 
 void SensorsNode::decode() {
   bool has_remarked = false;
-  try {
-    while (!stopped_) {
-      auto packet = [this] {
-        const Heartbeat::Step step(decoding_);
-        const auto scope = reading_.measure();
-        return reader_->next(
-            [this](Stamp stamp, Stamp arrival) { return choose_use(stamp, arrival); });
-      }();
-      if (!std::exchange(has_remarked, true))
-        for (const std::string& remark : reader_->remarks()) log::info(name()) << remark;
-      count_faults();
-      if (!packet) {
-        worker_.post(EndOfData{reader_->report()});
-        return;
-      }
-      if (!worker_.post(std::make_shared<const SensorPacket>(std::move(*packet)))) return;
+  while (!stopped_) {
+    auto packet = [this] {
+      const Heartbeat::Step step(decoding_);
+      const auto scope = reading_.measure();
+      return reader_->next(
+          [this](Stamp stamp, Stamp arrival) { return choose_use(stamp, arrival); });
+    }();
+    if (!std::exchange(has_remarked, true))
+      for (const std::string& remark : reader_->remarks()) log::info(name()) << remark;
+    count_faults();
+    if (!packet) {
+      worker_.post(EndOfData{reader_->report()});
+      return;
     }
-  } catch (...) {
-    worker_.post(std::current_exception());  // ends the worker with this exception
+    if (!worker_.post(std::make_shared<const SensorPacket>(std::move(*packet)))) return;
   }
 }
 

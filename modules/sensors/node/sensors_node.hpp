@@ -8,7 +8,6 @@
 #include <mutex>
 #include <string>
 #include <string_view>
-#include <thread>
 #include <variant>
 #include <vector>
 
@@ -17,6 +16,7 @@
 #include "modules/sensors/playback_pace.hpp"
 #include "modules/sensors/sensors_config.hpp"
 #include "runtime/clock.hpp"
+#include "runtime/guarded_thread.hpp"
 #include "runtime/metrics.hpp"
 #include "runtime/node.hpp"
 #include "runtime/topic.hpp"
@@ -115,7 +115,7 @@ class SensorsNode final : public Node {
   double counted_s_ = 0.0;
   Timing reading_;
   Heartbeat decoding_;  // heartbeat of the decoder thread, one step per packet
-  std::thread decoder_;
+  GuardedThread decoder_;
   Worker<Input> worker_;  // last member: stops first
 };
 
