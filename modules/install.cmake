@@ -34,7 +34,7 @@ foreach(module ${modules})
   endforeach()
 endforeach()
 foreach(header apps/centralised_system.hpp apps/command_line.hpp apps/descriptor.hpp
-               apps/output_file.hpp apps/program_folder.hpp apps/program_version.hpp
+               apps/output_file.hpp apps/program_folder.hpp apps/program_options.hpp apps/program_version.hpp
                apps/report_files.hpp apps/stage_progress.hpp
                apps/team/robot_process.hpp apps/team/team_file.hpp
                runtime/clock.hpp runtime/config_layers.hpp runtime/config_text.hpp

@@ -6,12 +6,12 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 
-#include "apps/command_line.hpp"
 #include "apps/doctor/examine_live.hpp"
 #include "apps/doctor/examine_recording.hpp"
 #include "apps/doctor/examine_results.hpp"
 #include "apps/doctor/network_probe.hpp"
 #include "apps/output_file.hpp"
+#include "apps/program_options.hpp"
 #include "apps/stage_progress.hpp"
 #include "modules/sensors/node/rig_file.hpp"
 #include "runtime/log.hpp"
@@ -24,8 +24,8 @@ namespace fs = std::filesystem;
 constexpr int kUnusable = 2;
 
 constexpr const char* kAbout =
-    "Finds faults of a recording, of live sensors, of the network between robots, or of a run, "
-    "before hours are spent on them: each finding has its number, its meaning and a remedy.";
+    "Finds faults of a recording, of live sensors, of the network between robots, or of a run. "
+    "Each finding has its figure, its meaning and a remedy.";
 
 constexpr const char* kFooter = R"(
 PATH is a recording (folder of EuRoC/ASL, KITTI odometry, TUM RGB-D or 7-Scenes; a bag of ROS 1 or 2 or an MCAP file, with --rig), or the results of
@@ -56,51 +56,51 @@ struct Options {
   double seconds = 0.0;
 };
 
-void add_network(Command app, Options& options) {
+void add_network(CLI::App& app, Options& options) {
   RobotOptions& robot = options.robot;
   app.add_flag("--network", options.network, "Examine the network and the participants on it");
-  app.add_option("--domain", robot.domain, "DDS domain of the team").within(0, 230);
+  app.add_option("--domain", robot.domain, "DDS domain of the team")->check(CLI::Range(0, 230));
   app.add_option("--peers", robot.peers, "Addresses of the other hosts: also asked for echoes")
-      .delimiter(',');
+      ->delimiter(',');
   app.add_option("--interface", robot.interface_name, "Network interface, e.g. wlan0");
   app.add_option("--link", robot.link, "Link profile: wired, wifi, intermittent, or a file");
 }
 
-void check(const Options& options, Command app) {
+void check(const Options& options, const CLI::App& app) {
   const int asked =
       (options.path.empty() ? 0 : 1) + (options.live.empty() ? 0 : 1) + (options.network ? 1 : 0);
-  if (asked != 1) throw CommandLineError("name one of PATH, --live and --network");
+  if (asked != 1) throw CLI::ValidationError("name one of PATH, --live and --network");
   if (!options.network && app.count("--domain") > 0)
-    throw CommandLineError(
+    throw CLI::ValidationError(
         "--domain is that of the team: with --network; drivers are on --set ros.domain=N");
   const RobotOptions& robot = options.robot;
   if (robot.from_s && robot.to_s && *robot.from_s >= *robot.to_s)
-    throw CommandLineError("--from is not before --to");
+    throw CLI::ValidationError("--from is not before --to");
 }
 
-Options parse_options(int argc, char** argv) {
+Options options_of(int argc, char** argv) {
   Options options;
   RobotOptions& robot = options.robot;
-  CommandLine line("kimera_multi_doctor", kAbout);
-  const Command app = line.command();
+  CLI::App app(kAbout, "kimera_multi_doctor");
   app.footer(kFooter);
-  app.add_option("PATH", options.path, "Recording, or results").existing_path();
+  app.add_option("PATH", options.path, "Recording, or results")->check(CLI::ExistingPath);
   app.add_option("--live", options.live, "Rig file: look at the live topics that it names (ROS 2)")
-      .existing_file();
+      ->check(CLI::ExistingFile);
   add_network(app, options);
   app.add_option("--rig", robot.rig, "For a bag: which topics are the sensors, and calibration")
-      .existing_file();
+      ->check(CLI::ExistingFile);
   app.add_option("--from", robot.from_s, "Look from here on [s since the first image]");
   app.add_option("--to", robot.to_s, "Look up to here [s]; by default 120 s are looked at");
   app.add_option("--seconds", options.seconds,
                  "How long to look at sensors once 3 s have shown that all are there, by default "
                  "10; how long to listen to the network, by default 5")
-      .within(0.5, 3600.0);
-  app.add_option("--config", robot.configs, "Configuration files of the robots").existing_file();
+      ->check(CLI::Range(0.5, 3600.0));
+  app.add_option("--config", robot.configs, "Configuration files of the robots")
+      ->check(CLI::ExistingFile);
   app.add_option("--set", robot.settings, "One setting over all files: section.key=value");
   app.add_option("--json", options.json, "Also write figures and findings to this file");
-  app.callback([&options, app] { check(options, app); });
-  if (const auto exit_code = line.parse(argc, argv, kUnusable)) std::exit(*exit_code);
+  app.callback([&options, &app] { check(options, app); });
+  if (const auto exit_code = parse_options(app, argc, argv, kUnusable)) std::exit(*exit_code);
   return options;
 }
 
@@ -181,7 +181,7 @@ int diagnose(const Options& options) {
 }  // namespace km
 
 int main(int argc, char** argv) try {
-  const km::Options options = km::parse_options(argc, argv);
+  const km::Options options = km::options_of(argc, argv);
   km::log::set_level(km::log::Level::kError);  // because findings report faults
   cv::setNumThreads(1);
   return km::diagnose(options);

@@ -132,59 +132,58 @@ void run(const ClosuresCommand& command) {
 }
 
 constexpr const char* kClosuresDetails =
-    "Loop closures of a finished run against the truth, per stage: their number, the "
-    "share\n"
-    "of true ones (precision), and the share of the possible ones that was found (recall)\n\n"
-    "A candidate is true if both keyframes see the same place: --min-overlap of either's image, "
-    "at\n"
-    "the median depth that the keyframe sees, lies in the other's. A verified closure and an "
-    "inlier\n"
-    "are true if the pose measured is off by at most --max-translation and --max-rotation.\n"
-    "Recall counts pairs of keyframes of two robots that see the same place, and, as a system "
-    "needs\n"
-    "only one match per keyframe, keyframes that are part of such a pair.\n\n"
-    "One --truth is that of robots on parts of one recording; else each robot needs its own, in "
-    "the\norder of --results.\n\n"
-    "Examples:\n"
-    "  kimera_multi_evaluate closures --dataset MH_01_easy --truth groundtruth_tum.txt \\\n"
-    "      --results results/two/a results/two/b\n"
-    "  kimera_multi_evaluate closures --dataset room/robot0 \\\n"
-    "      --truth room/robot{0,1}/mav0/state_groundtruth_estimate0/data.csv \\\n"
-    "      --results results/robot{0,1}";
+    R"(Loop closures of a finished run against the truth, per stage: their number, the share
+of true ones (precision), and the share of the possible ones that was found (recall)
 
-void define(Command app, ClosuresCommand& command) {
+A candidate is true if both keyframes see the same place: --min-overlap of either's image, at
+the median depth that the keyframe sees, lies in the other's. A verified closure and an inlier
+are true if the pose measured is off by at most --max-translation and --max-rotation.
+Recall counts pairs of keyframes of two robots that see the same place, and, as a system needs
+only one match per keyframe, keyframes that are part of such a pair.
+
+One --truth is that of robots on parts of one recording; else each robot needs its own, in the
+order of --results.
+
+Examples:
+  kimera_multi_evaluate closures --dataset MH_01_easy --truth groundtruth_tum.txt \
+      --results results/two/a results/two/b
+  kimera_multi_evaluate closures --dataset room/robot0 \
+      --truth room/robot{0,1}/mav0/state_groundtruth_estimate0/data.csv \
+      --results results/robot{0,1})";
+
+void define(CLI::App& app, ClosuresCommand& command) {
   app.add_option("--truth", command.truths,
                  "True poses in one common world: one file for each of --results, or one for "
                  "all, where they are parts of one recording")
-      .required();
+      ->required();
   app.add_option(
          "--results", command.results,
          "Results folders of all robots of the run, or records (MCAP) of robots or of the team")
-      .required();
+      ->required();
   app.add_option("--dataset", command.dataset, "EuRoC/ASL folder: its left camera is the robots'")
-      .required();
+      ->required();
   ClosureTruthOptions& options = command.options;
   app.add_option("--max-translation", options.max_translation_m,
                  "Error of a true pose, at most [m]")
-      .positive()
-      .show_default();
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
   app.add_option("--max-rotation", options.max_rotation_deg, "Error of a true pose, at most [deg]")
-      .positive()
-      .show_default();
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
   app.add_option("--min-overlap", options.min_overlap, "Share of the image that is seen by both")
-      .within(0.01, 1.0)
-      .show_default();
+      ->check(CLI::Range(0.01, 1.0))
+      ->capture_default_str();
   app.add_option("--default-depth", options.default_depth_m,
                  "Depth of the scene where a keyframe does not know it [m]")
-      .positive()
-      .show_default();
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
   app.add_option("--json", command.json, "Also write the numbers to this file, as JSON");
 }
 
 }  // namespace
 
-void add_closures(Command parent) {
-  const Command app = parent.add_subcommand("closures", kClosuresDetails);
+void add_closures(CLI::App& parent) {
+  CLI::App& app = *parent.add_subcommand("closures", kClosuresDetails);
   const auto command = std::make_shared<ClosuresCommand>();
   define(app, *command);
   app.callback([command] { run(*command); });

@@ -102,29 +102,30 @@ void run(const ColmapCommand& command) {
 }
 
 constexpr const char* kColmapDetails =
-    "Keyframes of robots as a COLMAP model, for trainers of Gaussian splats and radiance fields\n\n"
-    "Writes images/NAME/STAMP.png (left images of the keyframes) and, in sparse/0, cameras.txt,\n"
-    "images.txt (optimised poses from world to camera) and points3D.txt (vertices of --mesh).\n"
-    "The recordings are EuRoC/ASL folders. Their calibration is used, without corrections of a "
-    "run.\n\n"
-    "Example:\n"
-    "  kimera_multi_evaluate colmap --results results/robot0 results/robot1 \\\n"
-    "      --dataset city/robot0 city/robot1 --mesh results/robot*/mesh_optimized.ply \\\n"
-    "      --output city_colmap";
+    R"(Keyframes of robots as a COLMAP model, for trainers of Gaussian splats and radiance fields
+
+Writes images/NAME/STAMP.png (left images of the keyframes) and, in sparse/0, cameras.txt,
+images.txt (optimised poses from world to camera) and points3D.txt (vertices of --mesh).
+The recordings are EuRoC/ASL folders. Their calibration is used, without corrections of a run.
+
+Example:
+  kimera_multi_evaluate colmap --results results/robot0 results/robot1 \
+      --dataset city/robot0 city/robot1 --mesh results/robot*/mesh_optimized.ply \
+      --output city_colmap)";
 
 }  // namespace
 
-void add_colmap(Command parent) {
-  const Command app = parent.add_subcommand("colmap", kColmapDetails);
+void add_colmap(CLI::App& parent) {
+  CLI::App& app = *parent.add_subcommand("colmap", kColmapDetails);
   const auto command = std::make_shared<ColmapCommand>();
-  app.add_option("--results", command->results, "Results folder of each robot").required();
+  app.add_option("--results", command->results, "Results folder of each robot")->required();
   app.add_option("--dataset", command->datasets, "Recording of each robot (EuRoC/ASL folder)")
-      .required();
+      ->required();
   app.add_option("--mesh", command->meshes, "Meshes (PLY) in the frame of the poses");
   app.add_option("--max-points", command->max_points,
                  "Largest number of points; beyond it evenly chosen vertices are written")
-      .show_default();
-  app.add_option("--output", command->output, "Folder to write").required();
+      ->capture_default_str();
+  app.add_option("--output", command->output, "Folder to write")->required();
   app.callback([command] { run(*command); });
 }
 

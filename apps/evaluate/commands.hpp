@@ -1,21 +1,21 @@
 #pragma once
 
-#include "apps/command_line.hpp"
+#include "apps/program_options.hpp"
 
 namespace km {
 
 /// Each adds a subcommand of kimera_multi_evaluate to `app`, which runs as soon as the command line
 /// names it. A subcommand prints tables and writes the requested files. Unusable input throws an
 /// exception with a message of one line.
-void add_trajectory(Command app);
-void add_closures(Command app);
-void add_consistency(Command app);
-void add_images(Command app);
-void add_mesh(Command app);
-void add_copies(Command app);
-void add_render(Command app);
-void add_objects(Command app);
-void add_colmap(Command app);
-void add_glb(Command app);
+void add_trajectory(CLI::App& app);
+void add_closures(CLI::App& app);
+void add_consistency(CLI::App& app);
+void add_images(CLI::App& app);
+void add_mesh(CLI::App& app);
+void add_copies(CLI::App& app);
+void add_render(CLI::App& app);
+void add_objects(CLI::App& app);
+void add_colmap(CLI::App& app);
+void add_glb(CLI::App& app);
 
 }  // namespace km

@@ -100,31 +100,31 @@ void run(const ConsistencyCommand& command) {
 }
 
 constexpr const char* kDetails =
-    "Whether covariances are as large as the errors against the truth\n\n"
-    "--results are the folders of the robots of one team. Three kinds of covariances are "
-    "compared:\n"
-    "  poses              of optimized_keyframes.tum, relative to the first keyframe of the team,\n"
-    "                     at which the frame of the team is placed in the truth\n"
-    "  steps of odometry  from keyframe to keyframe, in pose_graph.g2o\n"
-    "  closures           that the team has kept, in pose_graph.g2o\n"
-    "Printed is the normalised estimation error squared (NEES) divided by its degrees of freedom.\n"
-    "It is 1 if covariances are right, 4 if standard deviations are half as large as the errors.\n"
-    "Poses of one run are correlated, so the mean of one run differs from 1 by chance. The median "
-    "is\n"
-    "relative to that of its distribution.\n\n"
-    "Example:\n"
-    "  kimera_multi_evaluate consistency --upright --truth robot0/truth.csv --truth "
-    "robot1/truth.csv \\\n"
-    "      --results results/robot0 results/robot1";
+    R"(Whether covariances are as large as the errors against the truth
+
+--results are the folders of the robots of one team. Three kinds of covariances are compared:
+  poses              of optimized_keyframes.tum, relative to the first keyframe of the team,
+                     at which the frame of the team is placed in the truth
+  steps of odometry  from keyframe to keyframe, in pose_graph.g2o
+  closures           that the team has kept, in pose_graph.g2o
+Printed is the normalised estimation error squared (NEES) divided by its degrees of freedom.
+It is 1 if covariances are right, 4 if standard deviations are half as large as the errors.
+Poses of one run are correlated, so the mean of one run differs from 1 by chance. The median is
+relative to that of its distribution.
+
+Example:
+  kimera_multi_evaluate consistency --upright --truth robot0/truth.csv --truth robot1/truth.csv \
+      --results results/robot0 results/robot1)";
 
 }  // namespace
 
-void add_consistency(Command parent) {
-  const Command app = parent.add_subcommand("consistency", kDetails);
+void add_consistency(CLI::App& parent) {
+  CLI::App& app = *parent.add_subcommand("consistency", kDetails);
   const auto command = std::make_shared<ConsistencyCommand>();
   app.add_option("--truth", command->truths, "True poses: one file for all robots or one for each")
-      .required();
-  app.add_option("--results", command->results, "Folders of the results, one per robot").required();
+      ->required();
+  app.add_option("--results", command->results, "Folders of the results, one per robot")
+      ->required();
   app.add_flag("--upright", command->upright,
                "Both frames have z up: runs with inertial sensing, and a truth with z up");
   app.add_option("--json", command->json, "Also write the numbers to this file");

@@ -39,27 +39,26 @@ void run(const CopiesCommand& command) {
 }
 
 constexpr const char* kCopiesDetails =
-    "Distances between the copies of a surface that two robots have mapped (double walls)\n\n"
-    "The meshes lie in one frame. Each is sampled evenly. A sample has a copy if the other mesh "
-    "has a\n"
-    "face within --reach whose normal is within 60 degrees, and does not end there. The distance "
-    "is\n"
-    "along the normal of that face. \"median aligned\" is the median after one rigid motion by "
-    "ICP:\n"
-    "the part that is not an error of the robots' relative pose.\n\n"
-    "Example:\n"
-    "  kimera_multi_evaluate copies --mesh results/robot*/mesh_optimized.ply";
+    R"(Distances between the copies of a surface that two robots have mapped (double walls)
+
+The meshes lie in one frame. Each is sampled evenly. A sample has a copy if the other mesh has a
+face within --reach whose normal is within 60 degrees, and does not end there. The distance is
+along the normal of that face. "median aligned" is the median after one rigid motion by ICP:
+the part that is not an error of the robots' relative pose.
+
+Example:
+  kimera_multi_evaluate copies --mesh results/robot*/mesh_optimized.ply)";
 
 }  // namespace
 
-void add_copies(Command parent) {
-  const Command app = parent.add_subcommand("copies", kCopiesDetails);
+void add_copies(CLI::App& parent) {
+  CLI::App& app = *parent.add_subcommand("copies", kCopiesDetails);
   const auto command = std::make_shared<CopiesCommand>();
   app.add_option("--mesh", command->meshes, "Meshes (PLY) in one frame, one file per robot")
-      .required();
+      ->required();
   app.add_option("--reach", command->options.reach_m, "Largest distance of two copies [m]")
-      .positive()
-      .show_default();
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
   app.callback([command] { run(*command); });
 }
 

@@ -29,22 +29,23 @@ void run(const GlbCommand& command) {
 }
 
 constexpr const char* kGlbDetails =
-    "Meshes as one binary glTF file (.glb), for viewers, game engines and browsers\n\n"
-    "Each class is a material with its name and its colour. Meshes must be in one frame, like "
-    "those\n"
-    "of a team.\n\n"
-    "Example:\n"
-    "  kimera_multi_evaluate glb --mesh results/robot*/mesh_optimized.ply --output city.glb";
+    R"(Meshes as one binary glTF file (.glb), for viewers, game engines and browsers
+
+Each class is a material with its name and its colour. Meshes must be in one frame, like those
+of a team.
+
+Example:
+  kimera_multi_evaluate glb --mesh results/robot*/mesh_optimized.ply --output city.glb)";
 
 }  // namespace
 
-void add_glb(Command parent) {
-  const Command app = parent.add_subcommand("glb", kGlbDetails);
+void add_glb(CLI::App& parent) {
+  CLI::App& app = *parent.add_subcommand("glb", kGlbDetails);
   const auto command = std::make_shared<GlbCommand>();
-  app.add_option("--mesh", command->meshes, "Meshes (PLY) in one frame").required();
+  app.add_option("--mesh", command->meshes, "Meshes (PLY) in one frame")->required();
   app.add_option("--palette", command->palette,
                  "Names of the labels (CSV); default: label_palette.csv beside the first mesh");
-  app.add_option("--output", command->output, "File to write").required();
+  app.add_option("--output", command->output, "File to write")->required();
   app.callback([command] { run(*command); });
 }
 

@@ -93,20 +93,22 @@ void run(const ImagesCommand& command) {
 }
 
 constexpr const char* kImagesDetails =
-    "Statistics of the images of a recording: corners, how long they can be tracked, how well "
-    "they\nare found in the other camera, gradients, grey levels, exposure, blur and noise\n\n"
-    "Tracking depends on motion most of all: compare two recordings by the rows \"flow A-B px\",\n"
-    "frames of like median flow. Rows that differ by more than 25 % are marked. Noise over time\n"
-    "needs the camera to stand still for a second; --still-from and --still-to state when.\n\n"
-    "Examples:\n"
-    "  kimera_multi_evaluate images --dataset MH_01_easy --to 15 --still-from 21 --still-to 25.5\n"
-    "  kimera_multi_evaluate images --dataset V1_01_easy --compare simulated --compare-from 5";
+    R"(Statistics of the images of a recording: corners, how long they can be tracked, how well they
+are found in the other camera, gradients, grey levels, exposure, blur and noise
 
-void define(Command app, ImagesCommand& command) {
-  app.add_option("--dataset", command.dataset, "EuRoC/ASL folder with stereo images").required();
+Tracking depends on motion most of all: compare two recordings by the rows "flow A-B px",
+frames of like median flow. Rows that differ by more than 25 % are marked. Noise over time
+needs the camera to stand still for a second; --still-from and --still-to state when.
+
+Examples:
+  kimera_multi_evaluate images --dataset MH_01_easy --to 15 --still-from 21 --still-to 25.5
+  kimera_multi_evaluate images --dataset V1_01_easy --compare simulated --compare-from 5)";
+
+void define(CLI::App& app, ImagesCommand& command) {
+  app.add_option("--dataset", command.dataset, "EuRoC/ASL folder with stereo images")->required();
   app.add_option("--compare", command.compare, "Another one: its figures beside, and the ratios");
   app.add_option("--from", command.part.from_s, "Look from here on [s since the first stereo pair]")
-      .show_default();
+      ->capture_default_str();
   app.add_option("--to", command.part.to_s, "Look up to here [s]; default: the end");
   app.add_option("--compare-from", command.compare_from_s,
                  "Look at the other from here on [s]; default: the window of --from and --to");
@@ -117,15 +119,15 @@ void define(Command app, ImagesCommand& command) {
   app.add_option("--still-to", command.still_to_s, "Also look for standing still up to here [s]");
   app.add_option("--stride", command.options.stride,
                  "Interval of the pairs at which ORB and stereo are matched and KLT tracks start")
-      .positive()
-      .show_default();
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
   app.add_option("--json", command.json, "Also write the figures to this file, as JSON");
 }
 
 }  // namespace
 
-void add_images(Command parent) {
-  const Command app = parent.add_subcommand("images", kImagesDetails);
+void add_images(CLI::App& parent) {
+  CLI::App& app = *parent.add_subcommand("images", kImagesDetails);
   const auto command = std::make_shared<ImagesCommand>();
   define(app, *command);
   app.callback([command] { run(*command); });

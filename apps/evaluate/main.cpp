@@ -1,11 +1,11 @@
-#include "apps/command_line.hpp"
 #include "apps/evaluate/commands.hpp"
+#include "apps/program_options.hpp"
 
 namespace {
 
 constexpr const char* kAbout =
-    "Compares what robots estimated with what is true.\n"
-    "Exit code: 0 if the comparison was made, 1 for input that cannot be used.";
+    R"(Compares what robots estimated with what is true.
+Exit code: 0 if the comparison was made, 1 for input that cannot be used.)";
 
 }  // namespace
 

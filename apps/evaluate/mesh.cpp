@@ -105,45 +105,43 @@ void run(const MeshCommand& command) {
 }
 
 constexpr const char* kMeshDetails =
-    "Errors of estimated meshes against the true one, of each robot and of all together\n\n"
-    "Both are sampled evenly, the estimates are moved by ONE rigid transform (ICP) onto the "
-    "truth,\n"
-    "and distances go from each sample to the nearest one on the other side. Three tables:\n"
-    "  each true point         \"mean\" is the mesh error of the Kimera-Multi paper. A true world "
-    "is\n"
-    "                          larger than its visible part: only points within --crop of the\n"
-    "                          estimate are judged; \"covered\" is their share\n"
-    "  only those in front     without those past the rim of the estimate or behind it, which no\n"
-    "                          robot can have seen: ground below cars, backs of walls\n"
-    "  each estimated point    distances above --crop count as --crop; \"covered\" is the "
-    "rest\n"
-    "Samples of equal surfaces are still 0.5 / sqrt(density) apart, 16 mm at 1000 per square "
-    "metre;\n"
-    "\"surface\" is the mean without that floor, to the triangles nearby. Labels are judged where\n"
-    "the other side is nearer than --max-distance; unknown counts as not right.\n\n"
-    "A robot's mesh lies in the frame of its trajectory. If that frame is not that of the truth, "
-    "--trajectory\n"
-    "and --trajectory-truth place it before ICP.\n\n"
-    "With --before, both states of the meshes are judged on the true points that either of them\n"
-    "shows, after one registration of both together: surface that a correction loses counts as "
-    "far\n"
-    "as --crop.\n\n"
-    "Examples:\n"
-    "  kimera_multi_evaluate mesh --truth city/world.ply --estimate mesh.ply --json mesh.json\n"
-    "  kimera_multi_evaluate mesh --truth city/world.ply \\\n"
-    "      --before results/robot*/mesh.ply --estimate results/robot*/mesh_optimized.ply\n"
-    "  kimera_multi_evaluate mesh --truth city/world.ply \\\n"
-    "      --estimate results/robot0/mesh_optimized.ply results/robot1/mesh_optimized.ply \\\n"
-    "      --trajectory results/robot0/optimized.tum results/robot1/optimized.tum \\\n"
-    "      --trajectory-truth city/robot0/mav0/state_groundtruth_estimate0/data.csv \\\n"
-    "                         city/robot1/mav0/state_groundtruth_estimate0/data.csv";
+    R"(Errors of estimated meshes against the true one, of each robot and of all together
 
-void define(Command app, MeshCommand& command) {
+Both are sampled evenly, the estimates are moved by ONE rigid transform (ICP) onto the truth,
+and distances go from each sample to the nearest one on the other side. Three tables:
+  each true point         "mean" is the mesh error of the Kimera-Multi paper. A true world is
+                          larger than its visible part: only points within --crop of the
+                          estimate are judged; "covered" is their share
+  only those in front     without those past the rim of the estimate or behind it, which no
+                          robot can have seen: ground below cars, backs of walls
+  each estimated point    distances above --crop count as --crop; "covered" is the rest
+Samples of equal surfaces are still 0.5 / sqrt(density) apart, 16 mm at 1000 per square metre;
+"surface" is the mean without that floor, to the triangles nearby. Labels are judged where
+the other side is nearer than --max-distance; unknown counts as not right.
+
+A robot's mesh lies in the frame of its trajectory. If that frame is not that of the truth, --trajectory
+and --trajectory-truth place it before ICP.
+
+With --before, both states of the meshes are judged on the true points that either of them
+shows, after one registration of both together: surface that a correction loses counts as far
+as --crop.
+
+Examples:
+  kimera_multi_evaluate mesh --truth city/world.ply --estimate mesh.ply --json mesh.json
+  kimera_multi_evaluate mesh --truth city/world.ply \
+      --before results/robot*/mesh.ply --estimate results/robot*/mesh_optimized.ply
+  kimera_multi_evaluate mesh --truth city/world.ply \
+      --estimate results/robot0/mesh_optimized.ply results/robot1/mesh_optimized.ply \
+      --trajectory results/robot0/optimized.tum results/robot1/optimized.tum \
+      --trajectory-truth city/robot0/mav0/state_groundtruth_estimate0/data.csv \
+                         city/robot1/mav0/state_groundtruth_estimate0/data.csv)";
+
+void define(CLI::App& app, MeshCommand& command) {
   MeshErrorOptions& options = command.options;
-  app.add_option("--truth", command.truth, "The true mesh (PLY)").required();
+  app.add_option("--truth", command.truth, "The true mesh (PLY)")->required();
   app.add_option("--estimate", command.estimates,
                  "Estimated meshes (PLY) in one common frame, one file per robot")
-      .required();
+      ->required();
   app.add_option("--before", command.before,
                  "The meshes before a correction (PLY), in the order of --estimate");
   app.add_option("--trajectory", command.trajectories,
@@ -151,23 +149,23 @@ void define(Command app, MeshCommand& command) {
   app.add_option("--trajectory-truth", command.true_trajectories,
                  "Their true poses: one file for all or one for each");
   app.add_option("--samples-per-m2", options.samples_per_m2, "Samples per square metre")
-      .positive()
-      .show_default();
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
   app.add_option("--max-samples", options.max_samples,
                  "Largest number for the estimate, and for the truth: beyond it the density is "
                  "reduced, with a note")
-      .positive()
-      .show_default();
-  app.add_option("--seed", options.seed, "Seed of the samples").show_default();
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_option("--seed", options.seed, "Seed of the samples")->capture_default_str();
   app.add_flag("!--no-icp", options.icp, "Compare the meshes where they are");
   app.add_option("--crop", options.crop_m,
                  "True points further from the estimate are not judged [m]; errors count up to it")
-      .positive()
-      .show_default();
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
   app.add_option("--max-distance", options.label_distance_m,
                  "Labels are judged up to this distance [m]")
-      .positive()
-      .show_default();
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
   app.add_option("--palette", command.palette,
                  "Names of the labels (CSV); default: label_palette.csv beside the truth");
   app.add_option("--json", command.json, "Also write the numbers to this file, as JSON");
@@ -175,8 +173,8 @@ void define(Command app, MeshCommand& command) {
 
 }  // namespace
 
-void add_mesh(Command parent) {
-  const Command app = parent.add_subcommand("mesh", kMeshDetails);
+void add_mesh(CLI::App& parent) {
+  CLI::App& app = *parent.add_subcommand("mesh", kMeshDetails);
   const auto command = std::make_shared<MeshCommand>();
   define(app, *command);
   app.callback([command] { run(*command); });

@@ -55,38 +55,37 @@ void run(const ObjectsCommand& command) {
 }
 
 constexpr const char* kObjectsDetails =
-    "Objects of a map against the true ones: precision, recall and overlap of the boxes\n\n"
-    "An object is right if a true one of its class overlaps with it: the volume that both boxes\n"
-    "share, divided by that of their union (IoU), is at least --min-overlap. \"IoU\" is the mean "
-    "of\n"
-    "the matches. A robot sees most objects from one side only, so boxes are too small. With "
-    "--mesh\n"
-    "only true objects count in \"true\" and \"found\" of whose surface, above the ground, at "
-    "least\n"
-    "--mapped is in the meshes, whatever its label; without it all do.\n\n"
-    "The simulator writes the true objects to objects.json. Objects of a robot lie in the frame "
-    "of\n"
-    "its optimised poses; --trajectory and --trajectory-truth place them in the true world.\n\n"
-    "Example:\n"
-    "  kimera_multi_evaluate objects --truth city/objects.json \\\n"
-    "      --estimate results/robot0/objects.json --mesh results/robot*/mesh_optimized.ply \\\n"
-    "      --trajectory results/robot0/optimized.tum results/robot1/optimized.tum \\\n"
-    "      --trajectory-truth city/robot0/mav0/state_groundtruth_estimate0/data.csv \\\n"
-    "                         city/robot1/mav0/state_groundtruth_estimate0/data.csv";
+    R"(Objects of a map against the true ones: precision, recall and overlap of the boxes
 
-void define(Command app, ObjectsCommand& command) {
-  app.add_option("--truth", command.truth, "The true objects (objects.json)").required();
+An object is right if a true one of its class overlaps with it: the volume that both boxes
+share, divided by that of their union (IoU), is at least --min-overlap. "IoU" is the mean of
+the matches. A robot sees most objects from one side only, so boxes are too small. With --mesh
+only true objects count in "true" and "found" of whose surface, above the ground, at least
+--mapped is in the meshes, whatever its label; without it all do.
+
+The simulator writes the true objects to objects.json. Objects of a robot lie in the frame of
+its optimised poses; --trajectory and --trajectory-truth place them in the true world.
+
+Example:
+  kimera_multi_evaluate objects --truth city/objects.json \
+      --estimate results/robot0/objects.json --mesh results/robot*/mesh_optimized.ply \
+      --trajectory results/robot0/optimized.tum results/robot1/optimized.tum \
+      --trajectory-truth city/robot0/mav0/state_groundtruth_estimate0/data.csv \
+                         city/robot1/mav0/state_groundtruth_estimate0/data.csv)";
+
+void define(CLI::App& app, ObjectsCommand& command) {
+  app.add_option("--truth", command.truth, "The true objects (objects.json)")->required();
   app.add_option("--estimate", command.estimate, "The objects of a robot (objects.json)")
-      .required();
+      ->required();
   app.add_option("--mesh", command.meshes, "Meshes of all robots in the frame of the objects");
   app.add_option("--mapped", command.mapped_m2,
                  "Mapped surface from which a true object counts [m^2]")
-      .not_negative()
-      .show_default();
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
   app.add_option("--min-overlap", command.min_overlap,
                  "Smallest intersection over union of a match")
-      .within(0.0, 1.0)
-      .show_default();
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
   app.add_option("--trajectory", command.trajectories,
                  "Estimated poses of the robots in the frame of the objects, TUM or EuRoC CSV");
   app.add_option("--trajectory-truth", command.true_trajectories,
@@ -96,8 +95,8 @@ void define(Command app, ObjectsCommand& command) {
 
 }  // namespace
 
-void add_objects(Command parent) {
-  const Command app = parent.add_subcommand("objects", kObjectsDetails);
+void add_objects(CLI::App& parent) {
+  CLI::App& app = *parent.add_subcommand("objects", kObjectsDetails);
   const auto command = std::make_shared<ObjectsCommand>();
   define(app, *command);
   app.callback([command] { run(*command); });

@@ -133,31 +133,30 @@ void run(const RenderCommand& command) {
 }
 
 constexpr const char* kRenderDetails =
-    "Shaded picture of meshes, without a display: colours of labels with a legend, a scale bar,\n"
-    "and trajectories on top\n\n"
-    "Faces are seen from the side they were mapped from: from above one looks into rooms. Views:\n"
-    "  top, front, oblique     parallel, fill the picture\n"
-    "  x,y,z,yaw,pitch         perspective from there [m, deg]: yaw 90 looks along y, pitch -30 "
-    "down\n"
-    "  x,y,z,qx,qy,qz,qw       pose of the camera (its z forward, y down)\n"
-    "Write --view=-1,... for one that begins with a minus sign.\n\n"
-    "A team's frame is the odometry frame of the robot with the lowest id, so upright. "
-    "--reference\n"
-    "turns the map to lie in another frame.\n\n"
-    "Examples:\n"
-    "  kimera_multi_evaluate render --mesh mesh.ply --trajectory optimized.tum \\\n"
-    "      --reference odometry.tum --output map.png\n"
-    "  kimera_multi_evaluate render --mesh a.ply b.ply --color robot --view oblique --output "
-    "team.png\n"
-    "  kimera_multi_evaluate render --mesh room/world.ply --view=-2,1,1.7,20,-10 --output "
-    "inside.png";
+    R"(Shaded picture of meshes, without a display: colours of labels with a legend, a scale bar,
+and trajectories on top
 
-void define(Command app, RenderCommand& command) {
-  app.add_option("--mesh", command.meshes, "Meshes (PLY) in one frame").required();
+Faces are seen from the side they were mapped from: from above one looks into rooms. Views:
+  top, front, oblique     parallel, fill the picture
+  x,y,z,yaw,pitch         perspective from there [m, deg]: yaw 90 looks along y, pitch -30 down
+  x,y,z,qx,qy,qz,qw       pose of the camera (its z forward, y down)
+Write --view=-1,... for one that begins with a minus sign.
+
+A team's frame is the odometry frame of the robot with the lowest id, so upright. --reference
+turns the map to lie in another frame.
+
+Examples:
+  kimera_multi_evaluate render --mesh mesh.ply --trajectory optimized.tum \
+      --reference odometry.tum --output map.png
+  kimera_multi_evaluate render --mesh a.ply b.ply --color robot --view oblique --output team.png
+  kimera_multi_evaluate render --mesh room/world.ply --view=-2,1,1.7,20,-10 --output inside.png)";
+
+void define(CLI::App& app, RenderCommand& command) {
+  app.add_option("--mesh", command.meshes, "Meshes (PLY) in one frame")->required();
   app.add_option("--output", command.output, "PNG; the file of the second view is NAME_2.png")
-      .required();
+      ->required();
   app.add_option("--view", command.views, "Viewpoint, see above; several give a picture each")
-      .show_default();
+      ->capture_default_str();
   app.add_option("--trajectory", command.trajectories,
                  "Poses drawn on top (TUM, EuRoC CSV, or a record: see trajectory)");
   app.add_option("--reference", command.references,
@@ -166,9 +165,10 @@ void define(Command app, RenderCommand& command) {
   app.add_option("--color", command.color,
                  "Colours by label, of the vertices, none, or one per mesh; auto: by label if "
                  "there are labels")
-      .one_of({"auto", "label", "own", "shade", "robot"})
-      .show_default();
-  app.add_option("--size", command.size, "WIDTHxHEIGHT without the legend [px]").show_default();
+      ->check(CLI::IsMember({"auto", "label", "own", "shade", "robot"}))
+      ->capture_default_str();
+  app.add_option("--size", command.size, "WIDTHxHEIGHT without the legend [px]")
+      ->capture_default_str();
   app.add_option("--cut", command.above_m, "Leave out all above this height [m]");
   app.add_flag("--both-sides", command.both_sides, "Also draw faces that are seen from behind");
   app.add_option(
@@ -178,8 +178,8 @@ void define(Command app, RenderCommand& command) {
 
 }  // namespace
 
-void add_render(Command parent) {
-  const Command app = parent.add_subcommand("render", kRenderDetails);
+void add_render(CLI::App& parent) {
+  CLI::App& app = *parent.add_subcommand("render", kRenderDetails);
   const auto command = std::make_shared<RenderCommand>();
   define(app, *command);
   app.callback([command] { run(*command); });

@@ -67,51 +67,51 @@ void run(TrajectoryCommand command) {
 }
 
 constexpr const char* kTrajectoryDetails =
-    "Errors of estimated trajectories against the truth\n\n"
-    "All estimates are moved by ONE rigid transform (Umeyama) to fit the truth, so several robots\n"
-    "are judged in their common frame. Files are TUM text (t[s] p q x y z w) or EuRoC CSV\n"
-    "(t[ns], p, q w x y z); or MCAP records of robots and teams: FILE.mcap stands for the last\n"
-    "/NAME/path of every robot in it, the optimised poses, and FILE.mcap:/NAME/odometry for one "
-    "topic\n"
-    "(nav_msgs/Path, nav_msgs/Odometry, geometry_msgs/PoseStamped or PoseWithCovarianceStamped).\n"
-    "The denser of truth and estimate is interpolated at the stamps of the other. Printed per "
-    "estimate and for the team:\n"
-    "  position error  distance to the truth at each pair [m]: the absolute trajectory error\n"
-    "  rotation        angle to the truth after the same alignment [deg]\n"
-    "  relative        error of the motion over --delta seconds [m, deg]\n"
-    "  covered         share of the truth's time (or of --from to --to) that has poses\n\n"
-    "Examples:\n"
-    "  kimera_multi_evaluate trajectory --truth groundtruth_tum.txt --estimate odometry.tum\n"
-    "  kimera_multi_evaluate trajectory --truth data.csv \\\n"
-    "      --estimate robot0/optimized.tum robot1/optimized.tum --json team.json --plot team.html\n"
-    "  kimera_multi_evaluate trajectory --truth a.csv --truth b.csv --estimate a.tum b.tum\n"
-    "  kimera_multi_evaluate trajectory --truth data.csv --estimate team.mcap";
+    R"(Errors of estimated trajectories against the truth
 
-void define(Command app, TrajectoryCommand& command) {
+All estimates are moved by ONE rigid transform (Umeyama) to fit the truth, so several robots
+are judged in their common frame. Files are TUM text (t[s] p q x y z w) or EuRoC CSV
+(t[ns], p, q w x y z); or MCAP records of robots and teams: FILE.mcap stands for the last
+/NAME/path of every robot in it, the optimised poses, and FILE.mcap:/NAME/odometry for one topic
+(nav_msgs/Path, nav_msgs/Odometry, geometry_msgs/PoseStamped or PoseWithCovarianceStamped).
+The denser of truth and estimate is interpolated at the stamps of the other. Printed per estimate and for the team:
+  position error  distance to the truth at each pair [m]: the absolute trajectory error
+  rotation        angle to the truth after the same alignment [deg]
+  relative        error of the motion over --delta seconds [m, deg]
+  covered         share of the truth's time (or of --from to --to) that has poses
+
+Examples:
+  kimera_multi_evaluate trajectory --truth groundtruth_tum.txt --estimate odometry.tum
+  kimera_multi_evaluate trajectory --truth data.csv \
+      --estimate robot0/optimized.tum robot1/optimized.tum --json team.json --plot team.html
+  kimera_multi_evaluate trajectory --truth a.csv --truth b.csv --estimate a.tum b.tum
+  kimera_multi_evaluate trajectory --truth data.csv --estimate team.mcap)";
+
+void define(CLI::App& app, TrajectoryCommand& command) {
   app.add_option("--truth", command.truths,
                  "True poses: one file for all estimates or one for each")
-      .required();
+      ->required();
   app.add_option("--estimate", command.estimates,
                  "Estimated poses, one file per robot, or a record")
-      .required();
+      ->required();
   app.add_flag("--sim3", command.options.with_scale, "Align by a similarity: the scale is free");
   app.add_option("--from", command.from_s,
                  "Judge from here on [s since the truth's first pose; above 1e6: a stamp]");
   app.add_option("--to", command.to_s, "Judge up to here, as --from");
   app.add_option("--delta", command.options.rpe_delta_s, "Time of the relative error [s]")
-      .positive()
-      .show_default();
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
   app.add_option("--coverage-gap", command.options.max_coverage_gap_s,
                  "Poses further apart leave the time between uncovered [s]")
-      .not_negative()
-      .show_default();
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
   command.files.define(app, "the numbers", "truth and estimates from above");
 }
 
 }  // namespace
 
-void add_trajectory(Command parent) {
-  const Command app = parent.add_subcommand("trajectory", kTrajectoryDetails);
+void add_trajectory(CLI::App& parent) {
+  CLI::App& app = *parent.add_subcommand("trajectory", kTrajectoryDetails);
   const auto command = std::make_shared<TrajectoryCommand>();
   define(app, *command);
   app.callback([command] { run(*command); });

@@ -59,11 +59,11 @@ void print_issued(const KeysCommand& command, const std::vector<RobotName>& robo
   for (const RobotName& robot : robots)
     std::cout << (command.team / robot.name).string() << "  for robot " << robot.id << ", valid "
               << command.days << " days\n";
-  std::cout
-      << "Copy each folder onto its robot, keeping modes (scp -rp), and start the robot with\n"
-         "  --robot ID --name NAME --security FOLDER\n"
-         "then delete it here. "
-      << (command.team / "authority").string() << " stays here: whoever has it can admit anyone.\n";
+  std::cout << R"(Copy each folder onto its robot, keeping modes (scp -rp), and start the robot with
+  --robot ID --name NAME --security FOLDER
+then delete it here. )"
+            << (command.team / "authority").string()
+            << " stays here: whoever has it can admit anyone.\n";
 }
 
 void make(const KeysCommand& command) {
@@ -90,18 +90,19 @@ void revoke(const KeysCommand& command) {
             << "\ninto the folder of keys on every robot that stays.\n";
 }
 
-void define_robots(Command app, KeysCommand& command) {
-  app.add_option("TEAM", command.team, "Folder of the team").required();
+void define_robots(CLI::App& app, KeysCommand& command) {
+  app.add_option("TEAM", command.team, "Folder of the team")->required();
   app.add_option("--robots", command.robots,
-                 "name:id of each robot, separated by commas; or how many, which are named robot0, "
-                 "robot1, ... Names and ids are what the robots are started with (--name, --robot)")
-      .required()
-      .delimiter(',');
-  app.add_option("--days", command.days,
-                 "How long the certificates hold. They hold from the day before, for clocks that "
-                 "are behind; robots without a clock must get the time before they start")
-      .within(1, 36500)
-      .show_default();
+                 "name:id of each robot, separated by commas, as in --name and --robot of the "
+                 "robots; or the number of robots, which are named robot0, robot1, ...")
+      ->required()
+      ->delimiter(',');
+  app.add_option(
+         "--days", command.days,
+         "Validity of the certificates. They are valid from the day before, for clocks that "
+         "are late; a robot without a clock needs the time before it starts")
+      ->check(CLI::Range(1, 36500))
+      ->capture_default_str();
 }
 
 }  // namespace
@@ -112,37 +113,37 @@ std::int64_t now_s() {
       .count();
 }
 
-void add_make(Command parent) {
-  const Command app =
-      parent.add_subcommand("make",
-                            "Make a team: its authority, and a folder of keys for each robot.\n"
-                            "  kimera_multi_keys make survey --robots alpha:0,beta:1\n"
-                            "  kimera_multi_keys make survey --robots 3 --days 30");
+void add_make(CLI::App& parent) {
+  CLI::App& app =
+      *parent.add_subcommand("make",
+                             R"(Make a team: its authority, and a folder of keys for each robot.
+  kimera_multi_keys make survey --robots alpha:0,beta:1
+  kimera_multi_keys make survey --robots 3 --days 30)");
   const auto command = std::make_shared<KeysCommand>();
   define_robots(app, *command);
   app.callback([command] { make(*command); });
 }
 
-void add_add(Command parent) {
-  const Command app = parent.add_subcommand(
+void add_add(CLI::App& parent) {
+  CLI::App& app = *parent.add_subcommand(
       "add",
-      "Add robots to a team, or give new keys to one whose certificate is revoked or has expired.\n"
-      "Robots that run already accept them: nothing has to be copied to those.\n"
-      "  kimera_multi_keys add survey --robots gamma:2");
+      R"(Add robots to a team, or renew a certificate that is revoked or has expired. Running robots
+accept the new keys: nothing has to be copied to them.
+  kimera_multi_keys add survey --robots gamma:2)");
   const auto command = std::make_shared<KeysCommand>();
   define_robots(app, *command);
   app.callback([command] { add(*command); });
 }
 
-void add_revoke(Command parent) {
-  const Command app = parent.add_subcommand(
+void add_revoke(CLI::App& parent) {
+  CLI::App& app = *parent.add_subcommand(
       "revoke",
-      "Take a robot's certificates back, for a robot that is lost or whose secret was read. The\n"
-      "new list must reach the other robots: until then they still accept the robot.\n"
-      "  kimera_multi_keys revoke survey beta");
+      R"(Revoke a robot's certificates, for a robot that is lost or whose secret was read. Copy the new
+list of revocations to the other robots: until then they still accept the robot.
+  kimera_multi_keys revoke survey beta)");
   const auto command = std::make_shared<KeysCommand>();
-  app.add_option("TEAM", command->team, "Folder of the team").required();
-  app.add_option("ROBOT", command->revoked, "Name or id of the robot").required();
+  app.add_option("TEAM", command->team, "Folder of the team")->required();
+  app.add_option("ROBOT", command->revoked, "Name or id of the robot")->required();
   app.callback([command] { revoke(*command); });
 }
 

@@ -2,16 +2,16 @@
 
 #include <cstdint>
 
-#include "apps/command_line.hpp"
+#include "apps/program_options.hpp"
 
 namespace km {
 
 /// Each function adds a subcommand to `app`. The subcommand runs when the command line that names
 /// it is parsed, and prints to stdout. It throws a std::exception if it fails.
-void add_make(Command app);
-void add_add(Command app);
-void add_revoke(Command app);
-void add_show(Command app);
+void add_make(CLI::App& app);
+void add_add(CLI::App& app);
+void add_revoke(CLI::App& app);
+void add_show(CLI::App& app);
 
 /// [s since 1970-01-01 UTC]
 [[nodiscard]] std::int64_t now_s();

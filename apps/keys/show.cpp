@@ -75,16 +75,16 @@ void show_robot(const fs::path& folder) {
 
 }  // namespace
 
-void add_show(Command parent) {
-  const Command app = parent.add_subcommand(
+void add_show(CLI::App& parent) {
+  CLI::App& app = *parent.add_subcommand(
       "show",
-      "Check the keys of a team, or of one robot, and show their content. Shows no secret.\n"
-      "  kimera_multi_keys show survey\n"
-      "  kimera_multi_keys show keys          # on the robot");
+      R"(Check and show the keys of a team, or of one robot, without the secrets.
+  kimera_multi_keys show survey
+  kimera_multi_keys show keys          # on the robot)");
   const auto folder = std::make_shared<fs::path>();
   app.add_option("FOLDER", *folder, "Folder of a team, or of a robot's keys")
-      .required()
-      .existing_folder();
+      ->required()
+      ->check(CLI::ExistingDirectory);
   app.callback([folder] {
     if (fs::exists(*folder / kCertificateFile))
       show_robot(*folder);

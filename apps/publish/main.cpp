@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <thread>
 
-#include "apps/command_line.hpp"
+#include "apps/program_options.hpp"
 #include "apps/publish/euroc_messages.hpp"
 #include "apps/publish/fix_messages.hpp"
 #include "apps/publish/message_player.hpp"
@@ -55,29 +55,28 @@ struct Options {
   std::string fix_topic = "/fix", fix_type = FixMessages::kGnssType;
 };
 
-Options parse_options(int argc, char** argv) {
+Options options_of(int argc, char** argv) {
   Options options;
-  CommandLine line("kimera_multi_publish", kAbout);
-  const Command app = line.command();
+  CLI::App app(kAbout, "kimera_multi_publish");
   app.footer(kFooter);
-  app.add_option("RECORDING", options.recording).required().existing_path();
+  app.add_option("RECORDING", options.recording)->required()->check(CLI::ExistingPath);
   app.add_option("--rate", options.play.rate, "Speed: 1 real time, 2 twice as fast")
-      .within(1e-3, 1e3)
-      .show_default();
+      ->check(CLI::Range(1e-3, 1e3))
+      ->capture_default_str();
   app.add_option("--from", options.play.from_s,
                  "Start of the part to play [s since the first message]")
-      .not_negative();
+      ->check(CLI::NonNegativeNumber);
   app.add_option("--to", options.play.to_s, "End of the part to play [s since the first message]")
-      .not_negative();
-  app.add_option("--topics", options.play.topics, "Topics to play; by default all").delimiter(',');
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--topics", options.play.topics, "Topics to play; by default all")->delimiter(',');
   app.add_option("--wait", options.wait,
                  "Number of readers of each topic of images and inertial samples to wait for "
                  "before playing")
-      .show_default();
+      ->capture_default_str();
   app.add_option("--patience", options.patience_s,
                  "Longest wait for these readers [s]; then the program ends")
-      .positive()
-      .show_default();
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
   app.add_option(
       "--latency", options.latency,
       "Topic of a robot's nav_msgs/Odometry (/robot0/odometry), to measure the time from an image "
@@ -86,36 +85,37 @@ Options parse_options(int argc, char** argv) {
                  "File of absolute fixes to play on a topic of their own: rows of a stamp and "
                  "latitude, longitude [deg], altitude [m], or x, y, z [m]; stamps in ns in a .csv "
                  "file, in s elsewhere")
-      .existing_file();
-  app.add_option("--fix-topic", options.fix_topic, "Topic of --fixes").show_default();
+      ->check(CLI::ExistingFile);
+  app.add_option("--fix-topic", options.fix_topic, "Topic of --fixes")->capture_default_str();
   app.add_option("--fix-type", options.fix_type, "Message type of --fixes")
-      .one_of({FixMessages::kGnssType, FixMessages::kMotionCaptureType})
-      .show_default();
+      ->check(CLI::IsMember({FixMessages::kGnssType, FixMessages::kMotionCaptureType}))
+      ->capture_default_str();
   app.add_flag("--reliable", options.play.reliable,
                "Send lost messages again; otherwise best effort, as drivers of sensors do");
-  app.add_option("--delay", options.play.delay_s, "Delay of every message [s]").within(0., 60.);
+  app.add_option("--delay", options.play.delay_s, "Delay of every message [s]")
+      ->check(CLI::Range(0., 60.));
   app.add_option("--jitter", options.play.jitter_s,
                  "Additional random delay, uniform from 0 to this [s]")
-      .within(0., 60.);
+      ->check(CLI::Range(0., 60.));
   app.add_option("--drop", options.play.drop_share, "Share of messages that are lost, at random")
-      .within(0., 1.);
-  app.add_option("--seed", options.play.seed, "Seed of the random numbers").show_default();
+      ->check(CLI::Range(0., 1.));
+  app.add_option("--seed", options.play.seed, "Seed of the random numbers")->capture_default_str();
   const char* const domain = std::getenv("ROS_DOMAIN_ID");
   options.ros.domain = domain != nullptr ? std::atoi(domain) : 0;
   app.add_option(
          "--domain", options.ros.domain,
          "ROS_DOMAIN_ID, by default that of the environment. A robot receives it with --set "
          "ros.domain=N (--domain of a robot is the domain of the team)")
-      .within(0, 230)
-      .show_default();
+      ->check(CLI::Range(0, 230))
+      ->capture_default_str();
   app.add_option("--interface", options.ros.interface, "Network interface, e.g. lo");
   app.add_option("--peers", options.ros.peers, "Addresses of other hosts, where multicast is off")
-      .delimiter(',');
+      ->delimiter(',');
   app.callback([&options] {
     if (options.play.from_s >= options.play.to_s)
-      throw CommandLineError("--from is not before --to");
+      throw CLI::ValidationError("--from is not before --to");
   });
-  if (const auto exit_code = line.parse(argc, argv, kBadCommandLine)) std::exit(*exit_code);
+  if (const auto exit_code = parse_options(app, argc, argv, kBadCommandLine)) std::exit(*exit_code);
   return options;
 }
 
@@ -214,7 +214,7 @@ void play(const Options& options, SignalWatch& signals) {
 }  // namespace km
 
 int main(int argc, char** argv) try {
-  const km::Options options = km::parse_options(argc, argv);
+  const km::Options options = km::options_of(argc, argv);
   km::SignalWatch signals;  // before any thread: threads inherit the blocked signals
   km::play(options, signals);
   return 0;

@@ -2,9 +2,9 @@
 #include <exception>
 #include <iostream>
 
-#include "apps/command_line.hpp"
 #include "apps/output_file.hpp"
 #include "apps/program_folder.hpp"
+#include "apps/program_options.hpp"
 #include "apps/result_files.hpp"
 #include "apps/result_writer.hpp"
 #include "apps/team/links_file.hpp"
@@ -24,27 +24,32 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kAbout =
-    "Runs a team of robots on this host, one process each, and compares their estimates with the "
-    "truth.\n\n"
-    "A team file lists the robots and their inputs: see below, and config/teams/.\n\n"
-    "True poses are in one world for all robots: where they are given, the tables show errors of "
-    "the\n"
-    "trajectories and how many closures are true (see kimera_multi_evaluate closures --help), "
-    "with\ntruth_mesh also how far the robots' meshes are from it.\n\n"
-    "report.html in the folder of the results shows all of it, with charts over time, every "
-    "closure\nand the findings: one file for any browser, without a network.\n\n"
-    "Exit code: 0 if every robot ended without a failure, 1 for unusable input and results that "
-    "cannot\nbe written, 3 if a robot failed.\n"
-    "Ctrl-C asks the robots to end in order and prints the results; a second one ends them. If "
-    "this\nprogram is killed, the robots end in order and write their results.\n\n"
-    "Examples:\n"
-    "  kimera_multi_team --config config/teams/euroc_two_robots.yaml --dataset MH_01_easy\n"
-    "  kimera_multi_team --config config/teams/tunnels.yaml --dataset tunnels_8robots --rate max\n"
-    "  kimera_multi_team --config team.yaml -- --set mapping.mode=off   # after --: for every "
-    "robot\n"
-    "  kimera_multi_team --config team.yaml --links config/links/lossy.yaml\n"
-    "  kimera_multi_team --config team.yaml --record   # for Foxglove, Rerun, ...: team.mcap\n"
-    "  kimera_multi_team --config team.yaml --output results --report   # robots ran elsewhere";
+    R"(Runs a team of robots on this host, one process each, and compares their estimates with the truth.
+
+A team file lists the robots and their inputs: see below, and config/teams/. If it names true poses,
+which are in one world for all robots, the tables show the errors of the trajectories and the number
+of true closures (see kimera_multi_evaluate closures --help). With truth_mesh they also show the
+errors of the robots' meshes.
+
+The folder of the results receives report.html, a page for any browser, without a network: the tables
+with charts over time, every closure, and the findings.
+
+Ctrl-C asks the robots to end in order and prints the results; a second one ends them at once. If this
+program is killed, the robots end in order and write their results.
+Exit codes: 0 if every robot ended without a failure; 1 for unusable input and results that cannot be
+written; 3 if a robot failed.
+
+Examples:
+  kimera_multi_team --config config/teams/euroc_two_robots.yaml --dataset MH_01_easy
+  kimera_multi_team --config config/teams/tunnels.yaml --dataset tunnels_8robots --rate max
+  kimera_multi_team --config team.yaml -- --set mapping.mode=off   # after --: for every robot
+  kimera_multi_team --config team.yaml --links config/links/lossy.yaml
+  kimera_multi_team --config team.yaml --record   # for Foxglove, Rerun, ...: team.mcap
+  kimera_multi_team --config team.yaml --output results --report   # of robots that ran elsewhere)";
+
+constexpr const char* kHintForUnknown = R"(Options of the robots come after --:
+  kimera_multi_team --config team.yaml -- --set mapping.mode=off
+)";
 
 struct TeamOptions {
   fs::path config, dataset, output, truth, security, links, json, robot_binary;
@@ -57,51 +62,53 @@ struct TeamOptions {
   bool report = false;
 };
 
-void define(km::Command app, TeamOptions& options) {
-  app.footer("Keys of a team file, paths relative to it:\n" + km::team_file_keys() +
-             "\nKeys of a file of links, likewise; all but seed, pairs and partitions are those of "
-             "every\nlink, and in pairs of some:\n" +
-             km::links_file_keys());
+void define(CLI::App& app, TeamOptions& options) {
+  app.footer(
+      "Keys of a team file, paths relative to it:\n" + km::team_file_keys() +
+      "\nKeys of a file of links, paths relative to it. seed, pairs and partitions are of the "
+      "file;\nthe others are of every link, and in pairs of the links named there:\n" +
+      km::links_file_keys());
   options.robot_binary = km::program_folder() / "kimera_multi_robot";
-  app.add_option("--config", options.config, "Team file").required();
+  app.add_option("--config", options.config, "Team file")->required();
   app.add_option("--dataset", options.dataset, "Value of ${DATASET} in the team file");
   app.add_option(
          "--rate", options.rate,
          "Times real time, max, or auto, see kimera_multi_robot --help (default: the file's, auto)")
-      .check([](const std::string& text) {
+      ->check([](const std::string& text) {
         return km::is_rate(text) ? "" : text + " is neither a positive number nor max nor auto";
       });
   app.add_option("--domain", options.domain,
                  "DDS domain (default: the file's, or one that no other team here has)")
-      .within(0, 230);
+      ->check(CLI::Range(0, 230));
   app.add_option("--output", options.output, "Results, one folder per robot (default: the file's)");
   app.add_option("--security", options.security,
                  "Team folder of kimera_multi_keys: each robot uses the keys in its folder there")
-      .existing_folder();
-  const km::CommandOption links = app.add_option(
+      ->check(CLI::ExistingDirectory);
+  CLI::Option* const links = app.add_option(
       "--links", options.links,
       "File of bad links, see below and config/links, or a link recorded by Mahimahi "
       "(.up, .down): "
       "each robot gets a network of its own");
-  links.existing_file();
+  links->check(CLI::ExistingFile);
   app.add_option("--truth", options.truth, "True poses of all robots, instead of the file's")
-      .existing_path();
+      ->check(CLI::ExistingPath);
   app.add_option("--time-limit", options.time_limit_s, "Ask the robots to end after this [s]")
-      .not_negative();
+      ->check(CLI::NonNegativeNumber);
   app.add_option("--json", options.json, "Also write the results to this file, as JSON");
-  app.add_option("--robot-binary", options.robot_binary, "Program of a robot").show_default();
+  app.add_option("--robot-binary", options.robot_binary, "Program of a robot")
+      ->capture_default_str();
   app.add_option_function<std::vector<std::string>>(
          "--record", [&options](const std::vector<std::string>& file) { options.record = file[0]; },
          "Each robot writes record.mcap, for Foxglove, Lichtblick, Rerun, PlotJuggler, and at the "
          "end they become one file (default: team.mcap in the folder of the results)")
-      .expected(0, 1)
-      .type_name("[FILE.mcap]");
+      ->expected(0, 1)
+      ->type_name("[FILE.mcap]");
   app.add_flag(
       "--view", options.view,
       "Robots allow every program in the domain to watch them: kimera_multi_viewer --domain N");
   app.add_flag("--report", options.report,
                "Start nothing: the tables of a run that has ended, from its folders in --output")
-      .excludes(links);
+      ->excludes(links);
   app.add_option("arguments", options.arguments, "After --: more arguments of every robot");
 }
 
@@ -238,15 +245,13 @@ int run(const TeamOptions& options) {
 }  // namespace
 
 int main(int argc, char** argv) try {
-  km::CommandLine line("kimera_multi_team", kAbout);
+  CLI::App app(kAbout, "kimera_multi_team");
   TeamOptions options;
-  define(line.command(), options);
-  line.hint_for_unknown(
-      "Options of the robots come after --, as in\n"
-      "  kimera_multi_team --config team.yaml -- --set mapping.mode=off\n");
+  define(app, options);
   // The parser takes "--" after --record only as the end of its values.
   char** const robots = std::find(argv, argv + argc, std::string_view("--"));
-  if (const auto exit_code = line.parse(static_cast<int>(robots - argv), argv, 1))
+  if (const auto exit_code =
+          km::parse_options(app, static_cast<int>(robots - argv), argv, 1, kHintForUnknown))
     return *exit_code;
   if (robots != argv + argc)
     options.arguments.insert(options.arguments.end(), robots + 1, argv + argc);

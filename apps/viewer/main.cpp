@@ -6,8 +6,8 @@
 #include <set>
 #include <thread>
 
-#include "apps/command_line.hpp"
 #include "apps/output_file.hpp"
+#include "apps/program_options.hpp"
 #include "apps/viewer/page_message.hpp"
 #include "apps/viewer/page_server.hpp"
 #include "apps/viewer/run_playback.hpp"
@@ -26,28 +26,26 @@ namespace {
 constexpr int kBadInput = 1, kBadCommandLine = 2;
 
 constexpr const char* kAbout =
-    "Shows a team in a browser, while it runs or afterwards. It prints the address to "
-    "open.\n\nThe page has the map, objects, trajectories and loop closures in 3D, and the state "
-    "of the "
-    "robots:\nwhich robots receive each other, cost, bytes, loads, memory. Its time slider goes "
-    "back to any moment "
-    "while the run\ncontinues.";
+    R"(Shows a team in a browser, during a run or afterwards. Prints the address to open.
+
+The page shows map, objects, trajectories and loop closures in 3D, and the state of the robots: who
+receives whom, cost, bytes, loads, memory. Its time slider goes back to any moment, also during the run.)";
 
 constexpr const char* kFooter = R"(
-With --domain it joins the team's DDS domain as a listener: robots neither wait for it nor count
-it. Robots that run with --view send the data of a page: about 2 kB/s, chunks of the map as they change,
-and small camera images of a robot while a page shows them.
+RESULTS is the folder of a team or of one robot, also if it still runs or was killed. Everything appears
+at the time at which the robot knew it, with two exceptions. Meshes are those of the end of the run: each
+chunk appears at the time at which the robot saw its surface. Objects, 2D map, distances and the team's
+mesh appear at the end of the run.
 
-RESULTS is the folder of kimera_multi_team, or of one robot: also of one that runs, or was killed.
-Everything is shown when it became known to the robot, except for the meshes: the page has those of
-the end of the run, each chunk from the time at which the robot saw its surface. Objects, 2D map,
-distances and the fused mesh of the team are in the page from the end of the run on.
+With --domain the viewer joins the DDS domain of a running team as a listener; robots do not wait for it.
+Robots that run with --view send about 2 kB/s, chunks of the map as they change, and small camera images
+while a page shows them.
 
 In the page: drag to turn, right button to move, wheel to zoom; double click on a robot's name to
 follow it; measure: two clicks on the map. Keys: space plays and stops, T from above, F all in view.
 
-Without --listen only this host can open the page. With it, every program that knows the address can.
-The address therefore has a random token, a new one for every run; the content is not encrypted.
+Only this host can open the page. With --listen every program that knows the address can: the address has
+a random token, a new one for every run, and the content is not encrypted.
 
 Examples
   kimera_multi_viewer --domain 7                     # a team that runs
@@ -57,8 +55,8 @@ Examples
   kimera_multi_viewer results/demo --rate 2          # replay it, twice as fast
   kimera_multi_viewer results/demo --listen 0.0.0.0  # for other hosts
 
-Exit codes: 0 ended by Ctrl-C; 1 for input that cannot be used, an address that cannot be had, and a
-record that is not whole; 2 for a command line that cannot be used.)";
+Exit codes: 0 ended by Ctrl-C; 1 unusable input, an address in use, or an incomplete record; 2 bad command
+line.)";
 
 struct ViewerOptions {
   std::filesystem::path results, palette, record;
@@ -77,57 +75,58 @@ void split_port(PageServerOptions& server) {
   std::uint16_t port = 0;
   const auto [rest, error] = std::from_chars(server.address.data() + colon + 1, end, port);
   if (error != std::errc() || rest != end)
-    throw CommandLineError("--listen", server.address + ": the port is not from 0 to 65535");
+    throw CLI::ValidationError("--listen", server.address + ": the port is not from 0 to 65535");
   server.port = port;
   server.address.resize(colon);
 }
 
-void define(Command app, ViewerOptions& options) {
+void define(CLI::App& app, ViewerOptions& options) {
   app.footer(kFooter);
-  const CommandOption results = app.add_option("RESULTS", options.results, "Results of a run");
-  const CommandOption rate =
+  CLI::Option* const results = app.add_option("RESULTS", options.results, "Results of a run");
+  CLI::Option* const rate =
       app.add_option("--rate", options.rate, "Play as if live: 1 as it was, 2 twice as fast");
-  rate.within(1e-3, 1e3).needs(results);
-  const CommandOption domain = app.add_option(
+  rate->check(CLI::Range(1e-3, 1e3))->needs(results);
+  CLI::Option* const domain = app.add_option(
       "--domain", options.dds.domain, "DDS domain of the team, whose robots run with --view");
-  domain.within(0, 230).excludes(results);
-  app.add_option("--team", options.dds.team, "Its dds.team").needs(domain).show_default();
-  app.add_option("--interface", options.dds.interface, "Network interface, e.g. lo").needs(domain);
-  app.add_option("--peers", options.dds.peers, "Addresses of its hosts, where multicast is off")
-      .delimiter(',')
-      .needs(domain);
-  const CommandOption record = app.add_option("--record", options.record,
-                                              "Write the messages of the robots to this MCAP file, "
-                                              "replacing it: the topics of a robot's own record");
-  record.needs(domain);
+  domain->check(CLI::Range(0, 230))->excludes(results);
+  app.add_option("--team", options.dds.team, "dds.team of the robots")
+      ->needs(domain)
+      ->capture_default_str();
+  app.add_option("--interface", options.dds.interface, "Network interface, e.g. lo")->needs(domain);
+  app.add_option("--peers", options.dds.peers,
+                 "Addresses of the robots' hosts, where multicast is off")
+      ->delimiter(',')
+      ->needs(domain);
+  CLI::Option* const record = app.add_option("--record", options.record,
+                                             "Write the messages of the robots to this MCAP file, "
+                                             "replacing it: the topics of a robot's own record");
+  record->needs(domain);
   app.add_flag("--record-images", options.record_images,
-               "And all their camera images, small; else those that a page shows")
-      .needs(record);
+               "Also record all camera images (small), not only those that a page shows")
+      ->needs(record);
   app.add_option(
          "--palette", options.palette,
          "label_palette.csv with names and colours of the labels (default: that of RESULTS)")
-      .existing_file();
+      ->check(CLI::ExistingFile);
   app.add_option("--port", options.server.port, "Port of the page; 0: any free port")
-      .within(0, 65535)
-      .show_default();
-  app.add_option(
-         "--listen", options.server.address,
-         "Address of this host to listen on, 0.0.0.0 for all, also ADDRESS:PORT; other than "
-         "loopback, the URL has a token")
-      .show_default();
+      ->check(CLI::Range(0, 65535))
+      ->capture_default_str();
+  app.add_option("--listen", options.server.address,
+                 "Address of this host to listen on, or ADDRESS:PORT; 0.0.0.0 for all. Except for "
+                 "loopback addresses, the URL has a token")
+      ->capture_default_str();
   app.add_option("--memory", options.memory_MB,
-                 "Memory for messages [MB]: beyond it, images, then superseded meshes are dropped, "
-                 "the oldest first")
-      .within(10.0, 1e6)
-      .show_default();
+                 "Memory for messages [MB]. Beyond it the oldest images, then the oldest replaced "
+                 "meshes, are discarded")
+      ->check(CLI::Range(10.0, 1e6))
+      ->capture_default_str();
   app.add_option("--page", options.server.page_folder,
-                 "Serve the page's files from this folder, for work on them")
-      .existing_folder();
+                 "Folder with files of the page, for work on them")
+      ->check(CLI::ExistingDirectory);
   app.callback([&options, results, domain] {
     split_port(options.server);
-    if (!results.is_given() && !domain.is_given())
-      throw CommandLineError(
-          "--domain of a team that runs, or RESULTS of one that has ended is required");
+    if (results->count() + domain->count() == 0)
+      throw CLI::ValidationError("give RESULTS of a run, or --domain of a team that runs");
   });
 }
 
@@ -232,10 +231,11 @@ void show_team(ViewerOptions options, ViewStore& store, SignalWatch& signals) {
 }  // namespace km
 
 int main(int argc, char** argv) try {
-  km::CommandLine line("kimera_multi_viewer", km::kAbout);
+  CLI::App app(km::kAbout, "kimera_multi_viewer");
   km::ViewerOptions options;
-  km::define(line.command(), options);
-  if (const auto exit_code = line.parse(argc, argv, km::kBadCommandLine)) return *exit_code;
+  km::define(app, options);
+  if (const auto exit_code = km::parse_options(app, argc, argv, km::kBadCommandLine))
+    return *exit_code;
   km::SignalWatch signals;  // before any thread: threads inherit the blocked signals
   km::ViewStore store(static_cast<std::size_t>(options.memory_MB * 1e6));
   (options.results.empty() ? km::show_team : km::show_run)(options, store, signals);

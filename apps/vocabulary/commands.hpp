@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "apps/command_line.hpp"
+#include "apps/program_options.hpp"
 
 namespace km {
 
@@ -13,27 +13,23 @@ struct VocabularyCommand {
   int features = 1000;     ///< ORB features per image.
   int every = 1;           ///< Use every n-th image.
 
-  void define(Command app) {
+  void define(CLI::App& app) {
     define_images(app);
     app.add_option("--json", json, "Also write the results to this file, as JSON");
   }
   /// Without --json.
-  void define_images(Command app) {
-    app.add_option("--features", features, "ORB features per image")
-        .within(1, 100000)
-        .show_default();
-    app.add_option("--every", every, "Use every N-th image of an input")
-        .within(1, 1000000)
-        .show_default();
+  void define_images(CLI::App& app) {
+    app.add_option("--features", features, "ORB features per image")->check(CLI::Range(1, 100000))->capture_default_str();
+    app.add_option("--every", every, "Use every N-th image of an input")->check(CLI::Range(1, 1000000))->capture_default_str();
   }
 };
 
 /// Add a subcommand to `app`, which runs as soon as the command line names it and prints to stdout.
 /// Unusable input throws a std::exception.
-void add_train(Command app);
-void add_inspect(Command app);
-void add_evaluate(Command app);
-void add_describe(Command app);
-void add_patches(Command app);
+void add_train(CLI::App& app);
+void add_inspect(CLI::App& app);
+void add_evaluate(CLI::App& app);
+void add_describe(CLI::App& app);
+void add_patches(CLI::App& app);
 
 }  // namespace km

@@ -20,15 +20,15 @@ struct DescribeCommand : VocabularyCommand {
   std::string output;
 };
 
-void define(Command app, DescribeCommand& command) {
-  app.add_option("network", command.network, "ONNX file").required();
-  app.add_option("images", command.images, "IMAGES, in the order of the descriptors").required();
+void define(CLI::App& app, DescribeCommand& command) {
+  app.add_option("network", command.network, "ONNX file")->required();
+  app.add_option("images", command.images, "IMAGES, in the order of the descriptors")->required();
   app.add_option("-o,--output", command.output,
                  "File of the descriptors, one line of numbers per image")
-      .required();
+      ->required();
   app.add_option("--every", command.every, "Use every N-th image of an input")
-      .within(1, 1000000)
-      .show_default();
+      ->check(CLI::Range(1, 1000000))
+      ->capture_default_str();
 }
 
 std::string text_of(const ImageDescriptor& descriptor) {
@@ -62,8 +62,8 @@ void run(const DescribeCommand& command) {
 
 }  // namespace
 
-void add_describe(Command parent) {
-  const Command app = parent.add_subcommand(
+void add_describe(CLI::App& parent) {
+  CLI::App& app = *parent.add_subcommand(
       "describe", "Write the descriptors of images by a network to a file, for apps/lab/places");
   const auto command = std::make_shared<DescribeCommand>();
   define(app, *command);

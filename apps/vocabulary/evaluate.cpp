@@ -139,21 +139,21 @@ void write_json(std::ostream& out, const std::vector<Row>& rows, std::size_t sam
   out << json << '\n';
 }
 
-void define(Command app, EvaluateCommand& command) {
-  app.add_option("vocabulary", command.vocabulary, "Vocabulary file").required();
+void define(CLI::App& app, EvaluateCommand& command) {
+  app.add_option("vocabulary", command.vocabulary, "Vocabulary file")->required();
   app.add_option("--known", command.known, "IMAGES a robot has taken, named by stamp [ns]")
-      .required();
+      ->required();
   app.add_option("--queries", command.queries, "IMAGES another robot sends, named by stamp [ns]")
-      .required();
-  app.add_option("--truth", command.truth, "Poses of both: TUM text, or EuRoC .csv").required();
+      ->required();
+  app.add_option("--truth", command.truth, "Poses of both: TUM text, or EuRoC .csv")->required();
   app.add_option("--max-distance", command.max_distance_m,
                  "Two images show the same place up to this distance [m] ...")
-      .show_default();
+      ->capture_default_str();
   app.add_option("--max-angle", command.max_angle_deg, "... and this angle between them [deg]")
-      .show_default();
+      ->capture_default_str();
   app.add_option("--min-normalizer", command.min_normalizer,
                  "Least score of a query against the image before it")
-      .show_default();
+      ->capture_default_str();
   app.add_option("--max-candidates", command.max_candidates,
                  "Only so many candidates per query, the best ones (default: all)");
   command.VocabularyCommand::define(app);
@@ -176,8 +176,8 @@ void run(const EvaluateCommand& command) {
 
 }  // namespace
 
-void add_evaluate(Command parent) {
-  const Command app = parent.add_subcommand(
+void add_evaluate(CLI::App& parent) {
+  CLI::App& app = *parent.add_subcommand(
       "evaluate", "Precision and recall of candidates over the similarity threshold");
   const auto command = std::make_shared<EvaluateCommand>();
   define(app, *command);

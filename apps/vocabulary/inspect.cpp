@@ -99,10 +99,10 @@ void print(const Usage& usage) {
   }
 }
 
-void define(Command app, InspectCommand& command) {
-  app.add_option("vocabulary", command.vocabulary, "Vocabulary file").required();
+void define(CLI::App& app, InspectCommand& command) {
+  app.add_option("vocabulary", command.vocabulary, "Vocabulary file")->required();
   app.add_option("--images", command.images, "IMAGES to count words in");
-  app.add_option("--pair", command.pair, "Two images to compare").expected(2);
+  app.add_option("--pair", command.pair, "Two images to compare")->expected(2);
   command.VocabularyCommand::define(app);
 }
 
@@ -139,8 +139,8 @@ void run(const InspectCommand& command) {
 
 }  // namespace
 
-void add_inspect(Command parent) {
-  const Command app = parent.add_subcommand("inspect", "Check a vocabulary and show what is in it");
+void add_inspect(CLI::App& parent) {
+  CLI::App& app = *parent.add_subcommand("inspect", "Check a vocabulary and show what is in it");
   const auto command = std::make_shared<InspectCommand>();
   define(app, *command);
   app.callback([command] { run(*command); });

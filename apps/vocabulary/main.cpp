@@ -1,17 +1,18 @@
-#include "apps/command_line.hpp"
+#include "apps/program_options.hpp"
 #include "apps/vocabulary/commands.hpp"
 
 namespace {
 
 constexpr const char* kAbout =
-    "Vocabularies of visual words: what place recognition compares images by.\n"
-    "All robots of a team need the same vocabulary file.\n\n"
-    "IMAGES are image files, folders of .png or .jpg, EuRoC/ASL folders (their left camera), or\n"
-    "text files that list one image per line. Examples:\n"
-    "  kimera_multi_vocabulary train -o site.kmvoc -k 10 -L 4 recording_1 recording_2\n"
-    "  kimera_multi_vocabulary inspect site.kmvoc --images recording_1 --pair a.png b.png\n"
-    "  kimera_multi_vocabulary evaluate site.kmvoc --known robot_1 --queries robot_2 \\\n"
-    "      --truth state_groundtruth_estimate0/data.csv";
+    R"(Vocabularies of visual words: what place recognition compares images by.
+All robots of a team need the same vocabulary file.
+
+IMAGES are image files, folders of .png or .jpg, EuRoC/ASL folders (their left camera), or
+text files that list one image per line. Examples:
+  kimera_multi_vocabulary train -o site.kmvoc -k 10 -L 4 recording_1 recording_2
+  kimera_multi_vocabulary inspect site.kmvoc --images recording_1 --pair a.png b.png
+  kimera_multi_vocabulary evaluate site.kmvoc --known robot_1 --queries robot_2 \
+      --truth state_groundtruth_estimate0/data.csv)";
 
 }  // namespace
 

@@ -18,13 +18,13 @@ struct PatchesCommand : VocabularyCommand {
   std::string output;
 };
 
-void define(Command app, PatchesCommand& command) {
+void define(CLI::App& app, PatchesCommand& command) {
   app.add_option(
          "images", command.images,
          "IMAGES: files, folders of .png or .jpg, EuRoC/ASL folders, or text files with one "
          "image per line")
-      .required();
-  app.add_option("-o,--output", command.output, "File of the patches (NumPy's .npy)").required();
+      ->required();
+  app.add_option("-o,--output", command.output, "File of the patches (NumPy's .npy)")->required();
   command.define_images(app);
 }
 
@@ -87,12 +87,12 @@ void run(const PatchesCommand& command) {
 
 }  // namespace
 
-void add_patches(Command parent) {
-  const Command app = parent.add_subcommand(
-      "patches",
-      "Write the surroundings of keypoints to a file, for apps/lab/places.\n"
-      "Each record has image (its number), x, y [px], octave, orb (descriptor) and patch.\n"
-      "Example: kimera_multi_vocabulary patches recording_1/mav0/cam0/data -o patches.npy");
+void add_patches(CLI::App& parent) {
+  CLI::App& app =
+      *parent.add_subcommand("patches",
+                             R"(Write the surroundings of keypoints to a file, for apps/lab/places.
+Each record has image (its number), x, y [px], octave, orb (descriptor) and patch.
+Example: kimera_multi_vocabulary patches recording_1/mav0/cam0/data -o patches.npy)");
   const auto command = std::make_shared<PatchesCommand>();
   define(app, *command);
   app.callback([command] { run(*command); });

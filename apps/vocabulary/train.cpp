@@ -18,16 +18,17 @@ struct TrainCommand : VocabularyCommand {
   std::uint32_t seed = 1;
 };
 
-void define(Command app, TrainCommand& command) {
+void define(CLI::App& app, TrainCommand& command) {
   app.add_option("images", command.images, "IMAGES to learn from, as varied as the places to come")
-      .required();
-  app.add_option("-o,--output", command.vocabulary, "Vocabulary file to write").required();
+      ->required();
+  app.add_option("-o,--output", command.vocabulary, "Vocabulary file to write")->required();
   app.add_option("-k,--branching", command.branching, "Children of a node of the tree")
-      .show_default();
+      ->capture_default_str();
   app.add_option("-L,--depth", command.depth,
                  "Levels of the tree: at most k^L words, about 37 bytes each")
-      .show_default();
-  app.add_option("--seed", command.seed, "Seed of the random start of clustering").show_default();
+      ->capture_default_str();
+  app.add_option("--seed", command.seed, "Seed of the random start of clustering")
+      ->capture_default_str();
   command.VocabularyCommand::define(app);
 }
 
@@ -60,8 +61,8 @@ void run(const TrainCommand& command) {
 
 }  // namespace
 
-void add_train(Command parent) {
-  const Command app = parent.add_subcommand("train", "Learn a vocabulary from images");
+void add_train(CLI::App& parent) {
+  CLI::App& app = *parent.add_subcommand("train", "Learn a vocabulary from images");
   const auto command = std::make_shared<TrainCommand>();
   define(app, *command);
   app.callback([command] { run(*command); });

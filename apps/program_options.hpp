@@ -1,0 +1,25 @@
+#pragma once
+
+#include <CLI/CLI.hpp>  // takes seconds to compile: only for sources that define options
+#include <initializer_list>
+#include <optional>
+#include <string>
+
+namespace km {
+
+/// Adds --version, parses the words and calls the callbacks. Empty if the program continues.
+/// Otherwise the exit code: 0 after --help, --version and a callback that throws CLI::Success. It
+/// is `exit_code_if_wrong` for an invalid command line, whose error is printed to stderr. An
+/// unknown word is often the reason why another one is missing, and is named instead, followed by
+/// `hint_for_unknown`. Other exceptions of callbacks are passed on.
+[[nodiscard]] std::optional<int> parse_options(CLI::App& app, int argc, const char* const* argv,
+                                               int exit_code_if_wrong,
+                                               const std::string& hint_for_unknown = {});
+
+/// The main() of a program whose first word is a subcommand. Each of `adders` adds one, which runs
+/// as soon as the command line names it. The exit code is 0 if the subcommand succeeded or help was
+/// requested. It is 1 for an exception, with a message on stderr, and for an invalid command line.
+int run_subcommands(const std::string& program, const std::string& about,
+                    std::initializer_list<void (*)(CLI::App&)> adders, int argc, char** argv);
+
+}  // namespace km
