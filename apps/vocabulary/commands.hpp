@@ -19,8 +19,12 @@ struct VocabularyCommand {
   }
   /// Without --json.
   void define_images(CLI::App& app) {
-    app.add_option("--features", features, "ORB features per image")->check(CLI::Range(1, 100000))->capture_default_str();
-    app.add_option("--every", every, "Use every N-th image of an input")->check(CLI::Range(1, 1000000))->capture_default_str();
+    app.add_option("--features", features, "ORB features per image")
+        ->check(CLI::Range(1, 100000))
+        ->capture_default_str();
+    app.add_option("--every", every, "Use every N-th image of an input")
+        ->check(CLI::Range(1, 1000000))
+        ->capture_default_str();
   }
 };
 
