@@ -45,7 +45,6 @@
 #include "modules/ros_dds/node/ros_output_node.hpp"
 #include "modules/semantic_mapping/semantic_mapper.hpp"
 #include "modules/sensors/node/sensors_node.hpp"
-#include "modules/surface_ties/node/surface_ties_node.hpp"
 #include "modules/team_map/node/team_map_node.hpp"
 #include "modules/view/node/view_node.hpp"
 #include "runtime/dds/bridge.hpp"
@@ -174,8 +173,8 @@ class Robot {
     if (constellations_ != nullptr &&
         !(mesh_deformation_->is_current() && constellations_->is_done()))
       return false;
-    return chunks_ == nullptr || (mesh_deformation_->is_current() && chunks_->is_done() &&
-                                  team_map_->is_done() && (ties_ == nullptr || ties_->is_done()));
+    return chunks_ == nullptr ||
+           (mesh_deformation_->is_current() && chunks_->is_done() && team_map_->is_done());
   }
   /// Null without labels.
   [[nodiscard]] ObjectsNode* objects() { return objects_; }
@@ -234,7 +233,6 @@ class Robot {
   void add_objects(const ObjectsConfig& config, const LabelPalette& palette,
                    const std::filesystem::path& folder, ResultWriter& results);
   void add_constellations(const ConstellationsConfig& config);
-  void add_surface_ties(const MeshDeformationConfig& config);
   void add_playback(const RobotConfig& config, double rate, RecordedGraph graph);
   void add_loop_closure(const RobotConfig& config);
   void add_back_end(const RobotConfig& config);
@@ -286,7 +284,6 @@ class Robot {
   MeshDeformationNode* mesh_deformation_ = nullptr;
   MeshFilesNode* mesh_files_ = nullptr;
   MeshChunksNode* chunks_ = nullptr;
-  SurfaceTiesNode* ties_ = nullptr;
   TeamMapNode* team_map_ = nullptr;
   ObjectsNode* objects_ = nullptr;
   ConstellationsNode* constellations_ = nullptr;

@@ -100,7 +100,6 @@ CrossingEnds Robot::share_meshes(const RobotConfig& robot, const LabelPalette& p
   chunks_ = &add<MeshChunksNode>(false, config, identity_.robot,
                                  MeshChunksTopics{topics_.sent_chunks, topics_.sent_mesh_poses},
                                  std::move(reduction));
-  if (config.surface_ties) add_surface_ties(robot.mesh_deformation);
   // A leaving robot corrects its mesh once more, from scratch. Other robots may have left before,
   // so all keep the chunks that they have.
   topics_.optimized_meshes.subscribe([this](const auto& optimized) {
@@ -143,25 +142,6 @@ void Robot::add_constellations(const ConstellationsConfig& config) {
                                                     .restarts = topics_.closure_restarts,
                                                     .found = topics_.new_closures,
                                                     .outcomes = topics_.outcomes});
-}
-
-// Visits are those of `config`, because the correction moves only their surfaces independently.
-void Robot::add_surface_ties(const MeshDeformationConfig& config) {
-  ties_ = &add<SurfaceTiesNode>(false, identity_.robot,
-                                static_cast<KeyframeIndex>(config.time_window_keyframes),
-                                SurfaceTiesTopics{.own_chunks = topics_.sent_chunks,
-                                                  .peer_chunks = topics_.chunks.from_peers(),
-                                                  .own_poses = topics_.sent_mesh_poses,
-                                                  .peer_poses = topics_.mesh_poses.from_peers(),
-                                                  .closures = topics_.closures,
-                                                  .progress = topics_.progress,
-                                                  .restarts = topics_.closure_restarts,
-                                                  .ties = topics_.new_closures,
-                                                  .outcomes = topics_.outcomes});
-  topics_.keyframes.subscribe([this](const auto& keyframe) {
-    chunks_->learn(keyframe->odometry);
-    ties_->learn(keyframe->odometry);
-  });
 }
 
 }  // namespace km

@@ -167,8 +167,7 @@ bool unpack(std::span<const std::uint8_t> bytes, const ChunkCounts& counts, Mesh
 }
 
 std::size_t wire_bytes(const MeshChunk& chunk) {
-  return kChunkFixedBytes + packed(chunk).size() + kMeshKeyframeBytes * chunk.keyframes.size() +
-         (chunk.odometry ? kChunkOdometryBytes : 0);
+  return kChunkFixedBytes + packed(chunk).size() + kMeshKeyframeBytes * chunk.keyframes.size();
 }
 
 }  // namespace km

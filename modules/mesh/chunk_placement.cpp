@@ -60,8 +60,8 @@ PlacedChunk place(const MeshChunk& chunk, const MeshPoses* poses) {
 }
 
 bool differ(const MeshChunk& a, const MeshChunk& b, double min_move_m, const MeshPoses* poses) {
-  if (a.step_m != b.step_m || a.odometry.has_value() != b.odometry.has_value() ||
-      a.labels != b.labels || a.faces != b.faces || a.offsets.size() != b.offsets.size())
+  if (a.step_m != b.step_m || a.labels != b.labels || a.faces != b.faces ||
+      a.offsets.size() != b.offsets.size())
     return true;
   const PlacedChunk sent = place(a, poses), present = place(b, poses);
   if (sent.anchor != present.anchor) return true;

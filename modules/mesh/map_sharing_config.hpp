@@ -21,7 +21,6 @@ struct MapSharingConfig {
   double position_step_m = 0.001;
   double min_move_m = 0.01;
   double max_bytes_per_s = 50000.0;
-  bool surface_ties = false;
 
   void visit_fields(auto& visitor) {
     visitor.field("team", team,
@@ -46,10 +45,6 @@ struct MapSharingConfig {
         "which its cell is sent again");
     visitor.field("max_bytes_per_s", max_bytes_per_s, {1000.0, 1e9},
                   "[B/s] average rate of sent chunks; counted once per message, not per receiver");
-    visitor.field("surface_ties", surface_ties,
-                  "tie robots to each other, and each robot to its own earlier visits, where their "
-                  "meshes show the same surface and no closure is near; a chunk then states a pose "
-                  "of odometry. Without effect if team is off");
   }
 };
 

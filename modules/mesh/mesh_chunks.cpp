@@ -73,10 +73,9 @@ class ChunkViews {
     step_ = mesh_keyframe_step(origin->T_world_kf.size());
   }
 
-  // Bytes that state() and odometry add at most to a chunk with this number of vertices.
+  // Bytes that state() adds at most to a chunk with this number of vertices.
   [[nodiscard]] std::size_t largest_bytes(std::size_t vertices) const {
-    return kChunkOdometryBytes +
-           (origin_ == nullptr ? 0 : kMaxChunkKeyframes * kMeshKeyframeBytes + 3 * vertices);
+    return origin_ == nullptr ? 0 : kMaxChunkKeyframes * kMeshKeyframeBytes + 3 * vertices;
   }
 
   void state(std::span<const std::uint32_t> vertices, MeshChunk& chunk) const {
@@ -352,10 +351,6 @@ const char* fault_of(const MeshChunk& chunk) {
   if (chunk.faces.empty() != chunk.offsets.empty()) return "vertices without faces";
   if (const char* fault = fault_of(chunk.keyframes)) return fault;
   if (const char* fault = fault_of_views(chunk)) return fault;
-  if (chunk.odometry && chunk.odometry->id.robot != chunk.key.robot)
-    return "a keyframe of another robot";
-  if (chunk.odometry && !find_pose(chunk.keyframes, chunk.odometry->id.index))
-    return "odometry of a keyframe that does not move the chunk";
   if (!are_positions_usable(chunk)) return "positions are not finite or too far away";
   return nullptr;
 }
@@ -369,15 +364,6 @@ SplitMesh split_mesh(const LabelledMesh& mesh, RobotId robot, RobotId anchor, co
   blank.anchor = anchor;
   blank.step_m = static_cast<float>(grid.step_m);
   return Splitter(mesh, blank, grid, origin).split();
-}
-
-const MeshKeyframe& middle_keyframe(const MeshChunk& chunk) {
-  std::vector<std::size_t> middles;
-  for (const auto& [first, last] : chunk.views)
-    middles.push_back((std::size_t{first} + last) / 2 / kViewsPerKeyframe);
-  const auto middle = middles.begin() + static_cast<std::ptrdiff_t>(middles.size() / 2);
-  std::ranges::nth_element(middles, middle);
-  return chunk.keyframes[*middle];
 }
 
 std::vector<MeshCells::Cell> occupied_cells(const LabelledMesh& mesh, double cell_m) {

@@ -4,7 +4,6 @@
 #include <compare>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -12,7 +11,6 @@
 #include "modules/core/keyframe.hpp"
 #include "modules/core/label_palette.hpp"
 #include "modules/core/mesh_cells.hpp"
-#include "modules/core/surface_keyframe.hpp"
 #include "modules/mesh/labelled_mesh.hpp"
 #include "modules/mesh/mesh_origin.hpp"
 #include "modules/mesh/mesh_poses.hpp"
@@ -55,8 +53,6 @@ struct MeshChunk {
   std::vector<std::array<View, 2>> views = {};
   /// MapMesh::certainty of each vertex, at most kMaxCertainty; empty without `keyframes`.
   std::vector<std::uint8_t> certainty = {};
-  /// Odometry of middle_keyframe(); absent without `map.surface_ties`.
-  std::optional<OdometryPose> odometry = {};
 
   [[nodiscard]] bool empty() const { return faces.empty(); }
   bool operator==(const MeshChunk&) const = default;
@@ -74,14 +70,11 @@ inline constexpr std::size_t kMaxChunkKeyframes = 256 / kViewsPerKeyframe;
 /// Largest MeshChunk::certainty, so that weights of 2^certainty can be added.
 inline constexpr std::uint8_t kMaxCertainty = 31;
 
-/// Bytes of MeshChunk::odometry on the wire, with padding.
-inline constexpr std::size_t kChunkOdometryBytes = kSurfaceKeyframeBytes;
-
 /// Bytes of all fields of a chunk that are not sequences, with its envelope and padding: an upper
 /// bound.
 inline constexpr std::size_t kChunkFixedBytes = 116;
 
-/// Bytes of a chunk that is not packed, without keyframes and odometry.
+/// Bytes of a chunk that is not packed, without keyframes.
 [[nodiscard]] constexpr std::size_t plain_bytes(std::size_t vertices, std::size_t faces,
                                                 bool labelled) {
   return kChunkFixedBytes + (labelled ? 7 : 6) * vertices + 6 * faces;
@@ -89,7 +82,7 @@ inline constexpr std::size_t kChunkFixedBytes = 116;
 [[nodiscard]] inline std::size_t plain_bytes(const MeshChunk& chunk) {
   return plain_bytes(chunk.offsets.size(), chunk.faces.size(), !chunk.labels.empty()) +
          kMeshKeyframeBytes * chunk.keyframes.size() + 2 * chunk.views.size() +
-         chunk.certainty.size() + (chunk.odometry ? kChunkOdometryBytes : 0);
+         chunk.certainty.size();
 }
 
 /// The reason why `chunk` cannot be from split_mesh() (a string literal), or null. Received chunks
@@ -109,7 +102,7 @@ struct SplitMesh {
   std::size_t oversized_faces = 0;
 };
 
-/// Splits a mesh in `world` into chunks of at most kMaxChunkBytes, also with odometry. Positions
+/// Splits a mesh in `world` into chunks of at most kMaxChunkBytes. Positions
 /// err by up to half a step per axis. Colours, and vertices without faces, are dropped. A face
 /// belongs to the cell of its centroid. An unchanged part of the mesh gives the same chunk if its
 /// vertices are in the same order; the order of faces does not matter.
@@ -125,10 +118,6 @@ struct SplitMesh {
 /// Linear except for sorting the faces of a cell.
 [[nodiscard]] SplitMesh split_mesh(const LabelledMesh& mesh, RobotId robot, RobotId anchor,
                                    const ChunkGrid& grid, const MeshOrigin* origin = nullptr);
-
-/// The keyframe in the middle of the views of a chunk: the median of its vertices. Precondition:
-/// the chunk has keyframes and vertices.
-[[nodiscard]] const MeshKeyframe& middle_keyframe(const MeshChunk& chunk);
 
 /// The cells that contain the centroid of a face, ascending. Faces that are not finite, or farther
 /// away than 2^30 cells, are left out. Precondition: corners exist.

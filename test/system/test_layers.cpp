@@ -50,7 +50,6 @@ const std::map<std::string, std::set<std::string>> kModuleUses = {
     {"map_2d", {"mesh"}},
     {"mesh_deformation", {"mesh"}},
     {"objects", {"mesh", "mesh_deformation"}},
-    {"surface_ties", {"mesh"}},
     {"view", {"images", "mesh", "objects"}},
 };
 

@@ -58,10 +58,6 @@ void MeshChunksNode::offer(RobotId anchor, std::shared_ptr<const LabelledMesh> m
   worker_.post({anchor, std::move(mesh), std::move(origin)});
 }
 
-void MeshChunksNode::learn(const OdometryPose& keyframe) {
-  worker_.post({.mesh = nullptr, .keyframe = keyframe});
-}
-
 void MeshChunksNode::start() {
   worker_.start();
   ticks_.start();
@@ -77,7 +73,6 @@ std::exception_ptr MeshChunksNode::error() const {
 }
 
 void MeshChunksNode::step(const Offer& offer, double now_s) {
-  if (offer.keyframe) keyframes_.insert_or_assign(offer.keyframe->id.index, *offer.keyframe);
   if (offer.mesh != nullptr) {
     if (newest_.mesh != nullptr) --offers_;
     newest_ = offer;
@@ -102,7 +97,6 @@ void MeshChunksNode::take(const Offer& offer) {
         << " faces are too long for map.position_step_m = " << config_.position_step_m
         << " m and are not sent";
   if (reduction_ || offer.origin == nullptr) return schedule_.update(std::move(pieces.chunks));
-  state_odometry(pieces.chunks);
   const MeshPoses poses{.robot = self_,
                         .anchor = offer.anchor,
                         .keyframes = mesh_keyframes(offer.origin->T_world_kf)};
@@ -115,13 +109,6 @@ SplitMesh MeshChunksNode::split(const Offer& offer) const {
   const ChunkGrid grid{config_.cell_m, config_.position_step_m};
   if (reduction_) return split_mesh(reduction_(*offer.mesh), self_, offer.anchor, grid);
   return split_mesh(*offer.mesh, self_, offer.anchor, grid, offer.origin.get());
-}
-
-void MeshChunksNode::state_odometry(std::vector<MeshChunk>& chunks) const {
-  for (MeshChunk& chunk : chunks) {
-    const auto keyframe = keyframes_.find(middle_keyframe(chunk).index);
-    if (keyframe != keyframes_.end()) chunk.odometry = keyframe->second;
-  }
 }
 
 // A message is sent while there is no debt. It may cause a debt.

@@ -3,7 +3,6 @@
 #include <atomic>
 #include <exception>
 #include <functional>
-#include <map>
 #include <memory>
 #include <optional>
 #include <string_view>
@@ -39,12 +38,11 @@ struct MeshChunksTopics {
 class MeshChunksNode final : public Node {
  public:
   /// A mesh in the frame `world` of the robot `anchor`, with the keyframes that saw it, if known. A
-  /// null mesh is a tick of the clock, or an own keyframe.
+  /// null mesh is a tick of the clock.
   struct Offer {
     RobotId anchor = 0;
     std::shared_ptr<const LabelledMesh> mesh;
     std::shared_ptr<const MeshOrigin> origin = {};
-    std::optional<OdometryPose> keyframe = {};
   };
 
   /// Reduces a mesh before it is sent.
@@ -59,9 +57,6 @@ class MeshChunksNode final : public Node {
   /// Only the newest mesh counts. Thread-safe; returns at once.
   void offer(RobotId anchor, std::shared_ptr<const LabelledMesh> mesh,
              std::shared_ptr<const MeshOrigin> origin = {});
-  /// An own keyframe. Chunks of meshes with an origin state the odometry of the keyframe in the
-  /// middle of their views, if it is known. Thread-safe; returns at once.
-  void learn(const OdometryPose& keyframe);
 
   std::string_view name() const override { return "mesh_chunks"; }
   void start() override;
@@ -82,7 +77,6 @@ class MeshChunksNode final : public Node {
  private:
   void take(const Offer& offer);
   [[nodiscard]] SplitMesh split(const Offer& offer) const;
-  void state_odometry(std::vector<MeshChunk>& chunks) const;
   void send(double now_s);
   void send_poses(double now_s);
 
@@ -90,7 +84,6 @@ class MeshChunksNode final : public Node {
   const RobotId self_;
   const MeshChunksTopics topics_;
   const Reduction reduction_;
-  std::map<KeyframeIndex, OdometryPose> keyframes_;
   ChunkSchedule schedule_;
   MeshPoses sent_poses_;
   std::optional<MeshPoses> waiting_poses_;

@@ -6,7 +6,6 @@
 
 #include "modules/mesh/chunk_packing.hpp"
 #include "runtime/dds/codec.hpp"
-#include "runtime/dds/wire_pose.hpp"
 
 namespace km {
 namespace {
@@ -47,12 +46,6 @@ Codec<MeshChunk>::Encoded Codec<MeshChunk>::encode(const MeshChunk& chunk) {
   wire.faces = static_cast<std::uint16_t>(chunk.faces.size());
   wire.is_labelled = !chunk.labels.empty();
   encoded.keyframes = to_wire(chunk.keyframes);
-  if (chunk.odometry)
-    encoded.keyframe.push_back(
-        {.odometry = to_wire(*chunk.odometry),
-         .T_world_kf = to_wire(
-             find_pose(chunk.keyframes, chunk.odometry->id.index).value_or(SE3::Identity()))});
-  borrow(wire.keyframe, encoded.keyframe);
   borrow(wire.keyframes, encoded.keyframes);
   borrow(wire.content, encoded.content);
   return encoded;
@@ -61,10 +54,8 @@ Codec<MeshChunk>::Encoded Codec<MeshChunk>::encode(const MeshChunk& chunk) {
 Decoded<MeshChunk> Codec<MeshChunk>::decode(const Wire& wire, const TeamPeer& writer) {
   using Result = Decoded<MeshChunk>;
   const auto content = elements_of(wire.content, kMaxBytes);
-  const auto odometry = elements_of(wire.keyframe, 1);
   const auto keyframes = elements_of(wire.keyframes, kMaxChunkKeyframes);
-  if (!content || !odometry || !keyframes)
-    return Result::refuse("elements are missing or too many");
+  if (!content || !keyframes) return Result::refuse("elements are missing or too many");
   MeshChunk chunk{.key = {writer.robot, {wire.cell.x, wire.cell.y, wire.cell.z}, wire.part},
                   .boot = writer.boot,
                   .anchor = wire.anchor,
@@ -76,10 +67,6 @@ Decoded<MeshChunk> Codec<MeshChunk>::decode(const Wire& wire, const TeamPeer& wr
                            .labelled = wire.is_labelled,
                            .seen = !chunk.keyframes.empty()};
   if (!unpack(*content, counts, chunk)) return Result::refuse("a chunk that cannot be unpacked");
-  if (!odometry->empty()) {
-    chunk.odometry = from_wire(odometry->front().odometry);
-    if (!chunk.odometry) return Result::refuse("a keyframe without a pose");
-  }
   if (const char* fault = fault_of(chunk)) return Result::refuse(fault);
   return Result::accept(std::move(chunk));
 }

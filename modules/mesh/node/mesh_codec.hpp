@@ -26,7 +26,6 @@ struct Codec<MeshChunk> {
   struct Encoded {
     Wire wire{};
     std::vector<std::uint8_t> content;
-    std::vector<km_wire_SurfaceKeyframe> keyframe;
     std::vector<km_wire_MeshKeyframe> keyframes;
   };
   static MessageKey key_of(const MeshChunk& chunk);

@@ -16,7 +16,6 @@
 #include "modules/mesh/node/mesh_codec.hpp"
 #include "modules/mesh/team_mesh.hpp"
 #include "runtime/dds/envelope.hpp"
-#include "runtime/dds/wire_pose.hpp"
 #include "test/modules/mesh/wavy_sheet.hpp"
 #include "test/runtime/dds/dds_fixture.hpp"
 #include "test/support/corrupted_message.hpp"
@@ -142,27 +141,6 @@ struct TwoViews {
   MeshOrigin origin;
 };
 
-TEST_CASE("A chunk states the odometry of the keyframe in the middle of its views", "[node]") {
-  SentMesh out;
-  MeshChunksNode node(MapSharingConfig(), 7, out.topics());
-  for (std::uint32_t i = 0; i < 13; ++i)
-    node.step({.mesh = nullptr,
-               .keyframe = OdometryPose{{7, i},
-                                        make_pose(Eigen::Matrix3d::Identity(), {1.0 * i, 0, 0}),
-                                        Matrix6::Identity()}},
-              0.0);
-  node.step(TwoViews().offer(), 0.0);
-  REQUIRE(out.chunks.messages().size() > 1);
-  for (const MeshChunk& chunk : out.chunks.messages()) {
-    CHECK(fault_of(chunk) == nullptr);
-    REQUIRE(chunk.odometry);
-    const KeyframeIndex expected = chunk.key.cell[0] < 0 ? 0 : 12;
-    CHECK(chunk.odometry->id == KeyframeId{7, expected});
-    CHECK(chunk.odometry->T_odom_kf.translation().x() == Approx(expected));
-    CHECK(find_pose(chunk.keyframes, expected)->translation().x() == Approx(2.0 * expected));
-  }
-}
-
 TEST_CASE("Poses take at most a tenth of the bytes, and the newest are sent last", "[node]") {
   SentMesh out;
   MapSharingConfig config;
@@ -273,14 +251,12 @@ MeshChunk some_chunk() {
   return split_mesh(wavy_sheet(20, 0.1), 700, 3, {}).chunks.at(1);
 }
 
-// States 5 keyframes, all vertices seen from the first to the last, and odometry.
+// States 5 keyframes, all vertices seen from the first to the last.
 void state_keyframes(MeshChunk& chunk) {
   chunk.keyframes = mesh_keyframes(
       std::vector<SE3>(20, make_pose(so3_exp({0.1, 0.2, 0.3}), {1.5, -2.25, 300.0})));
   chunk.views.assign(chunk.offsets.size(), {0, 16});
   chunk.certainty.assign(chunk.offsets.size(), 7);
-  chunk.odometry = {
-      {chunk.key.robot, 8}, make_pose(so3_exp({0.1, 0.2, 0.3}), {1, 2, 3}), Matrix6::Identity()};
 }
 
 Arrived<MeshChunk> received(const MeshChunk& chunk) {
@@ -299,10 +275,6 @@ TEST_CASE("A mesh chunk is equal after encoding and decoding", "[codec]") {
   SECTION("with keyframes") {
     state_keyframes(chunk);
   }
-  SECTION("with keyframes, without odometry") {
-    state_keyframes(chunk);
-    chunk.odometry.reset();
-  }
   SECTION("far away") {
     chunk.origin = {-(1 << 30), 1 << 30, 0};
   }
@@ -310,7 +282,6 @@ TEST_CASE("A mesh chunk is equal after encoding and decoding", "[codec]") {
   const Decoded<MeshChunk> result = decoded(encoded);
   REQUIRE(result.value);
   chunk.boot = 12345;
-  if (chunk.odometry) chunk.odometry = from_wire(to_wire(*chunk.odometry));
   CHECK(*result.value == chunk);
 }
 
@@ -322,9 +293,8 @@ TEST_CASE("The largest chunk is equal after encoding and decoding", "[codec]") {
     origin.seen_by.push_back({4 * v % 252, 4 * v % 252});
   const SplitMesh pieces = split_mesh(mesh, 1, 1, {}, &origin);
   std::size_t largest = 0;
-  for (MeshChunk chunk : pieces.chunks) {
+  for (const MeshChunk& chunk : pieces.chunks) {
     CHECK(chunk.keyframes.size() <= 63);
-    chunk.odometry = {{1, chunk.keyframes.back().index}, SE3::Identity(), Matrix6::Identity()};
     largest = std::max(largest, plain_bytes(chunk));
     CHECK(decoded(received(chunk)).value);
   }
@@ -357,25 +327,13 @@ TEST_CASE("An impossible mesh chunk is refused", "[codec]") {
        {"content that is not empty for no vertices", unpacked,
         [](auto& m) { m.wire.vertices = m.wire.faces = 0; }},
        {"labels that are not stated", unpacked, [](auto& m) { m.wire.is_labelled = false; }},
-       {"views of no keyframes", unpacked,
-        [](auto& m) {
-          m.wire.keyframes._length = 0;
-          m.wire.keyframe._length = 0;
-        }},
+       {"views of no keyframes", unpacked, [](auto& m) { m.wire.keyframes._length = 0; }},
        {"more content than a chunk has", unpacked, changed([](MeshChunk& large) {
           large.faces.resize(6000, {0, 1, 2});
         })},
        {"too large", "a chunk that is too large", changed([](MeshChunk& large) {
           large.faces.resize((kMaxChunkBytes - 10 * large.offsets.size()) / 6, {0, 1, 2});
         })},
-       {"two keyframes", missing, [](auto& m) { m.wire.keyframe._length = 2; }},
-       {"a keyframe of another robot", "a keyframe of another robot",
-        [](auto& m) { ++m.keyframe.front().odometry.keyframe.robot; }},
-       {"a keyframe without a pose", "a keyframe without a pose",
-        [](auto& m) { m.keyframe.front().odometry.q[0] = 7.0F; }},
-       {"odometry of a keyframe that is not listed",
-        "odometry of a keyframe that does not move the chunk",
-        [](auto& m) { ++m.keyframe.front().odometry.keyframe.index; }},
        {"keyframes not there", missing, [](auto& m) { m.wire.keyframes._buffer = nullptr; }},
        {"keyframes without end", missing, [](auto& m) { m.wire.keyframes._length = 65; }},
        {"a view after the last keyframe", "a view between keyframes which do not exist",
