@@ -378,7 +378,6 @@ void Robot::add_network(CrossingEnds meshes) {
                overlay_->guard_packets<OverlayLane::kPlaces>());
   dds.exchange(t.chunks, kState, kMap, meshes);
   dds.exchange(t.mesh_poses, kState, kMap, meshes);
-  dds.exchange(t.gone_surface, kState, kMap, meshes);
   const bool has_objects = objects_ != nullptr;
   dds.exchange(t.objects, kState, kMap, {.send = has_objects, .receive = has_objects});
   dds.exchange(t.status, kStatus, kOther);

@@ -130,8 +130,6 @@ struct Topics {
   Topic<MeshPoses> sent_mesh_poses;
   Crossing<MeshChunk> chunks;
   Crossing<MeshPoses> mesh_poses;
-  Topic<GoneSurface> sent_gone;
-  Crossing<GoneSurface> gone_surface;
   Topic<RobotObjects> sent_objects;  // to the other robots and to the search for places
   Crossing<RobotObjects> objects;
   Crossing<RobotStatus> status;
@@ -167,14 +165,13 @@ class Robot {
   [[nodiscard]] MeshFilesNode* mesh_files() { return mesh_files_; }
   /// Null unless the robots share their map.
   [[nodiscard]] const TeamMapNode* team_map() const { return team_map_; }
-  /// True unless the robot has yet to send a part of its mesh, or to lay received ones on its own.
-  /// Comparisons with its views and objects count too. Thread-safe.
+  /// True unless the robot has yet to send a part of its mesh, or to compare received objects with
+  /// its own. Thread-safe.
   [[nodiscard]] bool has_shared_map() const {
     if (constellations_ != nullptr &&
         !(mesh_deformation_->is_current() && constellations_->is_done()))
       return false;
-    return chunks_ == nullptr ||
-           (mesh_deformation_->is_current() && chunks_->is_done() && team_map_->is_done());
+    return chunks_ == nullptr || (mesh_deformation_->is_current() && chunks_->is_done());
   }
   /// Null without labels.
   [[nodiscard]] ObjectsNode* objects() { return objects_; }

@@ -79,22 +79,16 @@ CrossingEnds Robot::share_meshes(const RobotConfig& robot, const LabelPalette& p
   if (config.team == TeamMapMode::kOff) return {.send = false, .receive = false};
   const bool coarse = config.team == TeamMapMode::kCoarse;
   const double voxel_m = coarse ? config.coarse_voxel_m : robot.semantic_mapping.voxel_size_m;
-  team_map_ = &add<TeamMapNode>(
-      false, TeamMapSettings{identity_.robot, voxel_m, robot.mesh_deformation.seen_through_views},
-      palette,
-      TeamMapTopics{.own_chunks = topics_.sent_chunks,
-                    .received_chunks = topics_.chunks.from_peers(),
-                    .own_poses = topics_.sent_mesh_poses,
-                    .received_poses = topics_.mesh_poses.from_peers(),
-                    .own_gone = topics_.sent_gone,
-                    .received_gone = topics_.gone_surface.from_peers()});
+  team_map_ = &add<TeamMapNode>(false, voxel_m, palette,
+                                TeamMapTopics{.own_chunks = topics_.sent_chunks,
+                                              .received_chunks = topics_.chunks.from_peers(),
+                                              .own_poses = topics_.sent_mesh_poses,
+                                              .received_poses = topics_.mesh_poses.from_peers()});
   if (mesh_deformation_ == nullptr) return {.send = false, .receive = true};
   topics_.sent_chunks.subscribe(
       [to_peers = topics_.chunks.to_peers()](const auto& chunk) { to_peers.publish(chunk); });
   topics_.sent_mesh_poses.subscribe(
       [to_peers = topics_.mesh_poses.to_peers()](const auto& poses) { to_peers.publish(poses); });
-  topics_.sent_gone.subscribe(
-      [to_peers = topics_.gone_surface.to_peers()](const auto& gone) { to_peers.publish(gone); });
   MeshChunksNode::Reduction reduction;
   if (coarse) reduction = [voxel_m](const LabelledMesh& mesh) { return resampled(mesh, voxel_m); };
   chunks_ = &add<MeshChunksNode>(false, config, identity_.robot,
@@ -106,11 +100,6 @@ CrossingEnds Robot::share_meshes(const RobotConfig& robot, const LabelPalette& p
     if (phase_ == RobotPhase::kLeaving) return;
     chunks_->offer(optimized->anchor, {optimized, &optimized->mesh},
                    {optimized, &optimized->origin});
-    team_map_->offer(std::make_shared<const OwnViews>(
-        OwnViews{.anchor = optimized->anchor,
-                 .views = optimized->views,
-                 .T_world_odom = optimized->T_world_odom,
-                 .covariances = optimized->trajectory->covariances}));
   });
   return {};
 }

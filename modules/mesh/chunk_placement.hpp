@@ -14,13 +14,6 @@ struct PlacedChunk {
   const MeshChunk* chunk = nullptr;
   RobotId anchor = 0;                     ///< Robot whose odometry frame is `world`.
   std::vector<Eigen::Vector3f> vertices;  ///< [m] in `world`.
-  /// For each vertex, whether another robot states that it is gone (GoneSurface); empty: none is.
-  std::vector<bool> gone = {};
-
-  /// True if at least two corners of a face are gone.
-  [[nodiscard]] bool is_gone(const MeshChunk::Triple& face) const {
-    return !gone.empty() && gone[face[0]] + gone[face[1]] + gone[face[2]] >= 2;
-  }
 };
 
 /// Places a chunk with the present poses of its robot's keyframes. A vertex moves with the

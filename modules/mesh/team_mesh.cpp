@@ -36,13 +36,6 @@ ChunkVerdict TeamMesh::add(MeshPoses poses) {
   return ChunkVerdict::kTaken;
 }
 
-ChunkVerdict TeamMesh::add(GoneSurface gone) {
-  Robot* const robot = robot_of(gone.robot, gone.boot);
-  if (robot == nullptr) return ChunkVerdict::kEarlierBoot;
-  robot->gone = std::move(gone);
-  return ChunkVerdict::kTaken;
-}
-
 ChunkVerdict TeamMesh::add(MeshChunk chunk) {
   Robot* const sender = robot_of(chunk.key.robot, chunk.boot);
   if (sender == nullptr) return ChunkVerdict::kEarlierBoot;
@@ -69,26 +62,8 @@ std::vector<PlacedChunk> TeamMesh::placed() const {
   std::vector<PlacedChunk> all;
   for (const auto& [id, robot] : robots_)
     for (const auto& [key, chunk] : robot.chunks)
-      mark_gone(all.emplace_back(place(chunk, robot.poses ? &*robot.poses : nullptr)));
+      all.push_back(place(chunk, robot.poses ? &*robot.poses : nullptr));
   return all;
-}
-
-std::vector<PlacedChunk> TeamMesh::placed_of_peers(RobotId self) const {
-  std::vector<PlacedChunk> all;
-  for (const auto& [id, robot] : robots_)
-    for (const auto& [key, chunk] : robot.chunks)
-      if (id != self) all.push_back(place(chunk, robot.poses ? &*robot.poses : nullptr));
-  return all;
-}
-
-void TeamMesh::mark_gone(PlacedChunk& chunk) const {
-  const RobotId owner = chunk.chunk->key.robot;
-  for (const auto& [id, robot] : robots_) {
-    if (id == owner || robot.gone.anchor != chunk.anchor || robot.gone.blocks.empty()) continue;
-    chunk.gone.resize(chunk.vertices.size(), false);
-    for (std::size_t v = 0; v < chunk.vertices.size(); ++v)
-      if (is_gone(robot.gone, owner, chunk.vertices[v])) chunk.gone[v] = true;
-  }
 }
 
 std::vector<RobotMesh> TeamMesh::snapshot() const {

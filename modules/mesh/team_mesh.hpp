@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "modules/mesh/chunk_placement.hpp"
-#include "modules/mesh/gone_surface.hpp"
 #include "modules/mesh/labelled_mesh.hpp"
 #include "modules/mesh/mesh_chunks.hpp"
 #include "modules/mesh/mesh_poses.hpp"
@@ -50,16 +49,8 @@ class TeamMesh {
   /// Takes the poses that place the chunks of a robot, before or after them. Never kNoRoom.
   ChunkVerdict add(MeshPoses poses);
 
-  /// Takes the surface of other robots that a robot saw through. Never kNoRoom.
-  ChunkVerdict add(GoneSurface gone);
-
-  /// All chunks, by their keys, where the newest poses place them, with the vertices that other
-  /// robots state to be gone. Valid until the next add().
+  /// All chunks, by their keys, where the newest poses place them. Valid until the next add().
   [[nodiscard]] std::vector<PlacedChunk> placed() const;
-
-  /// The chunks of all robots except for `self`, by their keys, where the newest poses place them.
-  /// Valid until the next add().
-  [[nodiscard]] std::vector<PlacedChunk> placed_of_peers(RobotId self) const;
 
   /// One mesh per robot, by ascending id, of the chunks as they were sent.
   [[nodiscard]] std::vector<RobotMesh> snapshot() const;
@@ -71,11 +62,9 @@ class TeamMesh {
     RobotId anchor = 0;  // anchor of the newest chunk
     float step_m = 0.0F;
     std::optional<MeshPoses> poses = {};
-    GoneSurface gone = {};
     std::map<MeshChunkKey, MeshChunk> chunks = {};
     std::size_t bytes = 0;
   };
-  void mark_gone(PlacedChunk& chunk) const;
   // The robot after a message of its boot `boot`; null for a message of an earlier boot.
   [[nodiscard]] Robot* robot_of(RobotId id, std::uint64_t boot);
 

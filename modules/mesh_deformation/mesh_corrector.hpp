@@ -112,8 +112,6 @@ struct OptimizedMesh {
   /// T_world_kf * T_odom_kf^-1 of the poses in `origin`: where the correction moved what they saw.
   std::vector<SE3> T_world_odom = {};
   MeshOrigin origin = {};  ///< Keyframes that saw the mesh.
-  /// Views of the map, in the odometry frame.
-  std::vector<std::shared_ptr<const CoarseView>> views = {};
 };
 
 }  // namespace km

@@ -58,7 +58,6 @@ void enter(const PlacedChunk& chunk, const SurfaceFusion& fusion, ChunksOfBoxes&
   std::pair<Box, Box> last;
   bool is_first = true;
   for (const MeshChunk::Triple& face : chunk.chunk->faces) {
-    if (chunk.is_gone(face)) continue;
     const Eigen::AlignedBox3f bounds = bounds_of(corners_of(chunk, face), fusion.reach_m());
     if (is_left_out(bounds, fusion)) continue;
     const std::pair<Box, Box> range{fusion.box_of(bounds.min()), fusion.box_of(bounds.max())};
@@ -87,7 +86,6 @@ std::vector<RobotSurface> surfaces_near(const Box& box,
     if (surfaces.empty() || surfaces.back().robot != chunk.key.robot)
       surfaces.push_back({.robot = chunk.key.robot, .triangles = {}});
     for (const MeshChunk::Triple& face : chunk.faces) {
-      if (placed->is_gone(face)) continue;
       const auto corners = corners_of(*placed, face);
       const Eigen::AlignedBox3f bounds = bounds_of(corners, fusion.reach_m());
       if (space.intersects(bounds) && !is_left_out(bounds, fusion))

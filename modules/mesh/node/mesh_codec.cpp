@@ -91,34 +91,4 @@ Decoded<MeshPoses> Codec<MeshPoses>::decode(const Wire& wire, const TeamPeer& wr
   return Result::accept(std::move(poses));
 }
 
-Codec<GoneSurface>::Encoded Codec<GoneSurface>::encode(const GoneSurface& gone) {
-  Encoded encoded;
-  for (const GoneBlock& block : gone.blocks) {
-    km_wire_GoneBlock& wire = encoded.blocks.emplace_back();
-    wire.owner = block.owner;
-    std::ranges::copy(block.block, wire.block);
-    std::ranges::copy(block.cells, wire.cells);
-  }
-  encoded.wire.anchor = gone.anchor;
-  encoded.wire.cell_m = gone.cell_m;
-  borrow(encoded.wire.blocks, encoded.blocks);
-  return encoded;
-}
-
-Decoded<GoneSurface> Codec<GoneSurface>::decode(const Wire& wire, const TeamPeer& writer) {
-  using Result = Decoded<GoneSurface>;
-  const auto blocks = elements_of(wire.blocks, kMaxGoneBlocks);
-  if (!blocks) return Result::refuse("elements are missing or too many");
-  GoneSurface gone{
-      .robot = writer.robot, .boot = writer.boot, .anchor = wire.anchor, .cell_m = wire.cell_m};
-  for (const km_wire_GoneBlock& block : *blocks) {
-    GoneBlock& read = gone.blocks.emplace_back();
-    read.owner = block.owner;
-    std::ranges::copy(block.block, read.block.begin());
-    std::ranges::copy(block.cells, read.cells.begin());
-  }
-  if (const char* fault = fault_of(gone)) return Result::refuse(fault);
-  return Result::accept(std::move(gone));
-}
-
 }  // namespace km

@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <vector>
 
-#include "modules/mesh/gone_surface.hpp"
 #include "modules/mesh/mesh_chunks.hpp"
 #include "modules/mesh/mesh_poses.hpp"
 #include "runtime/dds/codec.hpp"
@@ -50,24 +49,6 @@ struct Codec<MeshPoses> {
   static MessageKey key_of(const MeshPoses& /*poses*/) { return message_key({}); }
   static Encoded encode(const MeshPoses& poses);
   static Decoded<MeshPoses> decode(const Wire& wire, const TeamPeer& writer);
-};
-
-/// A robot states only what it saw itself. A message is refused under the conditions of fault_of().
-template <>
-struct Codec<GoneSurface> {
-  using Wire = km_wire_GoneSurface;
-  static constexpr const char* kTopic = "gone_surface";
-  static constexpr std::uint16_t kVersion = 1;
-  static constexpr std::size_t kMaxBytes = 128 + kGoneBlockBytes * kMaxGoneBlocks;
-  static const dds_topic_descriptor_t& descriptor() { return km_wire_GoneSurface_desc; }
-
-  struct Encoded {
-    Wire wire{};
-    std::vector<km_wire_GoneBlock> blocks;
-  };
-  static MessageKey key_of(const GoneSurface& /*gone*/) { return message_key({}); }
-  static Encoded encode(const GoneSurface& gone);
-  static Decoded<GoneSurface> decode(const Wire& wire, const TeamPeer& writer);
 };
 
 }  // namespace km

@@ -159,8 +159,7 @@ void MeshDeformationNode::correct() {
                        correction->superseded_faces,
                        correction->seen_through,
                        {},
-                       std::move(correction->origin),
-                       map_->views};
+                       std::move(correction->origin)};
   for (std::size_t k = 0; k < result.origin.T_world_kf.size(); ++k)
     result.T_world_odom.push_back(result.origin.T_world_kf[k] * T_odom_kf_[k].inverse());
   if (!correction->superseded.vertices.empty())

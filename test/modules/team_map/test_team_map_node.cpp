@@ -27,17 +27,13 @@ struct Mapper {
   Mapper(const std::shared_ptr<const DdsDomain>& domain, RobotId robot)
       : basis(domain, robot),
         sender(fast(), robot, {sent, sent_poses}),
-        map({robot, kNodeVoxel_m}, {},
+        map(kNodeVoxel_m, {},
             {.own_chunks = sent,
              .received_chunks = chunks.from_peers(),
              .own_poses = sent_poses,
-             .received_poses = poses.from_peers(),
-             .own_gone = sent_gone,
-             .received_gone = gone.from_peers()}) {
+             .received_poses = poses.from_peers()}) {
     basis.bridge.exchange(chunks, TopicKind::kState, TrafficCategory::kMap);
     basis.bridge.exchange(poses, TopicKind::kState, TrafficCategory::kMap);
-    basis.bridge.exchange(gone, TopicKind::kState, TrafficCategory::kMap);
-    sent_gone.subscribe([this](const auto& seen) { gone.to_peers().publish(seen); });
     sent.subscribe([this](const auto& chunk) { chunks.to_peers().publish(chunk); });
     sent_poses.subscribe([this](const auto& newest) { poses.to_peers().publish(newest); });
     map.start();
@@ -76,8 +72,6 @@ struct Mapper {
   Topic<MeshPoses> sent_poses;
   Crossing<MeshChunk> chunks;
   Crossing<MeshPoses> poses;
-  Topic<GoneSurface> sent_gone;
-  Crossing<GoneSurface> gone;
   TestRobot basis;
   MeshChunksNode sender;
   TeamMapNode map;
@@ -87,22 +81,6 @@ float height_of(const LabelledMesh& mesh) {
   float highest = 0.0F;
   for (const Eigen::Vector3f& p : mesh.vertices) highest = std::max(highest, p.z());
   return highest;
-}
-
-// Views of keyframes 0 to `count` - 1, which look down from 3.5 m to a plane 2 m below the origin.
-std::shared_ptr<const OwnViews> views_from_above(KeyframeIndex count) {
-  const Camera camera{.width = 80, .height = 60, .fx = 60.0, .fy = 60.0, .cx = 39.5, .cy = 29.5};
-  CoarseViews views(camera, {}, 0.3);
-  OwnViews own{.anchor = 0};
-  const Eigen::Matrix3d down = Eigen::Vector3d(1.0, -1.0, -1.0).asDiagonal();
-  for (KeyframeIndex k = 0; k < count; ++k) {
-    views.add({80, 60, std::vector<std::uint16_t>(80 * 60, 5500)},
-              make_pose(down, {k % 2 == 0 ? 0.0 : 0.4, 0.0, 3.5}), k);
-    own.T_world_odom.push_back(SE3::Identity());
-    own.covariances.emplace_back(Matrix6::Zero());
-  }
-  own.views = views.views();
-  return std::make_shared<const OwnViews>(std::move(own));
 }
 
 bool have_one_map(Mapper& a, Mapper& b) {
@@ -134,25 +112,6 @@ TEST_CASE("Robots have the same map of their team, also those that join later", 
   CHECK(have_one_map(a, b));
   CHECK(have_one_map(a, late));
   CHECK(height_of(late.map.fuse().mesh) > 1.5F);
-}
-
-TEST_CASE("Robots have the same map after one sees through the surface of the other",
-          "[node][dds]") {
-  const auto domain = std::make_shared<const DdsDomain>(loopback_config());
-  Mapper a(domain, 3), b(domain, 4);
-  REQUIRE(b.basis.receives(PeerEventKind::kJoined, 3));
-  a.offer(0.0F, 0.0F);
-  REQUIRE(eventually([&] { return a.sender.is_done() && !b.map.fuse().mesh.empty(); }));
-  const auto faces = [&] { return a.map.fuse().mesh.faces.size(); };
-  const std::size_t before = faces();
-  b.map.offer(views_from_above(1));  // older than the arrival of the surface, as far as b knows
-  b.map.offer(views_from_above(5));
-  REQUIRE(eventually([&] { return b.map.is_done(); }));
-  CHECK(eventually([&] { return faces() < before - 1000; }));
-  CHECK(have_one_map(a, b));
-  Mapper late(domain, 5);
-  CHECK(have_one_map(a, late));
-  CHECK(faces() > 0);  // surface outside the views
 }
 
 }  // namespace km
