@@ -4,7 +4,7 @@
 #include "modules/core/write_file.hpp"
 #include "modules/map_2d/map_2d.hpp"
 #include "modules/map_2d/map_server_files.hpp"
-#include "modules/mesh/ply_file.hpp"
+#include "modules/mesh/mesh_file.hpp"
 #include "modules/objects/object_file.hpp"
 #include "runtime/log.hpp"
 
@@ -43,7 +43,7 @@ void write_team_map(const fs::path& folder, const Map2dConfig& config, const Tea
                     ResultWriter& results) {
   log::info("robot") << "fusing the map of the team";
   const TeamMap map = node.fuse();
-  results.write(folder / kTeamMesh, [&](const auto& file) { write_ply(file, map.mesh); });
+  results.write(folder / kTeamMesh, [&](const auto& file) { write_mesh(file, map.mesh); });
   if (config.enabled) write_team_map_2d(folder, config, map, node.palette(), results);
   log::info("robot") << "map of the team: " << map.mesh.faces.size()
                      << " faces, in the frame of robot " << map.anchor;

@@ -5,7 +5,7 @@
 #include "apps/result_files.hpp"
 #include "apps/robot/map_results.hpp"
 #include "modules/mesh/map_file.hpp"
-#include "modules/mesh/ply_file.hpp"
+#include "modules/mesh/mesh_file.hpp"
 #include "runtime/thread.hpp"
 
 namespace km {
@@ -64,7 +64,7 @@ void MeshFilesNode::step(const MapMesh& map) {
 
 void MeshFilesNode::step(const OptimizedMesh& mesh) {
   results_.write(folder_ / "mesh_optimized.ply",
-                 [&mesh](const auto& file) { write_ply(file, mesh.mesh); });
+                 [&mesh](const auto& file) { write_mesh(file, mesh.mesh); });
 }
 
 void MeshFilesNode::step(const OccupancyGrid& map) {
@@ -73,7 +73,7 @@ void MeshFilesNode::step(const OccupancyGrid& map) {
 
 void MeshFilesNode::step(const DistanceSlice& slice) {
   results_.write(folder_ / kDistanceSlice,
-                 [&slice](const auto& file) { write_ply(file, slice.points); });
+                 [&slice](const auto& file) { write_mesh(file, slice.points); });
 }
 
 void MeshFilesNode::finish(const std::optional<Trajectory>& trajectory) {
@@ -84,7 +84,7 @@ void MeshFilesNode::finish(const std::optional<Trajectory>& trajectory) {
 void MeshFilesNode::write_map(const LabelledMesh& map) {
   LabelledMesh mesh = map;
   if (T_world_first_ && T_odom_first_) mesh.transform(*T_world_first_ * T_odom_first_->inverse());
-  results_.write(folder_ / "mesh.ply", [&mesh](const auto& file) { write_ply(file, mesh); });
+  results_.write(folder_ / "mesh.ply", [&mesh](const auto& file) { write_mesh(file, mesh); });
 }
 
 }  // namespace km

@@ -14,7 +14,7 @@
 #include "apps/team/team_report.hpp"
 #include "apps/team/team_results.hpp"
 #include "modules/core/write_file.hpp"
-#include "modules/mesh/ply_file.hpp"
+#include "modules/mesh/mesh_file.hpp"
 #include "runtime/dds/dds_config.hpp"
 #include "runtime/dds/domain_draw.hpp"
 #include "runtime/unblocked_output.hpp"
@@ -218,7 +218,7 @@ void write_results(const TeamOptions& options, const km::TeamPlan& plan, const k
                   });
   if (!team.meshes.merged.empty())
     results.write(plan.output / km::kTeamMesh, [&](const fs::path& file) {
-      km::write_ply(file, team.meshes.merged);
+      km::write_mesh(file, team.meshes.merged);
       copy_palette(plan);
       out << "The mesh of all robots" << (team.optimized ? ", in the frame of the truth: " : ": ")
           << file.string() << '\n';

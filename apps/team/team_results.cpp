@@ -11,7 +11,7 @@
 
 #include "modules/core/input_file.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
-#include "modules/mesh/ply_file.hpp"
+#include "modules/mesh/mesh_file.hpp"
 #include "modules/sensors/node/euroc_rig.hpp"
 #include "modules/sensors/node/open_folder.hpp"
 
@@ -39,7 +39,7 @@ Meshes read_meshes(const TeamPlan& plan, const char* file, std::vector<std::stri
   for (const RobotPlan& robot : plan.robots) {
     const fs::path path = plan.output / robot.name / file;
     if (!is_there(path)) continue;
-    auto mesh = attempt(notes, [&] { return read_ply(path); });
+    auto mesh = attempt(notes, [&] { return read_mesh(path); });
     if (mesh && mesh->faces.empty())
       notes.push_back(path.string() + ": the mesh is empty");
     else if (mesh)
@@ -290,7 +290,7 @@ TeamMeshes collect_meshes(const TeamPlan& plan, const SE3& T_truth_team,
   result.merged.transform(T_truth_team);
   if (plan.truth_mesh.empty() || before.empty()) return result;
   std::cerr << "comparing the meshes with " << plan.truth_mesh.string() << " ...\n";
-  const auto truth = attempt(notes, [&] { return read_ply(plan.truth_mesh); });
+  const auto truth = attempt(notes, [&] { return read_mesh(plan.truth_mesh); });
   if (!truth) return result;
   result.errors = compare(*truth, std::move(before), std::move(after), T_truth_team, notes);
   return result;

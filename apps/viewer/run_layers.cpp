@@ -9,7 +9,7 @@
 #include "apps/result_files.hpp"
 #include "apps/viewer/optional_file.hpp"
 #include "modules/map_2d/map_server_files.hpp"
-#include "modules/mesh/ply_file.hpp"
+#include "modules/mesh/mesh_file.hpp"
 #include "modules/objects/object_file.hpp"
 
 namespace km {
@@ -52,7 +52,7 @@ std::vector<ViewContent> read_layers(const fs::path& folder, RobotId robot, Robo
   };
   add(kObjectsFile, [](const fs::path& file) { return view_objects(read_object_list(file)); });
   add(kMap2d, [&](const fs::path& file) { return view_raster(read_map_2d(file, anchor)); });
-  add(kDistanceSlice, [&](const fs::path& file) { return view_raster(read_ply(file), robot); });
+  add(kDistanceSlice, [&](const fs::path& file) { return view_raster(read_mesh(file), robot); });
   return layers;
 }
 
@@ -60,7 +60,7 @@ std::vector<MeshChunk> read_team_mesh(const fs::path& folder, RobotId robot, Rob
                                       std::vector<std::string>& notes) {
   const auto other = static_cast<RobotId>(robot ^ 1U);
   return read_if_there(folder / kTeamMesh, notes, [&](const fs::path& file) {
-    return split_mesh(read_ply(file), other, anchor, ChunkGrid{}).chunks;
+    return split_mesh(read_mesh(file), other, anchor, ChunkGrid{}).chunks;
   });
 }
 

@@ -15,7 +15,7 @@
 #include "modules/journal/restored_run.hpp"
 #include "modules/mesh/map_file.hpp"
 #include "modules/mesh/mesh_chunks.hpp"
-#include "modules/mesh/ply_file.hpp"
+#include "modules/mesh/mesh_file.hpp"
 #include "modules/view/view_selector.hpp"
 
 namespace km {
@@ -170,7 +170,7 @@ RunPlayback read_run(const fs::path& folder, Stamp begin) {
     RobotPlayback robot = read_robot(one, run.notes);
     if (robot.is_empty()) continue;
     const auto map = read_if_there(one / kMapFile, run.notes, read_map_file);
-    const auto optimized = read_if_there(one / "mesh_optimized.ply", run.notes, read_ply);
+    const auto optimized = read_if_there(one / "mesh_optimized.ply", run.notes, read_mesh);
     for (ViewContent& layer : read_layers(one, robot.robot(), robot.anchor(), run.notes))
       robot.add_at_end(std::move(layer));
     if (!fused.contains(robot.anchor()))
