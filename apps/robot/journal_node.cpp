@@ -34,9 +34,7 @@ JournalNode::JournalNode(std::filesystem::path file, ResultWriter& results,
           [this](const Input& input) {
             std::visit([this](const auto& message) { step(message); }, input);
           },
-          "journal"),
-      ticks_(
-          kSyncPeriod, [this] { worker_.post(Tick()); }, "journal tick") {
+          "journal", kSyncPeriod, [] { return Tick(); }) {
   if (restored != nullptr) {
     for (const Closure& closure : restored->closures)
       known_closures_.emplace(closure.from.id, closure.to.id);
@@ -62,19 +60,9 @@ JournalNode::JournalNode(std::filesystem::path file, ResultWriter& results,
   });
 }
 
-void JournalNode::start() {
-  worker_.start();
-  ticks_.start();
-}
-
 void JournalNode::stop() noexcept {
-  worker_.stop();  // refuses further ticks, so that none waits for room
-  ticks_.stop();
+  worker_.stop();
   if (worker_.error() == nullptr) step(Tick());
-}
-
-std::exception_ptr JournalNode::error() const {
-  return worker_.error() != nullptr ? worker_.error() : ticks_.error();
 }
 
 std::optional<JournalPlace> JournalNode::add(const JournalEntry& entry) {

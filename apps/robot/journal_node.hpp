@@ -21,9 +21,8 @@
 #include "modules/journal/restored_run.hpp"
 #include "runtime/dds/peer_table.hpp"
 #include "runtime/node.hpp"
-#include "runtime/periodic.hpp"
+#include "runtime/ticking_worker.hpp"
 #include "runtime/topic.hpp"
-#include "runtime/worker.hpp"
 
 namespace km {
 
@@ -75,10 +74,10 @@ class JournalNode final : public Node {
   [[nodiscard]] bool holds_back() const { return new_keyframes_ > 0; }
 
   std::string_view name() const override { return "journal"; }
-  void start() override;
+  void start() override { worker_.start(); }
   /// Writes the remaining entries.
   void stop() noexcept override;
-  std::exception_ptr error() const override;
+  std::exception_ptr error() const override { return worker_.error(); }
   std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
   /// Disks that spin up or wait for other requests take long.
   double step_limit_s() const override { return 120.0; }
@@ -123,8 +122,7 @@ class JournalNode final : public Node {
   mutable std::mutex mutex_;  // guards places_, and journal_ except for its write()
   std::vector<JournalPlace>
       places_;  // places of keyframes 0, 1, ..., up to the first that is not on the disk
-  Worker<Input> worker_;
-  Periodic ticks_;  // last member: stops before the worker it posts to
+  TickingWorker<Input> worker_;
 };
 
 }  // namespace km

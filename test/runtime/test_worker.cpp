@@ -1,5 +1,6 @@
 #include <pthread.h>
 #include <array>
+#include <atomic>
 #include <catch2/catch.hpp>
 #include <future>
 #include <memory>
@@ -12,6 +13,7 @@
 #include "runtime/bounded_queue.hpp"
 #include "runtime/latest.hpp"
 #include "runtime/thread.hpp"
+#include "runtime/ticking_worker.hpp"
 #include "runtime/topic.hpp"
 #include "runtime/worker.hpp"
 
@@ -28,6 +30,28 @@ TEST_CASE("A worker handles everything posted, in order, before stop returns", "
   for (int i = 0; i < 100; ++i) CHECK(handled[static_cast<std::size_t>(i)] == i);
   CHECK_FALSE(worker.post(100));
   CHECK(worker.error() == nullptr);
+}
+
+TEST_CASE("A worker with ticks stops after its clock, so that a waiting tick is handled",
+          "[worker]") {
+  std::promise<void> release;
+  const std::shared_future<void> released(release.get_future());
+  std::atomic<int> made = 0, handled = 0;
+  TickingWorker<int> worker(
+      1, Overflow::kBlock,
+      [&](int) {
+        released.wait();
+        ++handled;
+      },
+      "ticking", std::chrono::microseconds(100), [&] { return ++made; });
+  worker.start();
+  while (made < 3) std::this_thread::yield();  // one is handled, one is queued, one waits for room
+  const auto stopped = std::async(std::launch::async, [&] { worker.stop(); });
+  CHECK(stopped.wait_for(std::chrono::milliseconds(50)) == std::future_status::timeout);
+  release.set_value();
+  stopped.wait();
+  CHECK(handled == made);
+  CHECK_FALSE(worker.post(0));
 }
 
 TEST_CASE("A worker that throws keeps the exception and releases the threads that wait for it",

@@ -37,27 +37,11 @@ ConstellationsNode::ConstellationsNode(const ConstellationsConfig& config, Robot
             work_in_background();
             step(input, steady_now_s());
           },
-          ConstellationsConfig::kSection),
-      ticks_(
-          steady_duration(kMatchTick_s), [this] { worker_.post(Tick()); }, "match_tick") {
+          ConstellationsConfig::kSection, steady_duration(kMatchTick_s), [] { return Tick(); }) {
   for (const In<RobotObjects>& objects : {topics.own_objects, topics.peer_objects})
     objects.subscribe([this](const auto& message) { post(message); });
   topics.closures.subscribe([this](const auto& closure) { post(closure); });
   topics.restarts.subscribe([this](const auto& event) { post(event); });
-}
-
-void ConstellationsNode::start() {
-  worker_.start();
-  ticks_.start();
-}
-
-void ConstellationsNode::stop() noexcept {
-  ticks_.stop();
-  worker_.stop();
-}
-
-std::exception_ptr ConstellationsNode::error() const {
-  return worker_.error() != nullptr ? worker_.error() : ticks_.error();
 }
 
 void ConstellationsNode::post(Input input) {

@@ -11,9 +11,8 @@
 #include "modules/objects/map_object.hpp"
 #include "runtime/dds/peer_table.hpp"
 #include "runtime/node.hpp"
-#include "runtime/periodic.hpp"
+#include "runtime/ticking_worker.hpp"
 #include "runtime/topic.hpp"
-#include "runtime/worker.hpp"
 
 namespace km {
 
@@ -37,9 +36,9 @@ class ConstellationsNode final : public Node {
   ~ConstellationsNode() override { stop(); }
 
   std::string_view name() const override { return ConstellationsConfig::kSection; }
-  void start() override;
-  void stop() noexcept override;
-  std::exception_ptr error() const override;
+  void start() override { worker_.start(); }
+  void stop() noexcept override { worker_.stop(); }
+  std::exception_ptr error() const override { return worker_.error(); }
   std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
   DurationHistogram timing() const override { return worker_.timing(); }
 
@@ -64,8 +63,7 @@ class ConstellationsNode final : public Node {
   double next_s_ = 0.0;                                // time of the next match
   std::atomic<std::size_t> posted_ = 0, handled_ = 0;  // inputs, without ticks
   std::atomic<bool> search_done_ = true;
-  Worker<Input> worker_;
-  Periodic ticks_;  // last member: stops before the worker it posts to
+  TickingWorker<Input> worker_;
 };
 
 }  // namespace km

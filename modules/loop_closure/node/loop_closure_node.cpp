@@ -44,8 +44,7 @@ LoopClosureNode::LoopClosureNode(const LoopClosureConfig& config, RobotId self,
           [this](const Input& input) {
             std::visit([this](const auto& message) { step(message); }, input);
           },
-          "loop_closure"),
-      periodic_(kTickPeriod, [this] { worker_.post(LoopClosureTick{steady_now_s()}); }) {
+          "loop_closure", kTickPeriod, [] { return LoopClosureTick{steady_now_s()}; }) {
   const auto queue = [this](const auto& message) { worker_.post(message); };
   topics_.keyframes.subscribe(queue);
   topics_.candidates.subscribe(queue);
@@ -60,21 +59,6 @@ LoopClosureNode::LoopClosureNode(const LoopClosureConfig& config, RobotId self,
   topics_.restarts.subscribe(queue);
   topics_.restored.subscribe(queue);
   if (vocabulary_) topics_.peer_bows.subscribe(queue);
-}
-
-void LoopClosureNode::start() {
-  worker_.start();
-  periodic_.start();
-}
-
-void LoopClosureNode::stop() noexcept {
-  periodic_.stop();
-  worker_.stop();
-}
-
-std::exception_ptr LoopClosureNode::error() const {
-  const std::exception_ptr failure = worker_.error();
-  return failure ? failure : periodic_.error();
 }
 
 void LoopClosureNode::step(const std::shared_ptr<const Keyframe>& own_keyframe) {

@@ -22,9 +22,8 @@
 #include "modules/place_recognition/vocabulary.hpp"
 #include "runtime/dds/bridge.hpp"
 #include "runtime/node.hpp"
-#include "runtime/periodic.hpp"
+#include "runtime/ticking_worker.hpp"
 #include "runtime/topic.hpp"
-#include "runtime/worker.hpp"
 
 namespace km {
 
@@ -86,9 +85,9 @@ class LoopClosureNode final : public Node {
                   ReadKeyframe read_keyframe = {});
 
   std::string_view name() const override { return "loop_closure"; }
-  void start() override;
-  void stop() noexcept override;
-  std::exception_ptr error() const override;
+  void start() override { worker_.start(); }
+  void stop() noexcept override { worker_.stop(); }
+  std::exception_ptr error() const override { return worker_.error(); }
   std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
   DurationHistogram timing() const override { return worker_.timing(); }
 
@@ -161,8 +160,7 @@ class LoopClosureNode final : public Node {
   std::set<ClosureId> known_;                        // candidates and measured closures seen
   double now_s_ = 0.0;
   std::uint32_t next_request_ = 0;
-  Worker<Input> worker_;
-  Periodic periodic_;  // last member: stops first, it posts into the worker
+  TickingWorker<Input> worker_;
 };
 
 }  // namespace km

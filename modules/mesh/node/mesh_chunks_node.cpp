@@ -48,28 +48,12 @@ MeshChunksNode::MeshChunksNode(const MapSharingConfig& config, RobotId self,
       budget_bytes_(full_budget(config.max_bytes_per_s)),
       worker_(
           kQueue, Overflow::kBlock, [this](const Offer& offer) { step(offer, steady_now_s()); },
-          "mesh_chunks"),
-      ticks_(
-          steady_duration(kTick_s), [this] { worker_.post({}); }, "chunks tick") {}
+          "mesh_chunks", steady_duration(kTick_s), [] { return Offer(); }) {}
 
 void MeshChunksNode::offer(RobotId anchor, std::shared_ptr<const LabelledMesh> mesh,
                            std::shared_ptr<const MeshOrigin> origin) {
   ++offers_;
   worker_.post({anchor, std::move(mesh), std::move(origin)});
-}
-
-void MeshChunksNode::start() {
-  worker_.start();
-  ticks_.start();
-}
-
-void MeshChunksNode::stop() noexcept {
-  worker_.stop();
-  ticks_.stop();
-}
-
-std::exception_ptr MeshChunksNode::error() const {
-  return worker_.error() != nullptr ? worker_.error() : ticks_.error();
 }
 
 void MeshChunksNode::step(const Offer& offer, double now_s) {

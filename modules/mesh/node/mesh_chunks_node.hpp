@@ -15,10 +15,9 @@
 #include "modules/mesh/mesh_origin.hpp"
 #include "modules/mesh/mesh_poses.hpp"
 #include "runtime/node.hpp"
-#include "runtime/periodic.hpp"
+#include "runtime/ticking_worker.hpp"
 #include "runtime/token_bucket.hpp"
 #include "runtime/topic.hpp"
-#include "runtime/worker.hpp"
 
 namespace km {
 
@@ -59,9 +58,9 @@ class MeshChunksNode final : public Node {
              std::shared_ptr<const MeshOrigin> origin = {});
 
   std::string_view name() const override { return "mesh_chunks"; }
-  void start() override;
-  void stop() noexcept override;  ///< Drops the chunks that have not been sent.
-  std::exception_ptr error() const override;
+  void start() override { worker_.start(); }
+  void stop() noexcept override { worker_.stop(); }  ///< Drops the chunks that have not been sent.
+  std::exception_ptr error() const override { return worker_.error(); }
   std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
   DurationHistogram timing() const override { return worker_.timing(); }
 
@@ -93,8 +92,7 @@ class MeshChunksNode final : public Node {
   std::atomic<int> offers_ = 0;           // meshes that are neither split nor replaced
   Offer newest_;                          // the mesh to be split next, if any
   double next_take_s_ = 0.0;
-  Worker<Offer> worker_;
-  Periodic ticks_;  // last member: stops before the worker it posts to
+  TickingWorker<Offer> worker_;
 };
 
 }  // namespace km

@@ -45,10 +45,8 @@ MeshDeformationNode::MeshDeformationNode(const MeshDeformationConfig& config, Ro
             take_latest(now_s);
             step(input, now_s);
           },
-          MeshDeformationConfig::kSection),
-      ticks_(
-          steady_duration(config.period_s / kTicksPerPeriod), [this] { worker_.post(Tick()); },
-          "mesh tick") {
+          MeshDeformationConfig::kSection, steady_duration(config.period_s / kTicksPerPeriod),
+          [] { return Tick(); }) {
   topics.keyframes.subscribe([this](const auto& keyframe) { worker_.post(keyframe); });
   topics.maps.subscribe([this](const auto& map) {
     latest_map_.put(map);
@@ -60,11 +58,6 @@ MeshDeformationNode::MeshDeformationNode(const MeshDeformationConfig& config, Ro
   });
 }
 
-void MeshDeformationNode::start() {
-  worker_.start();
-  ticks_.start();
-}
-
 void MeshDeformationNode::finish() {
   latest_map_.close();
   latest_trajectory_.close();
@@ -74,11 +67,6 @@ void MeshDeformationNode::finish() {
 void MeshDeformationNode::stop() noexcept {
   finish();
   worker_.stop();
-  ticks_.stop();
-}
-
-std::exception_ptr MeshDeformationNode::error() const {
-  return worker_.error() != nullptr ? worker_.error() : ticks_.error();
 }
 
 void MeshDeformationNode::take_latest(double now_s) {

@@ -14,9 +14,8 @@
 #include "runtime/latest.hpp"
 #include "runtime/metrics.hpp"
 #include "runtime/node.hpp"
-#include "runtime/periodic.hpp"
+#include "runtime/ticking_worker.hpp"
 #include "runtime/topic.hpp"
-#include "runtime/worker.hpp"
 
 namespace km {
 
@@ -41,9 +40,9 @@ class MeshDeformationNode final : public Node {
   ~MeshDeformationNode() override { stop(); }
 
   std::string_view name() const override { return MeshDeformationConfig::kSection; }
-  void start() override;
+  void start() override { worker_.start(); }
   void stop() noexcept override;  ///< Call after finish().
-  std::exception_ptr error() const override;
+  std::exception_ptr error() const override { return worker_.error(); }
   std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
   /// Large, because the time of a correction is proportional to the size of the mesh.
   double step_limit_s() const override { return 120.0; }
@@ -100,8 +99,7 @@ class MeshDeformationNode final : public Node {
   Timing timing_;
   Latest<MapMesh> latest_map_;  // newest map, until it is handled
   Latest<Trajectory> latest_trajectory_;
-  Worker<Input> worker_;
-  Periodic ticks_;  // last member: stops before the worker it posts to
+  TickingWorker<Input> worker_;
 };
 
 }  // namespace km

@@ -35,26 +35,10 @@ ObjectsNode::ObjectsNode(const ObjectsConfig& config, RobotId self, const LabelP
             work_in_background();
             step(input, steady_now_s());
           },
-          ObjectsConfig::kSection),
-      ticks_(
-          std::chrono::seconds(1), [this] { worker_.post(Tick()); }, "objects_tick") {
+          ObjectsConfig::kSection, std::chrono::seconds(1), [] { return Tick(); }) {
   topics.meshes.subscribe([this](const auto& mesh) { latest_mesh_.put(mesh); });
   topics.trajectory.subscribe([this](const auto& newest) { latest_trajectory_.put(newest); });
   topics.received.subscribe([this](const auto& objects) { worker_.post(objects); });
-}
-
-void ObjectsNode::start() {
-  worker_.start();
-  ticks_.start();
-}
-
-void ObjectsNode::stop() noexcept {
-  ticks_.stop();
-  worker_.stop();
-}
-
-std::exception_ptr ObjectsNode::error() const {
-  return worker_.error() != nullptr ? worker_.error() : ticks_.error();
 }
 
 void ObjectsNode::step(const Input& input, double now_s) {

@@ -16,9 +16,8 @@
 #include "modules/objects/team_objects.hpp"
 #include "runtime/latest.hpp"
 #include "runtime/node.hpp"
-#include "runtime/periodic.hpp"
+#include "runtime/ticking_worker.hpp"
 #include "runtime/topic.hpp"
-#include "runtime/worker.hpp"
 
 namespace km {
 
@@ -42,9 +41,9 @@ class ObjectsNode final : public Node {
   ~ObjectsNode() override { stop(); }
 
   std::string_view name() const override { return ObjectsConfig::kSection; }
-  void start() override;
-  void stop() noexcept override;
-  std::exception_ptr error() const override;
+  void start() override { worker_.start(); }
+  void stop() noexcept override { worker_.stop(); }
+  std::exception_ptr error() const override { return worker_.error(); }
   std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
   /// Large, because subscribers of the joint objects write them to a disk, which may stall.
   double step_limit_s() const override { return 300.0; }
@@ -87,8 +86,7 @@ class ObjectsNode final : public Node {
   double next_s_ = 0.0;  // earliest time of the next message
   Latest<OptimizedMesh> latest_mesh_;
   Latest<Trajectory> latest_trajectory_;
-  Worker<Input> worker_;
-  Periodic ticks_;  // last member: stops before the worker it posts to
+  TickingWorker<Input> worker_;
 };
 
 }  // namespace km

@@ -26,28 +26,16 @@ PcmNode::PcmNode(const PcmConfig& config, RobotId self, const PcmTopics& topics,
       inlier_sets_(topics.inlier_sets),
       worker_(
           kQueue, Overflow::kBlock, [this](const Input& input) { handle(input); },
-          PcmConfig::kSection),
-      ticks_(
-          steady_duration(config.publish_period_s), [this] { worker_.post(Tick{}); }, "pcm tick") {
+          PcmConfig::kSection, steady_duration(config.publish_period_s), [] { return Tick(); }) {
   topics.closures.subscribe([this](const auto& message) { worker_.post(message); });
   topics.keyframes.subscribe([this](const auto& message) { worker_.post(message); });
   topics.restarts.subscribe([this](const auto& message) { worker_.post(message); });
   topics.restored.subscribe([this](const auto& message) { worker_.post(message); });
 }
 
-void PcmNode::start() {
-  worker_.start();
-  ticks_.start();
-}
-
 void PcmNode::stop() noexcept {
-  worker_.stop();  // first, so that no tick waits for room in the queue
-  ticks_.stop();
+  worker_.stop();
   if (worker_.error() == nullptr) publish_changes();
-}
-
-std::exception_ptr PcmNode::error() const {
-  return worker_.error() != nullptr ? worker_.error() : ticks_.error();
 }
 
 void PcmNode::handle(const Input& input) {

@@ -16,9 +16,8 @@
 #include "modules/outlier_rejection/witnessed_pair.hpp"
 #include "runtime/dds/peer_table.hpp"
 #include "runtime/node.hpp"
-#include "runtime/periodic.hpp"
+#include "runtime/ticking_worker.hpp"
 #include "runtime/topic.hpp"
-#include "runtime/worker.hpp"
 
 namespace km {
 
@@ -50,10 +49,10 @@ class PcmNode final : public Node {
   ~PcmNode() override { stop(); }
 
   std::string_view name() const override { return PcmConfig::kSection; }
-  void start() override;
+  void start() override { worker_.start(); }
   /// Publishes the remaining changes.
   void stop() noexcept override;
-  std::exception_ptr error() const override;
+  std::exception_ptr error() const override { return worker_.error(); }
   std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
   DurationHistogram timing() const override { return worker_.timing(); }
 
@@ -99,8 +98,7 @@ class PcmNode final : public Node {
   std::map<RobotId, std::uint32_t> version_of_;
   std::optional<Stamp> newest_;  // stamp of this robot's newest keyframe
   std::atomic<bool> no_more_ = false;
-  Worker<Input> worker_;
-  Periodic ticks_;  // last member: stops before the worker it posts to
+  TickingWorker<Input> worker_;
 };
 
 }  // namespace km

@@ -29,9 +29,7 @@ TeamNode::TeamNode(const PoseGraphConfig& config, TeamPeer self, MemberSolverFac
       agent_(config, self, std::move(solvers)),
       worker_(
           kQueue, Overflow::kBlock, [this](const Input& input) { step(input, steady_now_s()); },
-          PoseGraphConfig::kSection),
-      ticks_(
-          kTick, [this] { worker_.post(Tick()); }, "pose_graph tick") {
+          PoseGraphConfig::kSection, kTick, [] { return Tick(); }) {
   const auto post = [this](const auto& message) { worker_.post(message); };
   topics.odometry.subscribe(post);
   topics.closures.subscribe(post);
@@ -46,20 +44,6 @@ TeamNode::TeamNode(const PoseGraphConfig& config, TeamPeer self, MemberSolverFac
   });
   topics.links.subscribe(post);
   topics.peer_messages.subscribe(post);
-}
-
-void TeamNode::start() {
-  worker_.start();
-  ticks_.start();
-}
-
-void TeamNode::stop() noexcept {
-  worker_.stop();  // refuses further ticks, so that none waits for room
-  ticks_.stop();
-}
-
-std::exception_ptr TeamNode::error() const {
-  return worker_.error() != nullptr ? worker_.error() : ticks_.error();
 }
 
 void TeamNode::step(const Input& input, double now_s) {

@@ -11,9 +11,8 @@
 #include "modules/pose_graph/team_agent.hpp"
 #include "runtime/dds/peers.hpp"
 #include "runtime/node.hpp"
-#include "runtime/periodic.hpp"
+#include "runtime/ticking_worker.hpp"
 #include "runtime/topic.hpp"
-#include "runtime/worker.hpp"
 
 namespace km {
 
@@ -53,9 +52,9 @@ class TeamNode final : public Node {
   void begin_in_map(std::uint64_t map_id) { agent_.begin_in_map(map_id); }
 
   std::string_view name() const override { return PoseGraphConfig::kSection; }
-  void start() override;
-  void stop() noexcept override;
-  std::exception_ptr error() const override;
+  void start() override { worker_.start(); }
+  void stop() noexcept override { worker_.stop(); }
+  std::exception_ptr error() const override { return worker_.error(); }
   std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
   /// Large, because the time of a round grows with the graph.
   double step_limit_s() const override { return 120.0; }
@@ -87,8 +86,7 @@ class TeamNode final : public Node {
   const std::function<std::uint64_t()> sent_bytes_;
   TeamAgent agent_;
   std::size_t rejected_ = 0;  // closures of this robot that the last verdicts reject
-  Worker<Input> worker_;
-  Periodic ticks_;  // last member: stops before the worker it posts to
+  TickingWorker<Input> worker_;
 };
 
 }  // namespace km

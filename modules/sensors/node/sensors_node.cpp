@@ -50,10 +50,10 @@ void SensorsNode::stop() noexcept {
   stopped_ = true;
   reader_->stop();
   clock_.stop();
-  worker_.stop();  // further posts are refused, which ends the decoder
-  if (!decoder_.joinable()) return;
+  const bool is_running = decoder_.joinable();
   decoder_.join();
-  take_faults();
+  worker_.stop();
+  if (is_running) take_faults();
 }
 
 void SensorsNode::decode() {

@@ -55,9 +55,7 @@ ViewNode::ViewNode(const ViewConfig& config, const DdsParticipant& participant,
       layers_(self_, kLayerShare * config.mesh_bytes_per_s),
       worker_(
           kQueue, Overflow::kDropOldest, [this](const Input& input) { step(input); },
-          ViewConfig::kSection),
-      ticks_(
-          steady_duration(kTick_s), [this] { worker_.post(Tick{}); }, "view tick") {
+          ViewConfig::kSection, steady_duration(kTick_s), [] { return Tick(); }) {
   const auto post = [this](const auto& message) { worker_.post(message); };
   topics.odometry.subscribe(post);
   topics.keyframes.subscribe(post);
@@ -83,21 +81,11 @@ void ViewNode::offer(RobotId anchor, std::shared_ptr<const LabelledMesh> mesh) {
   worker_.post(MeshOffer{anchor, std::move(mesh)});
 }
 
-void ViewNode::start() {
-  worker_.start();
-  ticks_.start();
-}
-
 void ViewNode::stop() noexcept try {
   worker_.stop();
-  ticks_.stop();
   if (!std::exchange(stopped_, true) && error() == nullptr) send_rest();
 } catch (const std::exception& error) {
   log::warn(name()) << "the final state was not sent: " << error.what();
-}
-
-std::exception_ptr ViewNode::error() const {
-  return worker_.error() != nullptr ? worker_.error() : ticks_.error();
 }
 
 std::size_t ViewNode::sent_bytes(ViewChannel channel) const {

@@ -21,10 +21,9 @@
 #include "runtime/dds/participant.hpp"
 #include "runtime/dds/peer_table.hpp"
 #include "runtime/node.hpp"
-#include "runtime/periodic.hpp"
+#include "runtime/ticking_worker.hpp"
 #include "runtime/token_bucket.hpp"
 #include "runtime/topic.hpp"
-#include "runtime/worker.hpp"
 
 namespace km {
 
@@ -69,11 +68,11 @@ class ViewNode final : public Node {
   void offer_slice(std::shared_ptr<const LabelledMesh> points) { worker_.post(std::move(points)); }
 
   std::string_view name() const override { return ViewConfig::kSection; }
-  void start() override;
+  void start() override { worker_.start(); }
   /// Sends the remaining updates: at most two seconds at ViewConfig::past_bytes_per_s, and ten
   /// seconds at mesh_bytes_per_s for the map.
   void stop() noexcept override;
-  std::exception_ptr error() const override;
+  std::exception_ptr error() const override { return worker_.error(); }
   std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
   DurationHistogram timing() const override { return worker_.timing(); }
   /// Large, because a slow link may block the socket for as long.
@@ -152,8 +151,7 @@ class ViewNode final : public Node {
   ViewLayers layers_;
   std::atomic<bool> are_images_asked_ = false;
   bool stopped_ = false;
-  Worker<Input> worker_;
-  Periodic ticks_;  // Last member: it stops before the worker to which it posts.
+  TickingWorker<Input> worker_;
 };
 
 }  // namespace km
