@@ -2,6 +2,8 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include <zlib.h>
+
 #include "test/support/image_file.hpp"
 
 namespace km {
@@ -93,14 +95,68 @@ TEST_CASE("A part of a larger image is encoded", "[image_codec]") {
   CHECK(largest_difference(decoded(encode_jpeg(part, 100), DecodedPixels::kStored), part) <= 4.0);
 }
 
+std::string why(const std::string& file) {
+  try {
+    return std::to_string(decode_pixels(file, DecodedPixels::kGray).cols) + " columns";
+  } catch (const ImageCodecError& error) {
+    return std::string(error.what());
+  }
+}
+
+std::string four_bytes(std::uint64_t value) {
+  std::string bytes;
+  for (int shift = 24; shift >= 0; shift -= 8)
+    bytes.push_back(static_cast<char>(value >> static_cast<unsigned>(shift) & 0xFFU));
+  return bytes;
+}
+
+std::string chunk(const std::string& type, const std::string& content) {
+  const std::string checked = type + content;
+  const auto* const bytes = reinterpret_cast<const Bytef*>(checked.data());
+  return four_bytes(content.size()) + checked +
+         four_bytes(crc32(0, bytes, static_cast<uInt>(checked.size())));
+}
+
+std::string compressed_zeros(std::size_t count) {
+  const Bytes zeros(count);
+  uLongf size = compressBound(count);
+  std::string packed(size, '\0');
+  REQUIRE(compress2(reinterpret_cast<Bytef*>(packed.data()), &size, zeros.data(), count, 1) ==
+          Z_OK);
+  packed.resize(size);
+  return packed;
+}
+
+constexpr std::size_t kHeaderEnd = 33;  // signature and IHDR of a PNG file
+
+// A PNG file with these chunks before its pixels.
+std::string png_with(const std::string& chunks) {
+  const Bytes file = encode_png(picture(CV_8UC1));
+  return std::string(file.begin(), file.end()).insert(kHeaderEnd, chunks);
+}
+
+TEST_CASE("A PNG file whose text or colour profile unpacks to more than 8 MiB is not decoded",
+          "[image_codec]") {
+  using namespace std::string_literals;
+  CHECK(why(png_with(chunk("zTXt", "key\0\0"s + compressed_zeros(1U << 20U)))) == "61 columns");
+  const std::string zeros = compressed_zeros(9U << 20U);
+  const std::string bomb =
+      GENERATE_COPY(chunk("zTXt", "key\0\0"s + zeros), chunk("iTXt", "key\0\1\0\0\0"s + zeros),
+                    chunk("iCCP", "key\0\0"s + zeros));
+  CAPTURE(bomb.substr(4, 4));
+  CHECK(why(png_with(bomb)) == "PNG: reached chunk/cache limits");
+  const std::string half = chunk("zTXt", "key\0\0"s + compressed_zeros(5U << 20U));
+  CHECK(why(png_with(half + half)) == "PNG: reached chunk/cache limits");
+}
+
+TEST_CASE("An image of more than 48 MiB of pixels is not decoded", "[image_codec]") {
+  std::string png = png_with("");
+  png.replace(16, 8, four_bytes(16384) + four_bytes(3073));
+  png.replace(12, kHeaderEnd - 12, chunk("IHDR", png.substr(16, 13)).substr(4));
+  CHECK(why(png) == "16384x3073 px, at most 48 MiB are decoded");
+}
+
 TEST_CASE("Files that are no image say why", "[image_codec]") {
-  const auto why = [](const std::string& file) {
-    try {
-      return std::to_string(decode_pixels(file, DecodedPixels::kGray).cols) + " columns";
-    } catch (const ImageCodecError& error) {
-      return std::string(error.what());
-    }
-  };
   CHECK(why("") == "neither a PNG nor a JPEG file");
   CHECK(why("GIF89a") == "neither a PNG nor a JPEG file");
   CHECK(why("\x89PNG") == "PNG: end of stream");
