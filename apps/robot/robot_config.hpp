@@ -13,7 +13,6 @@
 #include "modules/core/ids.hpp"
 #include "modules/dense_sensing/segmentation_config.hpp"
 #include "modules/dense_sensing/stereo_depth_config.hpp"
-#include "modules/distance_field/distance_field_config.hpp"
 #include "modules/loop_closure/keyframe_features_config.hpp"
 #include "modules/loop_closure/loop_closure_config.hpp"
 #include "modules/map_2d/map_2d_config.hpp"
@@ -94,7 +93,6 @@ struct RobotConfig {
   SemanticMappingConfig semantic_mapping;
   MeshDeformationConfig mesh_deformation;
   Map2dConfig map_2d;
-  DistanceFieldConfig distance_field;
   MapSharingConfig map;
   ObjectsConfig objects;
   ConstellationsConfig constellations;
@@ -107,8 +105,8 @@ struct RobotConfig {
     const auto visit_all = [&](auto&... sections) { (visit(sections), ...); };
     visit_all(run, dds, budget, sensors, ros, tracker, vio, keyframe_features, place_recognition,
               loop_closure, pcm, pose_graph, absolute_fixes, graph_playback, mapping, stereo_depth,
-              segmentation, semantic_mapping, mesh_deformation, map_2d, distance_field, map,
-              objects, constellations, view);
+              segmentation, semantic_mapping, mesh_deformation, map_2d, map, objects,
+              constellations, view);
   }
 };
 

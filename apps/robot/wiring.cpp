@@ -109,7 +109,8 @@ Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput 
     add_ros_output("ros_output", std::make_unique<LiveSink>(std::move(input.ros)),
                    {.mesh_points = config.ros.mesh_points,
                     .mesh_faces = config.ros.mesh_faces,
-                    .mesh_bytes_per_s = config.ros.mesh_bytes_per_s},
+                    .mesh_bytes_per_s = config.ros.mesh_bytes_per_s,
+                    .slices = true},
                    std::nullopt);
   if (options.record) add_record(options, config.ros, results);
   if (seal_ != nullptr)
@@ -498,7 +499,7 @@ void Robot::add_ros_output(std::string_view node, std::unique_ptr<RosSink> sink,
   topics_.distance_slices.subscribe([&output](const auto& slice) {
     output.offer_slice({slice, &slice->points}, slice->stamp);
   });
-  if (node == kRecordNode) record_ = &output;
+  (node == kRecordNode ? record_ : ros_output_) = &output;
 }
 
 // Files of several robots can be merged: each has a map frame of its own, and the file states when

@@ -287,6 +287,7 @@ class Robot {
   PcmNode* pcm_ = nullptr;
   RobotStatusNode* status_ = nullptr;
   RosOutputNode* record_ = nullptr;
+  RosOutputNode* ros_output_ = nullptr;
   OverlayNode* overlay_ = nullptr;
   ViewNode* view_ = nullptr;
   std::optional<ModuleLoads> loads_;

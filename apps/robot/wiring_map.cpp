@@ -33,15 +33,16 @@ void Robot::add_mapping(const RobotConfig& config, const PlaybackPace& pace, con
                             .superseded = topics_.superseded_surface,
                             .maps = topics_.maps,
                             .progress = topics_.mapping_progress,
-                            .space = config.distance_field.enabled
-                                         ? std::optional<Out<SpaceUpdate>>(topics_.space_updates)
-                                         : std::nullopt});
+                            .space = topics_.space_updates});
+  mapper.track_space_while([this] {
+    return (view_ != nullptr && view_->has_map_viewers()) ||
+           (ros_output_ != nullptr && ros_output_->has_slice_readers());
+  });
   if (before) mapper.continue_from(*std::move(before));
   ray_thinner_.emplace(camera, map.max_range_m);
-  if (config.distance_field.enabled)
-    add<DistanceFieldNode>(
-        true, config.distance_field, map.voxel_size_m,
-        DistanceFieldTopics{.space = topics_.space_updates, .slices = topics_.distance_slices});
+  add<DistanceFieldNode>(
+      true, map.voxel_size_m,
+      DistanceFieldTopics{.space = topics_.space_updates, .slices = topics_.distance_slices});
 }
 
 void Robot::add_mesh_correction(const RobotConfig& config) {

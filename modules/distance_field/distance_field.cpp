@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <stdexcept>
 #include <string>
 #include <tuple>
 
 namespace km {
 namespace {
 
-constexpr int kMaxReach = 100;   // its square is below kBeyondReach
 constexpr int kPartBlocks = 12;  // regions with longer sides are divided
 constexpr std::uint64_t kColumnX0 = 0x0101010101010101, kColumnX7 = kColumnX0 << 7U;
 
@@ -31,10 +31,9 @@ bool bit(const BlockBits& bits, int x, int y, int z) {
 }
 
 double checked_voxel(double voxel_m, double max_m) {
-  if (!(voxel_m > 0.0) || max_m > kMaxReach * voxel_m)
-    throw ConfigError("distance_field.max_distance_m: " + shortest_text(max_m) + " exceeds " +
-                      std::to_string(kMaxReach) + " voxels of " + shortest_text(voxel_m) +
-                      " m; reduce it or raise semantic_mapping.voxel_size_m");
+  if (!(voxel_m > 0.0) || max_m > DistanceField::kMaxReach * voxel_m)
+    throw std::invalid_argument("distance field: " + shortest_text(max_m) + " m in voxels of " +
+                                shortest_text(voxel_m) + " m");
   return voxel_m;
 }
 
@@ -55,9 +54,9 @@ std::size_t DistanceField::PositionHash::operator()(
          mix(position.z(), 0x165667B19E3779F9);
 }
 
-DistanceField::DistanceField(const DistanceFieldConfig& config, double voxel_size_m)
-    : voxel_m_(checked_voxel(voxel_size_m, checked(config).max_distance_m)),
-      max_m_(config.max_distance_m),
+DistanceField::DistanceField(double max_distance_m, double voxel_size_m)
+    : voxel_m_(checked_voxel(voxel_size_m, max_distance_m)),
+      max_m_(max_distance_m),
       reach_(static_cast<int>(std::ceil(max_m_ / voxel_m_)) + 1),
       reach_blocks_((reach_ + kBlockSide - 1) / kBlockSide) {}
 

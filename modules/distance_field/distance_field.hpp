@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "modules/core/ids.hpp"
-#include "modules/distance_field/distance_field_config.hpp"
 #include "modules/distance_field/surface_distances.hpp"
 #include "modules/semantic_mapping/block_map.hpp"
 #include "modules/semantic_mapping/space_changes.hpp"
@@ -47,9 +46,10 @@ struct PointDistance {
 /// Memory: 1.2 kB per observed block of 8^3 voxels. Not thread-safe.
 class DistanceField {
  public:
-  /// Throws ConfigError if `config` is out of bounds, or for more than 100 voxels in
-  /// max_distance_m.
-  DistanceField(const DistanceFieldConfig& config, double voxel_size_m);
+  /// Throws std::invalid_argument for more than kMaxReach voxels in `max_distance_m`.
+  DistanceField(double max_distance_m, double voxel_size_m);
+
+  static constexpr int kMaxReach = 100;  ///< [voxels] its square is below kBeyondReach
 
   /// Replaces what is known of these blocks. Returns the number of blocks that are outdated by it
   /// and were not before.

@@ -259,8 +259,11 @@ SurfaceDrop SemanticMapper::drop(const SupersededSurface& superseded) {
   return dropped;
 }
 
-void SemanticMapper::track_space() {
+void SemanticMapper::track_space(bool is_wanted) {
+  state_->space.reset();
+  if (!is_wanted) return;
   state_->space.emplace(state_->config);
+  for (const auto& block : state_->map.blocks()) state_->space->note(block->position);
 }
 
 SpaceChanges SemanticMapper::take_space_changes() {

@@ -103,13 +103,12 @@ class SemanticMapper {
 
   [[nodiscard]] MapSize size() const;
 
-  /// Begins to follow the free and occupied space for take_space_changes(). Call before the first
-  /// frame.
-  void track_space();
+  /// Begins or ends to follow the free and occupied space. The mesh does not depend on it.
+  void track_space(bool is_wanted);
 
-  /// Free and occupied space of the blocks that changed since the last call, for a distance field.
-  /// Free space away from surface is updated with the first frame of each keyframe. Voxels up to
-  /// min_weight are unknown. Precondition: track_space().
+  /// Free and occupied space of the blocks that changed since the last call, for a distance field;
+  /// at first that of all blocks. Free space away from surface is updated with the first frame of
+  /// each keyframe. Voxels up to min_weight are unknown. Precondition: track_space(true).
   [[nodiscard]] SpaceChanges take_space_changes();
 
  private:

@@ -27,6 +27,7 @@ using SpaceChanges = std::vector<BlockSpace>;
 struct SpaceUpdate {
   Stamp stamp = 0;
   double camera_z_m = 0.0;  ///< Height of the camera in the odometry frame.
+  bool is_first = false;    ///< The changes are the whole space: earlier updates no longer count.
   SpaceChanges changes;
 };
 

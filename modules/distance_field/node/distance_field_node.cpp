@@ -1,5 +1,6 @@
 #include "modules/distance_field/node/distance_field_node.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "modules/core/distance_color.hpp"
@@ -13,9 +14,8 @@ constexpr std::size_t kQueue = 256;
 
 }  // namespace
 
-DistanceFieldNode::DistanceFieldNode(const DistanceFieldConfig& config, double voxel_size_m,
-                                     const DistanceFieldTopics& topics)
-    : field_(config, voxel_size_m),
+DistanceFieldNode::DistanceFieldNode(double voxel_size_m, const DistanceFieldTopics& topics)
+    : voxel_size_m_(voxel_size_m),
       slices_(topics.slices),
       worker_(
           kQueue, Overflow::kBlock,
@@ -23,7 +23,7 @@ DistanceFieldNode::DistanceFieldNode(const DistanceFieldConfig& config, double v
             work_in_background();
             step(*update);
           },
-          DistanceFieldConfig::kSection) {
+          "distance_field") {
   topics.space.subscribe([this](const auto& update) { worker_.post(update); });
 }
 
@@ -33,7 +33,10 @@ void DistanceFieldNode::stop() noexcept {
 }
 
 void DistanceFieldNode::step(const SpaceUpdate& update) {
-  (void)field_.set(update.changes);
+  if (update.is_first)
+    field_.emplace(std::min(kMaxDistance_m, DistanceField::kMaxReach * voxel_size_m_),
+                   voxel_size_m_);
+  (void)field_->set(update.changes);
   newest_ = update.stamp;
   camera_z_m_ = update.camera_z_m;
   if (!published_ || seconds_between(*published_, update.stamp) >= kSlice_s) publish_slice();
@@ -42,10 +45,10 @@ void DistanceFieldNode::step(const SpaceUpdate& update) {
 void DistanceFieldNode::publish_slice() {
   published_ = newest_;
   DistanceSlice slice{*newest_, {}};
-  for (const DistanceField::SlicePoint& point : field_.slice(camera_z_m_)) {
+  for (const DistanceField::SlicePoint& point : field_->slice(camera_z_m_)) {
     slice.points.vertices.push_back(point.point);
     slice.points.colors.push_back(
-        distance_color(static_cast<double>(point.distance_m) / field_.max_distance_m()));
+        distance_color(static_cast<double>(point.distance_m) / field_->max_distance_m()));
   }
   slices_.publish(std::move(slice));
 }

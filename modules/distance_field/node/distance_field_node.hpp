@@ -19,18 +19,19 @@ struct DistanceFieldTopics {
   Out<DistanceSlice> slices;  ///< At the height of the camera, every kSlice_s and at the end.
 };
 
-/// Keeps the distance field of the mapper's window on a thread of its own. No update is dropped,
-/// because each one has only the changes since the last.
+/// Keeps the distance field of the mapper's window on a thread of its own, while the mapper
+/// publishes its space. No update is dropped, because each one has only the changes since the last.
 class DistanceFieldNode final : public Node {
  public:
   static constexpr double kSlice_s = 1.0;  ///< Interval of slices, by stamps.
 
-  /// Throws under the conditions of DistanceField.
-  DistanceFieldNode(const DistanceFieldConfig& config, double voxel_size_m,
-                    const DistanceFieldTopics& topics);
+  /// Largest distance of the slices, or the 100 voxels that DistanceField can compute.
+  static constexpr double kMaxDistance_m = 2.0;
+
+  DistanceFieldNode(double voxel_size_m, const DistanceFieldTopics& topics);
   ~DistanceFieldNode() override { stop(); }
 
-  std::string_view name() const override { return DistanceFieldConfig::kSection; }
+  std::string_view name() const override { return "distance_field"; }
   void start() override { worker_.start(); }
   void stop() noexcept override;
   std::exception_ptr error() const override { return worker_.error(); }
@@ -44,7 +45,8 @@ class DistanceFieldNode final : public Node {
  private:
   void publish_slice();
 
-  DistanceField field_;
+  const double voxel_size_m_;
+  std::optional<DistanceField> field_;
   const Out<DistanceSlice> slices_;
   double camera_z_m_ = 0.0;
   std::optional<Stamp> newest_, published_;

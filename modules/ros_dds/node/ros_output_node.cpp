@@ -113,8 +113,13 @@ void RosOutputNode::open_topics(bool has_images) {
   }
   if (options_.objects) objects_ = latest("objects", RosMarkers::kType);
   if (options_.logs) log_ = sink_->open({"/rosout", RosLog::kType});
+  if (options_.slices) open_slices();
   if (has_images)
     image_ = sink_->open({prefix + "left/image_raw/compressed", RosCompressedImage::kType});
+}
+
+void RosOutputNode::open_slices() {
+  slice_ = sink_->open({'/' + name_ + "/distance_slice", RosPointCloud::kType, true, 1});
 }
 
 void RosOutputNode::start() {
@@ -243,8 +248,7 @@ void RosOutputNode::step(const Topic<ObjectList>::Message& objects) {
 }
 
 void RosOutputNode::step(const Slice& slice) {
-  if (!slice_)
-    slice_ = sink_->open({'/' + name_ + "/distance_slice", RosPointCloud::kType, true, 1});
+  if (!slice_) open_slices();
   const std::size_t most = std::max<std::size_t>(slice.points->vertices.size(), 1);
   publish(*slice_, cloud_of(*slice.points, most, {slice.stamp, odom_}));
 }
@@ -365,6 +369,7 @@ void RosOutputNode::step(const std::shared_ptr<const Tick>& /*tick*/) {
   }
   publish_latest(is_silent);
   publish_pieces();
+  has_slice_readers_ = slice_ && sink_->readers(*slice_) > 0;
   if (!is_silent) publish_team_frame();
   sink_->flush();
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <exception>
 #include <functional>
@@ -56,8 +57,9 @@ struct RosOutputOptions {
   bool awaits_trajectory = false;
   /// Classes of the objects that are published; nullopt: no objects are published.
   std::optional<LabelPalette> objects = std::nullopt;
-  bool draws = false;  ///< Publish faces of the mesh and closures as markers.
-  bool logs = false;   ///< Publish the log of this process.
+  bool draws = false;   ///< Publish faces of the mesh and closures as markers.
+  bool logs = false;    ///< Publish the log of this process.
+  bool slices = false;  ///< Open the topic of slices before the first one, so that it can be read.
   /// Maximum rate of each of the topics `path`, `mesh`, `map_2d`, `closures` and `objects`.
   double state_bytes_per_s = std::numeric_limits<double>::infinity();
   /// Maximum number of waiting inputs; beyond it the oldest are dropped, so that no node waits for
@@ -75,8 +77,8 @@ struct RosOutputOptions {
 ///   /NAME/path         nav_msgs/Path in `map`: the keyframes, whenever they are optimised
 ///   /NAME/mesh         sensor_msgs/PointCloud2 in `map`: vertices, whenever they are corrected
 ///   /NAME/map_2d       nav_msgs/OccupancyGrid in `map`, whenever it is made
-///   /NAME/distance_slice  sensor_msgs/PointCloud2 in NAME/odom, see DistanceSlice; only with a
-///                      distance field
+///   /NAME/distance_slice  sensor_msgs/PointCloud2 in NAME/odom, see DistanceSlice; while it
+///                      has readers
 ///   /diagnostics       diagnostic_msgs/DiagnosticArray, once a second: odometry, and what
 ///                      Diagnose returns
 /// and on request:
@@ -119,6 +121,9 @@ class RosOutputNode final : public Node {
   void offer(std::shared_ptr<const OccupancyGrid> grid) { worker_.post(std::move(grid)); }
 
   void start() override;
+  /// True if the topic of slices has readers, as of the last second. Thread-safe.
+  [[nodiscard]] bool has_slice_readers() const { return has_slice_readers_; }
+
   void stop() noexcept override;
   std::exception_ptr error() const override;
   std::vector<Heartbeat*> heartbeats() override;
@@ -164,6 +169,7 @@ class RosOutputNode final : public Node {
   };
 
   void open_topics(bool has_images);
+  void open_slices();
   void step(const std::shared_ptr<const Tick>& tick);
   void publish_diagnostics(std::vector<RosDiagnosticStatus> parts);
   void step(const Topic<OdometryState>::Message& state);
@@ -198,7 +204,8 @@ class RosOutputNode final : public Node {
   const Diagnose diagnose_;
   const Closures closures_of_;
   std::size_t odometry_ = 0, pose_ = 0, tf_ = 0, diagnostics_ = 0, faces_ = 0, log_ = 0, image_ = 0;
-  std::optional<std::size_t> slice_;  // opened with the first slice
+  std::optional<std::size_t> slice_;  // opened with the first slice at the latest
+  std::atomic<bool> has_slice_readers_ = false;
   LatestTopic path_, mesh_, map_2d_, closures_, objects_;
   LiveFrames frames_;
   std::size_t poses_ = 0;

@@ -26,7 +26,6 @@ SemanticMappingNode::SemanticMappingNode(const SemanticMappingConfig& config, co
             step(*frame);
           },
           SemanticMappingConfig::kSection) {
-  if (topics_.space) mapper_.track_space();
   topics_.frames.subscribe([this](const auto& frame) { worker_.post(frame); });
   topics_.superseded.subscribe([this](const auto& superseded) { superseded_.put(superseded); });
 }
@@ -64,9 +63,7 @@ void SemanticMappingNode::step(const DenseFrame& frame) {
   // The mesh is updated once for each keyframe, so that a vertex gets the first one that saw it.
   if (meshed_ != frame.keyframe) {
     mapper_.update_mesh();
-    if (topics_.space)
-      topics_.space->publish(SpaceUpdate{frame.stamp, frame.T_odom_cam.translation().z(),
-                                         mapper_.take_space_changes()});
+    publish_space(frame);
   }
   meshed_ = frame.keyframe;
   if (!published_) published_ = frame.stamp;
@@ -88,6 +85,15 @@ void SemanticMappingNode::count(const DenseFrame& frame, const IntegrationReport
   progress_.off_palette_pixels += report.off_palette_pixels;
   progress_.blocks_refused += report.blocks_refused;
   progress_.too_late = worker_.load().dropped;
+}
+
+void SemanticMappingNode::publish_space(const DenseFrame& frame) {
+  const bool is_wanted = wants_space_ && wants_space_();
+  const bool is_first = is_wanted && !tracks_space_;
+  if (is_wanted != std::exchange(tracks_space_, is_wanted)) mapper_.track_space(is_wanted);
+  if (is_wanted)
+    topics_.space.publish(SpaceUpdate{frame.stamp, frame.T_odom_cam.translation().z(), is_first,
+                                      mapper_.take_space_changes()});
 }
 
 void SemanticMappingNode::publish_mesh() {

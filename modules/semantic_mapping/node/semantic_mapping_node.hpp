@@ -1,6 +1,7 @@
 #pragma once
 
 #include <exception>
+#include <functional>
 #include <optional>
 #include <string_view>
 #include <utility>
@@ -23,7 +24,7 @@ struct SemanticMappingTopics {
                                      ///< newest message counts.
   Out<MapMesh> maps;                 ///< The whole map.
   Out<MappingProgress> progress;     ///< With every frame.
-  std::optional<Out<SpaceUpdate>> space = {};  ///< With every keyframe, if there is a reader.
+  Out<SpaceUpdate> space;            ///< With every keyframe while wants_space().
 };
 
 /// Builds a robot's map as a thread with one SemanticMapper. The mesh is published every few
@@ -37,6 +38,12 @@ class SemanticMappingNode final : public Node {
                       const LabelPalette& palette, double mesh_interval_s, Overflow overflow,
                       const SemanticMappingTopics& topics);
   ~SemanticMappingNode() override { stop(); }
+
+  /// Space is tracked and published while `wants_space` returns true. The thread calls it for every
+  /// keyframe. Call before start().
+  void track_space_while(std::function<bool()> wants_space) {
+    wants_space_ = std::move(wants_space);
+  }
 
   /// The mesh is appended to the map of an earlier process. Call before start().
   void continue_from(ResumedMap before) { before_.emplace(std::move(before)); }
@@ -59,11 +66,14 @@ class SemanticMappingNode final : public Node {
   void count(const DenseFrame& frame, const IntegrationReport& report);
   void drop_superseded();
   void publish_mesh();
+  void publish_space(const DenseFrame& frame);
 
   SemanticMapper mapper_;
   LabelPalette palette_;
   const double mesh_interval_s_;
   const SemanticMappingTopics topics_;
+  std::function<bool()> wants_space_;
+  bool tracks_space_ = false;
   std::optional<ResumedMap> before_;
   MappingProgress progress_;
   std::optional<KeyframeIndex> meshed_;  // keyframe of the last update of the mesh

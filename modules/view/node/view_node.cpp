@@ -156,7 +156,7 @@ std::optional<ViewContent> ViewNode::next_of_map(double now_s) {
 void ViewNode::send_map(double now_s) {
   Channel& mesh = on(ViewChannel::kMesh);
   const bool has_newcomers = mesh.writer.newcomers() > 0;
-  const bool sent_before = std::exchange(sends_mesh_, mesh.writer.readers() > 0);
+  const bool sent_before = sends_mesh_.exchange(mesh.writer.readers() > 0);
   if (has_newcomers || (sent_before && !sends_mesh_)) {
     schedule_.begin_again();
     layers_.begin_again();

@@ -67,6 +67,9 @@ class ViewNode final : public Node {
   /// Replaces the points of the slice (see DistanceSlice). Thread-safe; does not wait.
   void offer_slice(std::shared_ptr<const LabelledMesh> points) { worker_.post(std::move(points)); }
 
+  /// True if a viewer reads the map. Thread-safe.
+  [[nodiscard]] bool has_map_viewers() const { return sends_mesh_; }
+
   std::string_view name() const override { return ViewConfig::kSection; }
   void start() override { worker_.start(); }
   /// Sends the remaining updates: at most two seconds at ViewConfig::past_bytes_per_s, and ten
@@ -146,7 +149,7 @@ class ViewNode final : public Node {
   MeshOffer mesh_;      // The newest mesh.
   bool is_cut_ = true;  // True if `mesh_` is in the schedule.
   double cut_due_s_ = 0.0;
-  bool sends_mesh_ = false;  // True if the mesh channel has a reader.
+  std::atomic<bool> sends_mesh_ = false;  // True if the mesh channel has a reader.
   ChunkSchedule schedule_;
   ViewLayers layers_;
   std::atomic<bool> are_images_asked_ = false;

@@ -6,6 +6,7 @@
 #include <map>
 #include <random>
 #include <set>
+#include <stdexcept>
 #include <tuple>
 
 #include "modules/semantic_mapping/semantic_mapper.hpp"
@@ -97,7 +98,7 @@ std::size_t check_all(const World& world, DistanceField& field) {
 }
 
 TEST_CASE("A distance of too many voxels is refused", "[distance_field]") {
-  CHECK_THROWS_AS(DistanceField({.max_distance_m = 2.0}, 0.01), ConfigError);
+  CHECK_THROWS_AS(DistanceField(2.0, 0.01), std::invalid_argument);
 }
 
 TEST_CASE("Distances equal brute force while obstacles come and go", "[distance_field]") {
@@ -107,7 +108,7 @@ TEST_CASE("Distances equal brute force while obstacles come and go", "[distance_
   World world(3);
   std::uniform_int_distribution<int> any(0, world.side() - 1);
   const double max_distance_m = seed == 1 ? 0.55 : 1.2;
-  DistanceField field({.max_distance_m = max_distance_m}, kVoxel_m);
+  DistanceField field(max_distance_m, kVoxel_m);
   (void)field.set(world.all());
   CHECK(*field.at_voxel({0, 0, 0}) == max_distance_m);
   for (int round = 0; round < 6; ++round) {
@@ -136,7 +137,7 @@ TEST_CASE("Distances equal brute force while obstacles come and go", "[distance_
     for (const auto& [x, y, z] : changed) changes.push_back(world.block({x, y, z}));
     (void)field.set(changes);
     CHECK(check_all(world, field) > 10000);
-    DistanceField fresh({.max_distance_m = max_distance_m}, kVoxel_m);
+    DistanceField fresh(max_distance_m, kVoxel_m);
     (void)fresh.set(world.all());
     CHECK(fresh.update() == 27);
     CHECK(check_all(world, fresh) > 10000);
@@ -147,7 +148,7 @@ TEST_CASE("A removed block is unknown, and its surface does not count any more",
           "[distance_field]") {
   World world(3);
   world.inside.insert({4, 4, 4});
-  DistanceField field({.max_distance_m = 1.0}, kVoxel_m);
+  DistanceField field(1.0, kVoxel_m);
   (void)field.set(world.all());
   CHECK(*field.at_voxel({9, 4, 4}) == Approx(0.45));
   (void)field.set({BlockSpace{.position = {0, 0, 0}}});
@@ -161,7 +162,7 @@ TEST_CASE("Distance and gradient at a point in front of a wall", "[distance_fiel
   for (int x = 12; x < world.side(); ++x)
     for (int y = 0; y < world.side(); ++y)
       for (int z = 0; z < world.side(); ++z) world.inside.insert({x, y, z});
-  DistanceField field({.max_distance_m = 1.0}, kVoxel_m);
+  DistanceField field(1.0, kVoxel_m);
   (void)field.set(world.all());
   for (const double x_m : {0.2, 0.53, 0.91, 1.15, 1.38}) {
     const auto found = field.at({x_m, 0.77, 1.01});
@@ -184,7 +185,7 @@ TEST_CASE("Distance and gradient at a point in front of a wall", "[distance_fiel
 TEST_CASE("Blocks are computed once when they are asked for", "[distance_field]") {
   World world(2);
   world.inside.insert({4, 4, 4});
-  DistanceField field({.max_distance_m = 0.4}, kVoxel_m);
+  DistanceField field(0.4, kVoxel_m);
   CHECK(field.update() == 0);
   CHECK(field.set(world.all()) == 8);
   CHECK(field.set(world.all()) == 0);
@@ -206,8 +207,8 @@ TEST_CASE("The mapper reports space from which distances to a wall follow", "[di
   config.voxel_size_m = kVoxel_m;
   config.window_m = 3.0;
   SemanticMapper mapper(config, camera);
-  mapper.track_space();
-  DistanceField field({.max_distance_m = 1.0}, kVoxel_m);
+  mapper.track_space(true);
+  DistanceField field(1.0, kVoxel_m);
   const auto look = [&](const SE3& T_odom_cam, std::uint16_t millimetres, KeyframeIndex keyframe) {
     (void)mapper.integrate(wall_at(millimetres), nullptr, T_odom_cam, keyframe);
     (void)field.set(mapper.take_space_changes());
