@@ -22,7 +22,7 @@ void write_team_map_2d(const fs::path& folder, const Map2dConfig& config, const 
     return write_map_2d(folder, kTeamMap2d, kTeamMap2dImage, map.grid, results);
   log::warn("robot") << "no 2D map of the team: its mesh "
                      << (map.status == Map2dStatus::kEmpty ? "has no floor"
-                                                           : "needs more than map_2d.max_cells");
+                                                           : "needs more than 16 million cells");
 }
 
 }  // namespace

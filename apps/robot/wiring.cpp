@@ -537,10 +537,8 @@ void Robot::add_view(const RobotConfig& config, const std::optional<Camera>& cam
                                        "without encryption (view.in_clear)";
     return;
   }
-  const MapSharingConfig& mesh = config.map;
   Topics& t = topics_;
-  view_ = &add<ViewNode>(false, config.view, participant_,
-                         ViewMesh{{mesh.cell_m, mesh.position_step_m}, mesh.min_move_m}, camera,
+  view_ = &add<ViewNode>(false, config.view, participant_, ViewMesh(), camera,
                          ViewTopics{.odometry = t.odometry,
                                     .keyframes = t.keyframe_odometry,
                                     .outcomes = t.outcomes,

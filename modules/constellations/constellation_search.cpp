@@ -9,12 +9,6 @@
 namespace km {
 namespace {
 
-ConstellationOptions options_of(const ConstellationsConfig& config) {
-  ConstellationOptions options;
-  options.max_chance = config.max_chance;
-  return options;
-}
-
 // A pose whose frame has the axes of `world`, followed by the rotation to the axes of the keyframe.
 UncertainPose turn_of(const ObjectStretch& stretch) {
   return {make_pose(stretch.keyframe.T_world_kf.linear(), Eigen::Vector3d::Zero()),
@@ -57,7 +51,7 @@ Closure closure_of(const ObjectStretch& a, const ObjectStretch& b,
 }
 
 ConstellationSearch::ConstellationSearch(RobotId self, const ConstellationsConfig& config)
-    : self_(self), config_(checked(config)), options_(options_of(config)) {}
+    : self_(self), config_(checked(config)) {}
 
 void ConstellationSearch::add(const RobotObjects& objects, double now_s) {
   if (objects.robot < self_) return;  // that robot searches

@@ -9,22 +9,28 @@ namespace {
 
 constexpr KeyframeIndex kVisit = 100;  // keyframes of one visit
 constexpr double kMaxSigma_m = 1.0;    // largest useful error of a centre
-constexpr double kMinMove_m = 0.05;    // as for the messages of ObjectsNode
+// Standard deviation of the centre of a box along each axis for an object that is seen from all
+// sides: about half a voxel.
+constexpr double kCenterNoise_m = 0.1;
+
+// Standard deviation of the shift of the centre of a box, as a share of its sides. A robot that
+// sees one side of an object shifts it by up to half of the other.
+constexpr double kUnseenShare = 0.1;
+constexpr double kMinMove_m = 0.05;  // as for the messages of ObjectsNode
 
 KeyframeIndex gap(KeyframeIndex a, KeyframeIndex b) {
   return a < b ? b - a : a - b;
 }
 
-Landmark landmark_of(const AnchoredObject& object, const Eigen::Vector3d& center,
-                     const ConstellationsConfig& config) {
+Landmark landmark_of(const AnchoredObject& object, const Eigen::Vector3d& center) {
   const Eigen::Vector3d& size = object.size_m;
   const double longer = std::max(size.x(), size.y());
   return {.label = object.label,
           .center = center,
           .size_m = {longer, std::min(size.x(), size.y()), size.z()},
-          .sigma_m = std::hypot(config.center_noise_m, kStretchDrift * center.norm()),
-          .side_shift_m = config.unseen_share * longer,
-          .height_shift_m = config.unseen_share * size.z()};
+          .sigma_m = std::hypot(kCenterNoise_m, kStretchDrift * center.norm()),
+          .side_shift_m = kUnseenShare * longer,
+          .height_shift_m = kUnseenShare * size.z()};
 }
 
 std::vector<Landmark> landmarks_near(const SurfaceKeyframe& keyframe, const RobotObjects& objects,
@@ -35,7 +41,7 @@ std::vector<Landmark> landmarks_near(const SurfaceKeyframe& keyframe, const Robo
     const Eigen::Vector3d center =
         (object.T_world_kf * object.T_kf_box).translation() - keyframe.T_world_kf.translation();
     if (center.norm() > config.radius_m) continue;
-    const Landmark landmark = landmark_of(object, center, config);
+    const Landmark landmark = landmark_of(object, center);
     if (landmark.side_variance() + landmark.height_variance() <= 2.0 * kMaxSigma_m * kMaxSigma_m)
       near.push_back(landmark);
   }

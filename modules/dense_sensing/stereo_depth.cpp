@@ -137,12 +137,8 @@ constexpr int kDisparityUnit = 16;  // the number of searched disparities is a m
 
 StereoDepthConfig checked_depths(StereoDepthConfig config) {
   config = checked(config);
-  std::string problems;
-  if (config.block_px % 2 == 0)
-    problems += "stereo_depth.block_px = " + std::to_string(config.block_px) + " is not odd\n";
   if (!(config.min_depth_m < config.max_depth_m))
-    problems += "stereo_depth.min_depth_m is not below max_depth_m\n";
-  if (!problems.empty()) throw ConfigError(problems);
+    throw ConfigError("stereo_depth.min_depth_m is not below max_depth_m\n");
   return config;
 }
 
@@ -158,13 +154,17 @@ int disparity_count(const StereoRectification& rectification, const StereoDepthC
 }
 
 // The smoothness penalties are those that OpenCV's documentation proposes, for one channel.
-cv::Ptr<cv::StereoSGBM> make_matcher(const StereoDepthConfig& config, int disparities) {
-  const int area = config.block_px * config.block_px;
+cv::Ptr<cv::StereoSGBM> make_matcher(int disparities) {
+  constexpr int kBlock_px = 5;         // side of the compared blocks, odd
+  constexpr int kMaxLeftRight_px = 1;  // from the disparity matched from the right image
   constexpr int kPrefilterCap = 31;
+  constexpr int kUniqueness_percent = 8;  // margin of the best match over all others
+  constexpr int kSpeckle_px = 300;        // smaller areas of similar depth are wrong matches
   constexpr int kSpeckleStep_px = 1;
-  return cv::StereoSGBM::create(0, disparities, config.block_px, 8 * area, 32 * area,
-                                config.max_left_right_px, kPrefilterCap, config.uniqueness_percent,
-                                config.speckle_px, kSpeckleStep_px, cv::StereoSGBM::MODE_SGBM_3WAY);
+  constexpr int kArea = kBlock_px * kBlock_px;
+  return cv::StereoSGBM::create(0, disparities, kBlock_px, 8 * kArea, 32 * kArea, kMaxLeftRight_px,
+                                kPrefilterCap, kUniqueness_percent, kSpeckle_px, kSpeckleStep_px,
+                                cv::StereoSGBM::MODE_SGBM_3WAY);
 }
 
 }  // namespace
@@ -211,7 +211,7 @@ StereoDepth::StereoDepth(const StereoRig& rig, const StereoDepthConfig& config)
     : config_(checked_depths(config)),
       rectification_(rig, config_.downscale),
       disparities_(disparity_count(rectification_, config_)),
-      matcher_(make_matcher(config_, disparities_)) {}
+      matcher_(make_matcher(disparities_)) {}
 
 DepthImage StereoDepth::compute(const GrayImage& left, const GrayImage& right) {
   const cv::Mat rectified_left = rectification_.rectified(left, 0);

@@ -135,7 +135,7 @@ Map2dResult make_map_2d(const Map2dConfig& config, const Map2dInput& input) {
   const Eigen::Vector2d cells = cells_needed(input.mesh, config.resolution_m);
   result.cells_needed = cells.prod();
   if (input.mesh.faces.empty()) return result;
-  if (result.cells_needed > config.max_cells) {
+  if (result.cells_needed > kMaxMap2dCells) {
     result.status = Map2dStatus::kTooLarge;
     return result;
   }

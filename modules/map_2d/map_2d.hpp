@@ -23,10 +23,13 @@ struct Map2dInput {
   std::span<const SE3> T_world_odom = {};
 };
 
+/// Largest number of cells, 1 B each in files and about 24 B in memory while the map is made.
+inline constexpr int kMaxMap2dCells = 16'000'000;
+
 enum class Map2dStatus {
   kMade,
   kEmpty,     ///< The mesh has no faces, or no floor is found.
-  kTooLarge,  ///< More than Map2dConfig::max_cells cells.
+  kTooLarge,  ///< More than kMaxMap2dCells cells.
 };
 
 struct [[nodiscard]] Map2dResult {

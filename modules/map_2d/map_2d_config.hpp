@@ -18,8 +18,6 @@ struct Map2dConfig {
   double max_step_m = 0.25;
   std::vector<std::string> floor_labels = {"floor",  "ground", "road",   "sidewalk", "lane",
                                            "stairs", "ramp",   "carpet", "terrain"};
-  int max_cells = 16000000;
-  double period_s = 5.0;
 
   void visit_fields(auto& visitor) {
     visitor.field("enabled", enabled,
@@ -34,10 +32,6 @@ struct Map2dConfig {
     visitor.field("floor_labels", floor_labels,
                   "names of palette classes that are floor, stairs and ramps included; without "
                   "such labels in the map, level surface is searched for the floor");
-    visitor.field("max_cells", max_cells, {1000, 1000000000},
-                  "largest number of cells, 1 B each in files and about 24 B in memory while the "
-                  "map is made; a larger map is not made, and the log says so");
-    visitor.field("period_s", period_s, {0.1, 3600.0}, "[s] smallest interval between 2D maps");
   }
 };
 

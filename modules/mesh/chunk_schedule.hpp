@@ -13,6 +13,10 @@
 
 namespace km {
 
+/// Motion of a vertex along an axis, beyond that of the keyframes which saw it, after which its
+/// chunk is sent again.
+inline constexpr double kMinChunkMove_m = 0.01;
+
 /// Selects the chunks of a changing mesh that are to be sent, and their order. Keys whose chunk was
 /// never sent come first, then those sent longest ago, so that each has its turn at any rate of
 /// changes. Only the newest chunk of a key is sent. It is not sent if differ() finds no difference

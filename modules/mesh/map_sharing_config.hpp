@@ -17,9 +17,6 @@ struct MapSharingConfig {
 
   TeamMapMode team = TeamMapMode::kOff;
   double coarse_voxel_m = 0.2;
-  double cell_m = 2.0;
-  double position_step_m = 0.001;
-  double min_move_m = 0.01;
   double max_bytes_per_s = 50000.0;
 
   void visit_fields(auto& visitor) {
@@ -33,16 +30,6 @@ struct MapSharingConfig {
     visitor.field(
         "coarse_voxel_m", coarse_voxel_m, {0.01, 5.0},
         "[m] side of the voxels of a coarse map; a full one has those of semantic_mapping");
-    visitor.field("cell_m", cell_m, {0.1, 20.0},
-                  "[m] side of the cells of a mesh; a changed part of the mesh is sent again cell "
-                  "by cell");
-    visitor.field("position_step_m", position_step_m, {0.001, 0.05},
-                  "[m] positions are rounded to multiples of this; cells must be longer, and "
-                  "shorter than 21,845 times this (see split_mesh()), which the bounds ensure");
-    visitor.field(
-        "min_move_m", min_move_m, {0.0, 100.0},
-        "[m along an axis] motion of a vertex, beyond that of the keyframes which saw it, after "
-        "which its cell is sent again");
     visitor.field("max_bytes_per_s", max_bytes_per_s, {1000.0, 1e9},
                   "[B/s] average rate of sent chunks; counted once per message, not per receiver");
   }

@@ -14,6 +14,8 @@
 namespace km {
 namespace {
 
+constexpr std::size_t kInterpolationNodes = 4;  // nodes that move a vertex: the paper's k
+constexpr std::size_t kKeyframesPerNode = 4;    // at most, which hold a node
 constexpr float kFarthest_m = 1e7F;
 constexpr double kRigidTolerance = 1e-6;  // entries of R^T R
 
@@ -140,10 +142,11 @@ void check_trajectories(std::span<const SE3> T_odom_kf, std::span<const SE3> T_w
 }
 
 struct LocalMeshOptimizer::State {
-  explicit State(const MeshDeformationConfig& c)
+  State(const MeshDeformationConfig& c, const DeformationStop& s)
       : config(checked(c)),
+        stop(s),
         window(static_cast<KeyframeIndex>(config.time_window_keyframes)),
-        interpolation(static_cast<std::size_t>(config.interpolation_nodes), window) {}
+        interpolation(kInterpolationNodes, window) {}
 
   // Updates the vertex and seen_by of each node. Returns the nodes whose seen_by has changed.
   std::vector<std::uint32_t> follow_vertices(const VertexMatch& matched, const MapMesh& map);
@@ -157,12 +160,9 @@ struct LocalMeshOptimizer::State {
 
   [[nodiscard]] DeformationGraph make_graph(const MapMesh& map,
                                             std::span<const SE3> T_odom_kf) const;
-  [[nodiscard]] DeformationNoise noise() const {
-    return {config.anchor_rotation_rad, config.anchor_translation_m, config.mesh_edge_m,
-            config.keyframe_edge_m};
-  }
 
   MeshDeformationConfig config;
+  DeformationStop stop;
   KeyframeIndex window;
   Interpolation interpolation;
   KnownVertices known;
@@ -219,13 +219,13 @@ DeformationGraph LocalMeshOptimizer::State::make_graph(const MapMesh& map,
   for (const MeshNode& node : simplified.nodes) graph.nodes.push_back(node.position);
   graph.T_odom_kf.assign(T_odom_kf.begin(), T_odom_kf.end());
   graph.edges = region_edges(simplified, map.mesh.faces, window);
-  graph.keyframe_edges = choose_keyframe_edges(
-      simplified.nodes, static_cast<std::size_t>(config.keyframes_per_node), window);
+  graph.keyframe_edges = choose_keyframe_edges(simplified.nodes, kKeyframesPerNode, window);
   return graph;
 }
 
-LocalMeshOptimizer::LocalMeshOptimizer(const MeshDeformationConfig& config)
-    : state_(std::make_unique<State>(config)) {}
+LocalMeshOptimizer::LocalMeshOptimizer(const MeshDeformationConfig& config,
+                                       const DeformationStop& stop)
+    : state_(std::make_unique<State>(config, stop)) {}
 LocalMeshOptimizer::~LocalMeshOptimizer() = default;
 LocalMeshOptimizer::LocalMeshOptimizer(LocalMeshOptimizer&&) noexcept = default;
 LocalMeshOptimizer& LocalMeshOptimizer::operator=(LocalMeshOptimizer&&) noexcept = default;
@@ -253,9 +253,7 @@ DeformedMesh LocalMeshOptimizer::optimize(const MapMesh& map, std::span<const SE
   DeformationPoses initial =
       state.solved ? warm_start_poses(graph, state.last, state.T_world_kf_last, anchors)
                    : initial_poses(graph, anchors);
-  DeformationSolution solution =
-      solve(graph, anchors, state.noise(),
-            {state.config.max_iterations, state.config.energy_tolerance}, std::move(initial));
+  DeformationSolution solution = solve(graph, anchors, {}, state.stop, std::move(initial));
 
   // Correction at each keyframe, which moves vertices without a node.
   std::vector<SE3> T_world_odom;
@@ -283,7 +281,7 @@ DeformedMesh LocalMeshOptimizer::optimize(const MapMesh& map, std::span<const SE
 }
 
 void LocalMeshOptimizer::reset() {
-  state_ = std::make_unique<State>(state_->config);
+  state_ = std::make_unique<State>(state_->config, state_->stop);
 }
 
 }  // namespace km

@@ -68,7 +68,8 @@ struct [[nodiscard]] DeformedMesh {
 class LocalMeshOptimizer {
  public:
   /// Throws ConfigError if `config` is out of bounds.
-  explicit LocalMeshOptimizer(const MeshDeformationConfig& config = {});
+  explicit LocalMeshOptimizer(const MeshDeformationConfig& config = {},
+                              const DeformationStop& stop = {});
   ~LocalMeshOptimizer();
   LocalMeshOptimizer(LocalMeshOptimizer&&) noexcept;
   LocalMeshOptimizer& operator=(LocalMeshOptimizer&&) noexcept;

@@ -34,24 +34,20 @@ std::size_t faces_after(const MapMesh& map, const SupersededSurface& dropped) {
 
 }  // namespace
 
-MeshCorrector::MeshCorrector(const MeshDeformationConfig& config)
-    : duplicate_voxels_(config.duplicate_voxels),
+MeshCorrector::MeshCorrector(const MeshDeformationConfig& config, const CopyLimits& limits)
+    : limits_(limits),
       duplicate_faces_(static_cast<std::size_t>(config.duplicate_faces)),
-      duplicate_share_(config.duplicate_share),
-      copies_(static_cast<std::size_t>(config.duplicate_copies)),
       max_gap_keyframes_(static_cast<KeyframeIndex>(config.time_window_keyframes)),
       seen_through_views_(config.seen_through_views),
-      scale_{config.min_move_m, config.min_rotation_rad},
       optimizer_(config) {}
 
 std::optional<MeshCorrection> MeshCorrector::correct(const CorrectionInput& input) {
   check_trajectories(input.T_odom_kf, input.T_world_kf);
   std::vector<SE3> anchors = complete(input.T_odom_kf, input.T_world_kf);
   if (input.map_version != map_version_) return deform(input, std::move(anchors));
-  const KeyframeMotion motion = keyframe_motion(origin_.T_world_kf, anchors, scale_);
+  const KeyframeMotion motion = keyframe_motion(origin_.T_world_kf, anchors, {});
   if (motion.non_rigid > 1.0) return deform(input, std::move(anchors));
-  if (largest_difference(origin_.T_world_kf, motion.T_after_before, T_result_optimized_, scale_) <=
-      1.0)
+  if (largest_difference(origin_.T_world_kf, motion.T_after_before, T_result_optimized_, {}) <= 1.0)
     return std::nullopt;
   T_result_optimized_ = motion.T_after_before;
   MeshCorrection result{optimized_, report_, false, {}, 0, 0, origin_};
@@ -94,14 +90,13 @@ std::vector<bool> MeshCorrector::seen_through(const CorrectionInput& input) cons
 }
 
 // True if a search for copies is due. It takes long, and follows the growth of the mesh. All
-// vertices stay if the config keeps all copies, or if the map has an unknown voxel size or no ids,
+// vertices stay if the limits keep all copies, or if the map has an unknown voxel size or no ids,
 // by which the mapper drops vertices.
 bool MeshCorrector::has_many_copies(const MapMesh& map) const {
   const std::size_t faces = map.mesh.faces.size();
-  return duplicate_voxels_ > 0.0 && map.voxel_m > 0.0 && !map.ids.empty() &&
+  return limits_.voxels > 0.0 && map.voxel_m > 0.0 && !map.ids.empty() &&
          faces > duplicate_faces_ &&
-         static_cast<double>(faces) >
-             (1.0 + duplicate_share_) * static_cast<double>(distinct_faces_);
+         static_cast<double>(faces) > (1.0 + limits_.share) * static_cast<double>(distinct_faces_);
 }
 
 // Replacements of the copies in optimized_, whose vertices are those `kept` of the map.
@@ -110,8 +105,8 @@ std::vector<std::uint32_t> MeshCorrector::copies_in(const MapMesh& map,
   constexpr double kLongestEdge_voxels = 2.0;  // sqrt(3), plus the deformation
   return find_replacements(optimized_,
                            {elements_of(map.seen_by, kept), elements_of(map.certainty, kept)},
-                           {duplicate_voxels_ * map.voxel_m, kLongestEdge_voxels * map.voxel_m,
-                            max_gap_keyframes_, copies_});
+                           {limits_.voxels * map.voxel_m, kLongestEdge_voxels * map.voxel_m,
+                            max_gap_keyframes_, limits_.copies});
 }
 
 // Surface that the mapper may drop: copies, and surface that is gone now and was gone at the last

@@ -39,12 +39,24 @@ struct [[nodiscard]] MeshCorrection {
   MeshOrigin origin = {};            ///< Keyframes that saw `mesh`.
 };
 
+/// Which copies of surface from several visits stay in a mesh of more than
+/// MeshDeformationConfig::duplicate_faces faces.
+struct CopyLimits {
+  /// Largest distance of a copy from the best ones, after correction, at which it is dropped
+  /// permanently from mesh and map; 0: all copies stay.
+  double voxels = 1.0;
+  std::size_t copies = 2;  ///< Number of copies that stay. With one, walls have holes.
+  /// Number of faces of further copies, as a share of all other faces, above which they are
+  /// dropped. Memory is proportional to 1 + share.
+  double share = 0.5;
+};
+
 /// Keeps a mesh consistent with map and trajectory at the lowest cost. While the map is unchanged,
-/// the mesh is corrected only if a keyframe has moved by the configured threshold. If all keyframes
+/// the mesh is corrected only if a keyframe has moved by more than MotionScale. If all keyframes
 /// have moved equally, as they do when the origin of `world` changes, one rigid motion suffices.
 /// Otherwise, and for a changed map, Local Mesh Optimization deforms the mesh. This removes drift,
 /// so that copies of surface from several visits coincide. If a mesh of more than duplicate_faces
-/// has more copies than duplicate_share permits, only the best ones stay (see
+/// has more copies than CopyLimits permit, only the best ones stay (see
 /// find_replacements()).
 ///
 /// Surface that several later views of the map saw through is left out of the mesh (SightVotes): it
@@ -56,7 +68,7 @@ struct [[nodiscard]] MeshCorrection {
 class MeshCorrector {
  public:
   /// Throws ConfigError if `config` is out of bounds.
-  explicit MeshCorrector(const MeshDeformationConfig& config);
+  explicit MeshCorrector(const MeshDeformationConfig& config, const CopyLimits& limits = {});
 
   /// Returns the corrected mesh, or nullopt if the last one is still valid. Throws under the
   /// conditions of LocalMeshOptimizer::optimize().
@@ -76,13 +88,10 @@ class MeshCorrector {
                                             const std::vector<std::uint32_t>& kept,
                                             std::span<const std::uint32_t> replacements);
 
-  const double duplicate_voxels_;
+  const CopyLimits limits_;
   const std::size_t duplicate_faces_;
-  const double duplicate_share_;
-  const std::size_t copies_;
   const KeyframeIndex max_gap_keyframes_;
   const int seen_through_views_;
-  MotionScale scale_;
   LocalMeshOptimizer optimizer_;
   // Result of the last search for copies.
   std::size_t distinct_faces_ = 0;   // faces that stayed

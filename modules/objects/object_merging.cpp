@@ -6,6 +6,10 @@
 namespace km {
 namespace {
 
+// Part of the smaller box that two boxes of one object share. Both are first enlarged by half of
+// ObjectsConfig::gap_m.
+constexpr double kMergeOverlap = 0.3;
+
 std::vector<RobotId> united(const std::vector<RobotId>& a, const std::vector<RobotId>& b) {
   std::vector<RobotId> all;
   std::ranges::set_union(a, b, std::back_inserter(all));
@@ -30,7 +34,7 @@ bool are_same(const MapObject& a, const MapObject& b, const ObjectsConfig& confi
   const double reach = 0.5 * (box_a.size_m.norm() + box_b.size_m.norm());
   if ((a.box.center - b.box.center).norm() > reach) return false;
   const double smaller = std::min(box_a.volume_m3(), box_b.volume_m3());
-  return smaller > 0.0 && shared_volume_m3(box_a, box_b) >= config.merge_overlap * smaller;
+  return smaller > 0.0 && shared_volume_m3(box_a, box_b) >= kMergeOverlap * smaller;
 }
 
 std::vector<MapObject> merge_objects(std::vector<MapObject> objects, const ObjectsConfig& config) {

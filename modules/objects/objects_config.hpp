@@ -18,8 +18,6 @@ struct ObjectsConfig {
   double gap_m = 0.15;
   double min_surface_m2 = 0.1;
   int min_views = 2;
-  double merge_overlap = 0.3;
-  double period_s = 5.0;
 
   void visit_fields(auto& visitor) {
     visitor.field(
@@ -36,12 +34,6 @@ struct ObjectsConfig {
                   "[m^2] smaller surfaces are no objects");
     visitor.field("min_views", min_views, {1, 1000000},
                   "number of keyframes below which a surface is no object");
-    visitor.field("merge_overlap", merge_overlap, {0.01, 1.0},
-                  "objects of one class are the same if their boxes share this part of the smaller "
-                  "one; both boxes are first enlarged by half of gap_m");
-    visitor.field("period_s", period_s, {0.5, 86400.0},
-                  "[s] shortest time between two messages with the objects of this robot, which "
-                  "has 150 bytes for each object and is sent only after changes");
   }
 };
 

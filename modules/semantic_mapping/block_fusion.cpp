@@ -126,12 +126,12 @@ BlockFusion::BlockFusion(const SemanticMappingConfig& config, const DepthView& v
   block_m_ = kBlockSide * config.voxel_size_m;
 
   voxel_ = static_cast<float>(config.voxel_size_m);
-  truncation_ = static_cast<float>(config.truncation_voxels) * voxel_;
+  truncation_ = static_cast<float>(SemanticMappingConfig::kTruncation_voxels) * voxel_;
   near_ = kNearVoxels * voxel_;
-  limit_ = config.carving ? std::numeric_limits<float>::max() : truncation_;
   closest_ = 0.5F * static_cast<float>(std::max(config.min_range_m, 0.01));
-  max_weight_ = static_cast<float>(config.max_weight);
-  variance_ = static_cast<float>(config.depth_sigma_m * config.depth_sigma_m);
+  max_weight_ = static_cast<float>(SemanticMappingConfig::kMaxWeight);
+  variance_ = static_cast<float>(SemanticMappingConfig::kDepthSigma_m *
+                                 SemanticMappingConfig::kDepthSigma_m);
   const double sigma_per_m =
       config.depth_sigma_per_m.value_or(SemanticMappingConfig::kDepthSigma_per_m);
   quadratic_variance_ = static_cast<float>(sigma_per_m * sigma_per_m);
@@ -209,7 +209,7 @@ void BlockFusion::project(const Eigen::Vector3f& start, Row& row) const {
 }
 
 void BlockFusion::update(Row& row, float* distance, float* weight) const {
-  const float truncation = truncation_, limit = limit_, near = near_, max_weight = max_weight_;
+  const float truncation = truncation_, near = near_, max_weight = max_weight_;
   const float ramp = 1.0F / (truncation_ - voxel_);
   const float variance = variance_, quadratic = quadratic_variance_;
   std::uint32_t moved = 0, near_bits = 0;
@@ -217,7 +217,7 @@ void BlockFusion::update(Row& row, float* distance, float* weight) const {
     const auto mm = static_cast<std::int32_t>(row.pixel[i] & 0xFFFFU);
     const float depth = 0.001F * static_cast<float>(mm);
     const float s = depth - row.z[i];
-    const bool observed = (mm > 0) & (s > -truncation) & (s < limit);
+    const bool observed = (mm > 0) & (s > -truncation);
     const float squared = depth * depth;
     float w = variance / (variance + quadratic * squared * squared);
     const float fade = (truncation + s) * ramp;

@@ -34,7 +34,7 @@ struct NearBlocks {
 ///
 /// A voxel at depth z that projects to a pixel of depth d has the signed distance s = d - z along
 /// the optical axis. If s > -truncation, the voxel's distance becomes the weighted mean of its
-/// former value and min(s, truncation) (Curless and Levoy, 1996). The weight is depth_sigma_m^2 /
+/// former value and min(s, truncation) (Curless and Levoy, 1996). The weight is kDepthSigma_m^2 /
 /// sigma(d)^2 (see SemanticMappingConfig). From one voxel behind the surface to the truncation the
 /// weight falls linearly to zero, because a voxel farther behind may belong to another surface.
 class BlockFusion {
@@ -76,7 +76,7 @@ class BlockFusion {
   Eigen::Vector3d offset_;  // K t
   Eigen::Matrix3f step_;    // columns: M times one voxel along x, y, z
   double block_m_;
-  float truncation_, voxel_, near_, limit_, closest_, max_weight_;
+  float truncation_, voxel_, near_, closest_, max_weight_;
   float variance_, quadratic_variance_;  // depth_sigma_m^2, depth_sigma_per_m^2
 };
 

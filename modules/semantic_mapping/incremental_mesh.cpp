@@ -59,12 +59,8 @@ class PlaceOfId {
 
 }  // namespace
 
-IncrementalMesh::IncrementalMesh(double voxel_size_m, const LabelModel& labels,
-                                 double min_label_probability, double min_weight)
-    : voxel_m_(voxel_size_m),
-      label_model_(labels),
-      min_label_probability_(min_label_probability),
-      min_weight_(static_cast<float>(min_weight)) {}
+IncrementalMesh::IncrementalMesh(double voxel_size_m, double min_weight)
+    : voxel_m_(voxel_size_m), min_weight_(static_cast<float>(min_weight)) {}
 
 MeshUpdateReport IncrementalMesh::update(BlockMap& map) {
   std::vector<VoxelBlock*> blocks;
@@ -201,7 +197,7 @@ void IncrementalMesh::compute(Vertex& vertex, const BlockCells& cells, const Eig
   const VoxelLabels near_labels = labels_of(near_block, near_voxel);
   const VoxelLabels far_labels = labels_of(far_block, far_voxel);
   vertex.labels = a < 0.0F ? near_labels : far_labels;
-  if (label_of(vertex.labels) == 0) vertex.labels = a < 0.0F ? far_labels : near_labels;
+  if (vertex.labels.best() == 0) vertex.labels = a < 0.0F ? far_labels : near_labels;
 
   vertex.certainty =
       certainty_of(std::min(near_block.weight[near_voxel], far_block.weight[far_voxel]));
@@ -211,12 +207,6 @@ void IncrementalMesh::compute(Vertex& vertex, const BlockCells& cells, const Eig
   };
   if (seen(near_block, near_voxel)) vertex.last = std::max(vertex.last, near_block.last_seen);
   if (seen(far_block, far_voxel)) vertex.last = std::max(vertex.last, far_block.last_seen);
-}
-
-LabelId IncrementalMesh::label_of(const VoxelLabels& labels) const {
-  const LabelId best = labels.best();
-  if (best == 0 || min_label_probability_ <= 0.0) return best;
-  return labels.probability(best, label_model_) >= min_label_probability_ ? best : LabelId{0};
 }
 
 std::size_t IncrementalMesh::remove_unused() {
@@ -348,7 +338,7 @@ MapMesh IncrementalMesh::snapshot(const BlockMap& map, bool labelled) const {
     const Vertex& vertex = vertices_[place];
     index[place] = static_cast<std::uint32_t>(mesh.vertices.size());
     mesh.vertices.push_back(vertex.position);
-    if (labelled) mesh.labels.push_back(label_of(vertex.labels));
+    if (labelled) mesh.labels.push_back(vertex.labels.best());
     map_mesh.seen_by.push_back({vertex.first, vertex.last});
     map_mesh.ids.push_back(vertex.id);
     map_mesh.certainty.push_back(vertex.certainty);

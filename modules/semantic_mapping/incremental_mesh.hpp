@@ -32,8 +32,7 @@ struct SurfaceDrop {
 class IncrementalMesh {
  public:
   /// Makes no face at a voxel whose weight is not above `min_weight`.
-  IncrementalMesh(double voxel_size_m, const LabelModel& labels, double min_label_probability,
-                  double min_weight);
+  IncrementalMesh(double voxel_size_m, double min_weight);
 
   /// Meshes the blocks that changed, and the blocks below them whose cells extend into them.
   MeshUpdateReport update(BlockMap& map);
@@ -86,7 +85,6 @@ class IncrementalMesh {
   std::uint32_t new_vertex(KeyframeIndex keyframe);
   void compute(Vertex& vertex, const BlockCells& cells, const Eigen::Vector3i& voxel,
                int axis) const;
-  [[nodiscard]] LabelId label_of(const VoxelLabels& labels) const;
   [[nodiscard]] std::vector<std::uint32_t> final_replacements(
       const SupersededSurface& superseded) const;
   std::size_t remove_unused();
@@ -94,8 +92,6 @@ class IncrementalMesh {
 
   MarchingCubes table_;
   double voxel_m_;
-  LabelModel label_model_;
-  double min_label_probability_;
   float min_weight_;
 
   std::vector<Vertex> vertices_;

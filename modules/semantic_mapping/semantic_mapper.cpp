@@ -20,14 +20,8 @@ namespace {
 // the next one.
 constexpr std::size_t kFullEighths = 7;
 
-LabelModel model_of(const SemanticMappingConfig& config, const LabelPalette& palette) {
-  std::size_t known = 0;
-  for (const LabelClass& entry : palette.classes()) known += entry.id != 0 ? 1 : 0;
-  return {std::max<std::size_t>(known, 1), config.label_confidence};
-}
-
 DepthNoise noise_of(const SemanticMappingConfig& config) {
-  return {config.depth_sigma_m,
+  return {SemanticMappingConfig::kDepthSigma_m,
           config.depth_sigma_per_m.value_or(SemanticMappingConfig::kDepthSigma_per_m)};
 }
 
@@ -74,8 +68,7 @@ struct SemanticMapper::State {
         camera(its_camera),
         views(camera, config.min_range_m, config.max_range_m, palette),
         coarse_views(camera, noise_of(config), config.min_range_m),
-        mesh(config.voxel_size_m, model_of(config, palette), config.min_label_probability,
-             config.min_weight) {}
+        mesh(config.voxel_size_m, config.min_weight) {}
 
   std::vector<Update> select(const DepthView& view, const BlockFusion& fusion,
                              const SE3& T_odom_cam, IntegrationReport& report);
@@ -119,7 +112,6 @@ std::vector<SemanticMapper::State::Update> SemanticMapper::State::select(
     block->last_seen_m = way_m;
     updates.push_back({block, true, false});
   }
-  if (!config.carving) return updates;
   for (const auto& block : map.blocks()) {
     if (block->selected_in == frame) continue;
     const BlockFusion::Relation relation = fusion.relation_to(*block);

@@ -1,16 +1,9 @@
 #include "modules/semantic_mapping/voxel_labels.hpp"
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
 #include <utility>
 
 namespace km {
-
-double LabelModel::log_odds() const {
-  if (classes < 2) return std::numeric_limits<double>::infinity();
-  return std::log(confidence * static_cast<double>(classes - 1) / (1.0 - confidence));
-}
 
 void VoxelLabels::observe_other(LabelId label, unsigned votes) {
   std::size_t place = 0;
@@ -58,18 +51,6 @@ double VoxelLabels::weight_of(LabelId label) const {
     if (ids_[i] == label && label != 0)
       return static_cast<double>(votes_[i]) / static_cast<double>(kVotesPerWeight);
   return 0.0;
-}
-
-double VoxelLabels::probability(LabelId label, const LabelModel& model) const {
-  if (model.classes < 2) return 1.0;
-  const double delta = model.log_odds();
-  const double top = weight_of(best());
-  double sum = 0.0;  // sum of exp(delta (n - top)) over all classes
-  std::size_t unseen = model.classes;
-  for (std::size_t i = 0; i < kPlaces && votes_[i] > 0 && unseen > 0; ++i, --unseen)
-    sum += std::exp(delta * (weight_of(ids_[i]) - top));
-  sum += static_cast<double>(unseen) * std::exp(-delta * top);
-  return std::exp(delta * (weight_of(label) - top)) / sum;
 }
 
 }  // namespace km

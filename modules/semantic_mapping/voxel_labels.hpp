@@ -8,24 +8,16 @@
 
 namespace km {
 
-/// Reliability of one observed label.
+/// The votes on the label of one voxel: for each label l the sum n_l of the weights of its
+/// observations.
 ///
 /// An observation of label m has the likelihood P(m | label l) = c for l = m and (1 - c) / (L - 1)
-/// for each other of the L classes. It sums to one over m, so that one of five labels, seen once at
-/// 0.8, has the posterior 0.8. (With 1 - c for every other class, as in some mappers, it would be
-/// 0.5.) From a uniform prior, observations of weights w_m, with likelihoods to the power of w_m,
-/// give
+/// for each other of the L classes. From a uniform prior, observations of weights w_m, with
+/// likelihoods to the power of w_m, give
 ///   P(l | all) ~ exp(delta n_l),  delta = log(c (L - 1) / (1 - c)),
-/// with n_l the sum of the weights of the observations of l. A voxel stores only these sums.
-struct LabelModel {
-  std::size_t classes = 1;  ///< L, without unknown.
-  double confidence = 0.8;  ///< c, at least 0.5.
-
-  /// delta; infinite for a single class, which is certain.
-  [[nodiscard]] double log_odds() const;
-};
-
-/// The sums n_l of one voxel in 8 bytes, for the four labels with most votes, in eighths of weight.
+/// so that the most probable label is the one with most votes, for any c above 1 / L.
+///
+/// A voxel has the sums in 8 bytes, for the four labels with most votes, in eighths of weight.
 /// Exact while no more than four labels were seen. The votes of a fifth label are subtracted from
 /// each of the four, and the fifth takes an entry that becomes free (Misra and Gries, "Finding
 /// Repeated Elements", 1982). A label with more than a fifth of all votes is therefore never lost.
@@ -59,9 +51,6 @@ class VoxelLabels {
 
   /// Sum of the weights n_l kept for a label.
   [[nodiscard]] double weight_of(LabelId label) const;
-
-  /// Posterior of a known label.
-  [[nodiscard]] double probability(LabelId label, const LabelModel& model) const;
 
  private:
   static constexpr std::size_t kPlaces = 4;

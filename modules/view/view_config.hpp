@@ -29,7 +29,7 @@ struct ViewConfig {
     visitor.field("past_bytes_per_s", past_bytes_per_s, {500.0, 1e9},
                   "[B/s] maximum rate while earlier data are sent to a new viewer");
     visitor.field("mesh_bytes_per_s", mesh_bytes_per_s, {1000.0, 1e9},
-                  "[B/s] maximum rate of the map: the mesh in chunks (map.cell_m), and objects, 2D "
+                  "[B/s] maximum rate of the map: the mesh in chunks, and objects, 2D "
                   "map and slice of the distance field, at most a quarter of it");
     visitor.field("images_per_s", images_per_s, {0.0, 30.0},
                   "[1/s] camera images, 640 pixels wide, while a viewer asks for them; 0: none");

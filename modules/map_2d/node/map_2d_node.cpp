@@ -15,6 +15,8 @@ namespace {
 // Larger than the number of views during the making of any map, so that publishers do not wait.
 constexpr std::size_t kQueue = 4096;
 
+constexpr double kPeriod_s = 5.0;  // smallest interval between 2D maps
+
 // Making maps takes at most this share of the time.
 constexpr double kShare = 0.2;
 
@@ -75,11 +77,11 @@ void Map2dNode::make_map() {
       make_map_2d(config_, {*surface_->mesh, palette_, views_, surface_->T_world_odom});
   const double end_s = steady_now_s();
   timing_.add(end_s - start_s);
-  next_s_ = end_s + std::max(config_.period_s, (end_s - start_s) * (1.0 - kShare) / kShare);
+  next_s_ = end_s + std::max(kPeriod_s, (end_s - start_s) * (1.0 - kShare) / kShare);
   if (result.status == Map2dStatus::kTooLarge)
     log::limited(log::Level::kWarn, name(), "too large")
         << "no 2D map: it needs " << fixed(result.cells_needed, 0)
-        << " cells, more than max_cells (" << config_.max_cells
+        << " cells, more than max_cells (" << kMaxMap2dCells
         << "); raise map_2d.max_cells or map_2d.resolution_m";
   if (result.status != Map2dStatus::kMade) return;
   log::debug(name()) << result.grid.width << " x " << result.grid.height << " cells from "

@@ -24,8 +24,8 @@ constexpr double kPauses = 10.0;
 // Poses take at most this share of the budget, because each message states all of them.
 constexpr double kPosesShare = 0.1;
 
-// Poses are sent when they move surface by this share of min_move_m. A chunk that was sent with
-// newer poses may lie this far from its neighbours until the next poses.
+// Poses are sent when they move surface by this share of kMinChunkMove_m. A chunk that was sent
+// with newer poses may lie this far from its neighbours until the next poses.
 constexpr double kPosesMove = 0.5;
 
 // Unused budget is kept for this time.
@@ -43,7 +43,7 @@ MeshChunksNode::MeshChunksNode(const MapSharingConfig& config, RobotId self,
       self_(self),
       topics_(topics),
       reduction_(std::move(reduction)),
-      schedule_(config.min_move_m),
+      schedule_(kMinChunkMove_m),
       sent_poses_{.robot = self},
       budget_bytes_(full_budget(config.max_bytes_per_s)),
       worker_(
@@ -77,22 +77,19 @@ void MeshChunksNode::take(const Offer& offer) {
   SplitMesh pieces = split(offer);
   if (pieces.oversized_faces > 0)
     log::limited(log::Level::kWarn, name(), "oversized")
-        << pieces.oversized_faces
-        << " faces are too long for map.position_step_m = " << config_.position_step_m
-        << " m and are not sent";
+        << pieces.oversized_faces << " faces are longer than 21 m and are not sent";
   if (reduction_ || offer.origin == nullptr) return schedule_.update(std::move(pieces.chunks));
   const MeshPoses poses{.robot = self_,
                         .anchor = offer.anchor,
                         .keyframes = mesh_keyframes(offer.origin->T_world_kf)};
   schedule_.update(std::move(pieces.chunks), &poses);
   waiting_poses_.reset();
-  if (has_moved(sent_poses_, poses, kPosesMove * config_.min_move_m)) waiting_poses_ = poses;
+  if (has_moved(sent_poses_, poses, kPosesMove * kMinChunkMove_m)) waiting_poses_ = poses;
 }
 
 SplitMesh MeshChunksNode::split(const Offer& offer) const {
-  const ChunkGrid grid{config_.cell_m, config_.position_step_m};
-  if (reduction_) return split_mesh(reduction_(*offer.mesh), self_, offer.anchor, grid);
-  return split_mesh(*offer.mesh, self_, offer.anchor, grid, offer.origin.get());
+  if (reduction_) return split_mesh(reduction_(*offer.mesh), self_, offer.anchor, {});
+  return split_mesh(*offer.mesh, self_, offer.anchor, {}, offer.origin.get());
 }
 
 // A message is sent while there is no debt. It may cause a debt.

@@ -32,8 +32,8 @@ struct MeshChunksTopics {
 /// robot's best mesh passes it to offer().
 ///
 /// A correction of the trajectory moves chunks by the poses of their keyframes, which take at most
-/// a tenth of the bytes. They are sent when they move some surface by more than half of min_move_m,
-/// and when keyframes were added.
+/// a tenth of the bytes. They are sent when they move some surface by more than half of
+/// kMinChunkMove_m, and when keyframes were added.
 class MeshChunksNode final : public Node {
  public:
   /// A mesh in the frame `world` of the robot `anchor`, with the keyframes that saw it, if known. A

@@ -15,6 +15,10 @@ namespace {
 // Larger than the number of messages during an extraction, so that no sender waits.
 constexpr std::size_t kQueue = 4096;
 
+// Shortest time between two messages with the objects of this robot, which has 150 bytes for each
+// object and is sent only after changes.
+constexpr double kPeriod_s = 5.0;
+
 // Change of a box or of its keyframe that other robots are sent [m].
 constexpr double kMinChange_m = 0.05;
 
@@ -82,7 +86,7 @@ void ObjectsNode::take(const RobotObjects& received) {
 
 void ObjectsNode::send(double now_s) {
   if (!to_send_ || now_s < next_s_) return;
-  next_s_ = now_s + config_.period_s;
+  next_s_ = now_s + kPeriod_s;
   last_sent_ = std::exchange(to_send_, std::nullopt);
   own_.publish(*last_sent_);
 }

@@ -45,7 +45,7 @@ struct ViewTopics {
 /// Parameters for splitting the mesh into chunks.
 struct ViewMesh {
   ChunkGrid grid;
-  double min_move_m = 0.01;  ///< See differ().
+  double min_move_m = kMinChunkMove_m;  ///< See differ().
 };
 
 /// Sends the state of the robot to viewers (see ViewUpdate), on topics of its own in the team's

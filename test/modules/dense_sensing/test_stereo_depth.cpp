@@ -163,9 +163,6 @@ TEST_CASE("Rigs and depth ranges without disparities to search are refused", "[s
   config.max_depth_m = 4.0;
   CHECK_THROWS_WITH(StereoDepth(rig, config), Catch::Contains("not below max_depth_m"));
   config = {};
-  config.block_px = 4;
-  CHECK_THROWS_WITH(StereoDepth(rig, config), Catch::Contains("not odd"));
-  config = {};
   config.min_depth_m = 0.1;  // 253 px: fits
   CHECK_NOTHROW(StereoDepth(rig, config));
   CHECK_THROWS_WITH(StereoDepth(test_rig(0.2), config), Catch::Contains("as wide as the image"));

@@ -113,17 +113,6 @@ TEST_CASE("A mesh that changes while it is sent ends in its newest state", "[nod
   CHECK(lowest == Approx(-0.5F).margin(0.01));
 }
 
-TEST_CASE("Cells and steps at their bounds can be sent", "[node]") {
-  SentMesh out;
-  MapSharingConfig config;
-  config.cell_m = GENERATE(0.1, 20.0);
-  config.position_step_m = GENERATE(0.001, 0.05);
-  MeshChunksNode node(config, 7, out.topics());
-  CHECK_NOTHROW(node.step({kAnchor, sheet(10)}, 0.0));
-  config.cell_m = 0.05;
-  CHECK_THROWS_AS(MeshChunksNode(config, 7, out.topics()), ConfigError);
-}
-
 // A sheet of 3 m whose left half was seen by keyframes 0 to 2 and the right one by 12.
 struct TwoViews {
   TwoViews() : mesh(sheet(30)) {

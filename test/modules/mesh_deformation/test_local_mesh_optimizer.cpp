@@ -93,18 +93,17 @@ TEST_CASE("A straight corridor follows bent keyframes and stays locally rigid",
 TEST_CASE("A warm start and a cold start have the same solution", "[mesh_deformation]") {
   // Within a millimetre at the default tolerance, and within the precision of floats at a small
   // one.
-  const auto [tolerance, same_m] = GENERATE(table<double, double>(
-      {{MeshDeformationConfig().energy_tolerance, 1e-3}, {1e-14, 2 * kSame}}));
+  const auto [tolerance, same_m] = GENERATE(
+      table<double, double>({{DeformationStop().energy_tolerance, 1e-3}, {1e-14, 2 * kSame}}));
   CAPTURE(tolerance);
-  MeshDeformationConfig config;
-  config.energy_tolerance = tolerance;
+  const DeformationStop stop{.energy_tolerance = tolerance};
   const MapMesh map = sheet(kSheet);
   const std::vector<SE3> keyframes = keyframes_above(kSheet);
-  LocalMeshOptimizer optimizer(config);
+  LocalMeshOptimizer optimizer({}, stop);
   for (const double radius_m : {60.0, 20.0, -30.0, 10.0}) {
     CAPTURE(radius_m);
     const DeformedMesh warm = optimizer.optimize(map, keyframes, bent(keyframes, radius_m));
-    LocalMeshOptimizer fresh(config);
+    LocalMeshOptimizer fresh({}, stop);
     const DeformedMesh cold = fresh.optimize(map, keyframes, bent(keyframes, radius_m));
     CHECK(warm.report.warm == (radius_m != 60.0));
     CHECK_FALSE(cold.report.warm);
@@ -234,8 +233,8 @@ TEST_CASE("A refused call leaves the optimizer unchanged", "[mesh_deformation]")
 
 TEST_CASE("A configuration out of bounds is refused", "[mesh_deformation]") {
   MeshDeformationConfig config;
-  config.interpolation_nodes = 9;
-  CHECK_THROWS_WITH(LocalMeshOptimizer(config), Contains("interpolation_nodes"));
+  config.node_spacing_m = 0.0;
+  CHECK_THROWS_WITH(LocalMeshOptimizer(config), Contains("node_spacing_m"));
 }
 
 }  // namespace km

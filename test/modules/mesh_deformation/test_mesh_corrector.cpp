@@ -178,9 +178,9 @@ TEST_CASE("The newer of two visits that coincide after correction stays", "[mesh
   TwoVisits visits;
   MeshDeformationConfig config;
   config.duplicate_faces = 0;
-  config.duplicate_copies = 1;
+  CopyLimits limits{.copies = 1};
   SECTION("corrected") {
-    MeshCorrector corrector(config);
+    MeshCorrector corrector(config, limits);
     const auto first = corrector.correct(visits.input());
     REQUIRE(first);
     CHECK(first->mesh.faces.size() == visits.one());
@@ -208,30 +208,30 @@ TEST_CASE("The newer of two visits that coincide after correction stays", "[mesh
   }
   SECTION("with uncorrected poses both stay") {
     visits.T_world_kf = visits.T_odom_kf;
-    const auto result = MeshCorrector(config).correct(visits.input());
+    const auto result = MeshCorrector(config, limits).correct(visits.input());
     REQUIRE(result);
     CHECK(result->mesh.faces.size() == 2 * visits.one());
     CHECK(result->superseded.vertices.empty());
   }
   SECTION("switched off, both stay") {
-    config.duplicate_voxels = 0.0;
-    CHECK(MeshCorrector(config).correct(visits.input())->superseded_faces == 0);
+    limits.voxels = 0.0;
+    CHECK(MeshCorrector(config, limits).correct(visits.input())->superseded_faces == 0);
   }
   SECTION("below the bound on faces both stay") {
     config.duplicate_faces = static_cast<int>(visits.map.mesh.faces.size());
-    CHECK(MeshCorrector(config).correct(visits.input())->superseded_faces == 0);
+    CHECK(MeshCorrector(config, limits).correct(visits.input())->superseded_faces == 0);
     --config.duplicate_faces;
-    CHECK(MeshCorrector(config).correct(visits.input())->superseded_faces == visits.one());
+    CHECK(MeshCorrector(config, limits).correct(visits.input())->superseded_faces == visits.one());
   }
   SECTION("below the bound on the share of copies both stay") {
-    config.duplicate_share = 1.0;
-    CHECK(MeshCorrector(config).correct(visits.input())->superseded_faces == 0);
-    config.duplicate_share = 0.99;
-    CHECK(MeshCorrector(config).correct(visits.input())->superseded_faces == visits.one());
+    limits.share = 1.0;
+    CHECK(MeshCorrector(config, limits).correct(visits.input())->superseded_faces == 0);
+    limits.share = 0.99;
+    CHECK(MeshCorrector(config, limits).correct(visits.input())->superseded_faces == visits.one());
   }
   SECTION("with voxels of unknown size both stay") {
     visits.map.voxel_m = 0.0;
-    CHECK(MeshCorrector(config).correct(visits.input())->superseded_faces == 0);
+    CHECK(MeshCorrector(config, limits).correct(visits.input())->superseded_faces == 0);
   }
 }
 
@@ -239,9 +239,9 @@ TEST_CASE("Copies stay until a further visit exceeds their share", "[mesh_deform
   TwoVisits visits;
   MeshDeformationConfig config;
   config.duplicate_faces = 0;
-  config.duplicate_copies = 1;
-  config.duplicate_share = 1.0;
-  MeshCorrector corrector(config);
+  CopyLimits limits{.copies = 1};
+  limits.share = 1.0;
+  MeshCorrector corrector(config, limits);
   CHECK(corrector.correct(visits.input())->mesh.faces.size() == 2 * visits.one());
   const std::size_t one = visits.one();
   visits.add_visit();
@@ -257,8 +257,8 @@ TEST_CASE("A correction from scratch searches for copies regardless of earlier c
   const std::vector<SE3> T_world_kf = visits.T_world_kf;
   MeshDeformationConfig config;
   config.duplicate_faces = 0;
-  config.duplicate_copies = 1;
-  MeshCorrector corrector(config);
+  CopyLimits limits{.copies = 1};
+  MeshCorrector corrector(config, limits);
   visits.T_world_kf = visits.T_odom_kf;  // with drift the two visits are different surfaces
   REQUIRE(corrector.correct(visits.input())->superseded_faces == 0);
   visits.T_world_kf = T_world_kf;
@@ -272,8 +272,8 @@ TEST_CASE("The deformation graph does not grow in a place visited repeatedly",
   const std::uint64_t count = visits.map.ids.size() / 2;
   MeshDeformationConfig config;
   config.duplicate_faces = 0;
-  config.duplicate_copies = 1;
-  MeshCorrector corrector(config);
+  CopyLimits limits{.copies = 1};
+  MeshCorrector corrector(config, limits);
   std::size_t nodes_at_first = 0, most_nodes = 0;
   for (std::uint64_t visit = 0; visit < 8; ++visit) {
     const auto result = corrector.correct(visits.input());

@@ -133,7 +133,8 @@ SemanticMappingConfig window_of_3_m() {
 class Flight {
  public:
   Flight(double duplicate_voxels, int period)
-      : corrector_(config(duplicate_voxels)), period_(period) {}
+      : corrector_(all_faces(), {.voxels = duplicate_voxels, .copies = 1, .share = 0.0}),
+        period_(period) {}
 
   void lap() {
     for (int i = 0; i < kFramesPerLap; ++i) {
@@ -155,12 +156,9 @@ class Flight {
   [[nodiscard]] const MeshCorrection& corrected() const { return correction_; }
 
  private:
-  static MeshDeformationConfig config(double duplicate_voxels) {
+  static MeshDeformationConfig all_faces() {
     MeshDeformationConfig config;
-    config.duplicate_voxels = duplicate_voxels;
     config.duplicate_faces = 0;
-    config.duplicate_copies = 1;
-    config.duplicate_share = 0.0;
     return config;
   }
   void correct() {

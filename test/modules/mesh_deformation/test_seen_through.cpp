@@ -144,8 +144,7 @@ TEST_CASE("The mapper may drop a box that two searches for copies find gone",
   auto recording = TwoPasses({{kWall, kFloor, kParked}}, {{kWall, kFloor}}).record();
   MeshDeformationConfig config;
   config.duplicate_faces = 0;
-  config.duplicate_share = 0.0;
-  MeshCorrector corrector(config);
+  MeshCorrector corrector(config, {.share = 0.0});
   REQUIRE(corrector.correct(recording.input(1))->superseded.vertices.empty());
 
   MapMesh& map = recording.map;  // one face more lets a second search follow

@@ -50,44 +50,6 @@ TEST_CASE("Blocks beyond the map's reach do not exist", "[semantic_mapping]") {
 
 constexpr unsigned kOne = VoxelLabels::kVotesPerWeight;  // votes of weight 1
 
-TEST_CASE("One observation of confidence 0.8 among five labels has the posterior 0.8",
-          "[semantic_mapping]") {
-  const LabelModel model{5, 0.8};
-  VoxelLabels labels;
-  for (LabelId label = 1; label <= 5; ++label)
-    CHECK(labels.probability(label, model) == Approx(0.2));
-  labels.observe(2, kOne);
-  CHECK(labels.best() == 2);
-  CHECK(labels.probability(2, model) == Approx(0.8));
-  for (const LabelId other : std::array<LabelId, 4>{1, 3, 4, 5})
-    CHECK(labels.probability(other, model) == Approx(0.05));
-}
-
-TEST_CASE("The posterior is the product of the likelihoods", "[semantic_mapping]") {
-  // Label 2 twice, label 4 once: 0.8^2 0.05, 0.05^2 0.8, and 0.05^3 for the three others.
-  const LabelModel model{5, 0.8};
-  VoxelLabels labels;
-  labels.observe(2, kOne);
-  labels.observe(4, kOne);
-  labels.observe(2, kOne);
-  const double two = 0.8 * 0.8 * 0.05, four = 0.05 * 0.05 * 0.8, other = 0.05 * 0.05 * 0.05;
-  const double sum = two + four + 3.0 * other;
-  CHECK(labels.probability(2, model) == Approx(two / sum));
-  CHECK(labels.probability(4, model) == Approx(four / sum));
-  CHECK(labels.probability(1, model) == Approx(other / sum));
-}
-
-TEST_CASE("An observation of weight w counts as its likelihood to the power of w",
-          "[semantic_mapping]") {
-  const LabelModel model{3, 0.6};  // others 0.2
-  VoxelLabels labels;
-  labels.observe(1, VoxelLabels::votes_of(0.25F));
-  const double one = std::pow(0.6, 0.25), other = std::pow(0.2, 0.25);
-  CHECK(labels.probability(1, model) == Approx(one / (one + 2.0 * other)));
-  CHECK(VoxelLabels::votes_of(1.0F) == kOne);
-  CHECK(VoxelLabels::votes_of(0.0F) == 1);
-}
-
 TEST_CASE("Four labels are counted exactly, in any order", "[semantic_mapping]") {
   const unsigned seed = GENERATE(1U, 2U, 3U);
   CAPTURE(seed);

@@ -41,7 +41,7 @@ void fill(BlockMap& map, int n, const Distance& distance) {
 }
 
 IncrementalMesh new_mesh() {
-  return {kVoxel_m, LabelModel{}, 0.0, 0.0};
+  return {kVoxel_m, 0.0};
 }
 
 const Eigen::Vector3d kCentre(0.013, -0.021, 0.037);  // on no grid line
