@@ -1,30 +1,23 @@
 #pragma once
 
 #include <filesystem>
-#include <span>
-#include <string_view>
 
 #include "modules/mesh/labelled_mesh.hpp"
 
 namespace km {
 
-/// A file format of meshes.
-struct MeshFormat {
-  std::string_view extension;  ///< ".ply"
-  /// Throws InputFileError. The other function throws std::system_error.
-  LabelledMesh (*read)(const std::filesystem::path& file);
-  void (*write)(const std::filesystem::path& file, const LabelledMesh& mesh);
-};
-
-/// All formats. The first one is PLY, in which robots write.
-[[nodiscard]] std::span<const MeshFormat> mesh_formats();
-
-/// Reads a mesh in the format of the file's extension, or as PLY if no format has this extension.
-/// Throws InputFileError.
+/// Reads a PLY file: ascii, binary little or big endian. It uses the properties x, y, z, red,
+/// green, blue and label of `vertex`, and vertex_indices (or vertex_index) and label of `face`, all
+/// of any scalar type. Other properties are skipped. Polygons are divided into fans. If only faces
+/// have labels, a vertex gets the label of its last face. Throws InputFileError for a file that is
+/// missing, truncated or not PLY, for coordinates that are not finite, and for faces with vertices
+/// that do not exist.
 [[nodiscard]] LabelledMesh read_mesh(const std::filesystem::path& file);
 
-/// Writes a mesh in the format of the file's extension. Throws std::system_error if it cannot be
-/// written, and std::invalid_argument for an extension that no format has.
+/// Writes binary little endian PLY, which read_mesh() reads back unchanged: vertices as float, then
+/// uchar red, green, blue and label if the mesh has them. Throws std::invalid_argument for another
+/// extension than .ply, and std::system_error under the conditions of write_file(). Then it leaves
+/// no partial file.
 void write_mesh(const std::filesystem::path& file, const LabelledMesh& mesh);
 
 }  // namespace km

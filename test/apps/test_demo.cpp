@@ -7,7 +7,7 @@
 #include "modules/evaluation/association.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
 #include "modules/map_2d/map_2d.hpp"
-#include "modules/mesh/ply_file.hpp"
+#include "modules/mesh/mesh_file.hpp"
 #include "modules/sensors/text_file.hpp"
 #include "test/support/command.hpp"
 #include "test/support/demo_world.hpp"
@@ -37,7 +37,7 @@ void check_map_2d(const std::filesystem::path& robot, const std::filesystem::pat
       read_trajectory(world / "robot0/mav0/state_groundtruth_estimate0/data.csv");
   const auto T_truth_body = pose_at(truth_poses, first.stamp, 0.1, 0.05);
   REQUIRE(T_truth_body);
-  LabelledMesh room = read_ply(world / "world.ply");
+  LabelledMesh room = read_mesh(world / "world.ply");
   room.transform(first.T * T_truth_body->inverse());
   const LabelPalette palette =
       parse_label_palette(read_file(world / "label_palette.csv"), "label_palette.csv");

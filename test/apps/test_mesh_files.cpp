@@ -2,7 +2,7 @@
 
 #include "apps/robot/mesh_files_node.hpp"
 #include "modules/core/lie.hpp"
-#include "modules/mesh/ply_file.hpp"
+#include "modules/mesh/mesh_file.hpp"
 #include "test/support/captured_log.hpp"
 #include "test/support/nav2_map.hpp"
 #include "test/support/temporary_folder.hpp"
@@ -38,7 +38,7 @@ struct Bench {
                       .slices = slices}};
 
   [[nodiscard]] LabelledMesh written(const char* file) const {
-    return read_ply(folder.path() / file);
+    return read_mesh(folder.path() / file);
   }
 };
 

@@ -8,7 +8,7 @@
 
 #include "apps/lab/pgo_study/team_graph_file.hpp"
 #include "modules/core/input_file.hpp"
-#include "modules/mesh/ply_file.hpp"
+#include "modules/mesh/mesh_file.hpp"
 #include "test/support/eavesdropper.hpp"
 #include "test/support/process.hpp"
 #include "test/support/shared_data.hpp"
@@ -81,13 +81,13 @@ TEST_CASE("Two robots end with the same map of their team", "[system]") {
   for (const int robot : {0, 1}) {
     const fs::path results = folder.path() / std::to_string(robot);
     REQUIRE(read_summary(results / "summary.json").pgo.members.size() == 2);
-    faces[static_cast<std::size_t>(robot)] = read_ply(results / "mesh_optimized.ply").faces.size();
+    faces[static_cast<std::size_t>(robot)] = read_mesh(results / "mesh_optimized.ply").faces.size();
   }
   for (const char* file : {"team_mesh.ply", "team_map.pgm"})
     CHECK(read_input_file(folder.path() / "0" / file) ==
           read_input_file(folder.path() / "1" / file));
   // Each place is there once: fewer faces than both have, and more than one has.
-  const std::size_t fused = read_ply(folder.path() / "0/team_mesh.ply").faces.size();
+  const std::size_t fused = read_mesh(folder.path() / "0/team_mesh.ply").faces.size();
   CHECK(5 * fused < 4 * (faces[0] + faces[1]));
   CHECK(fused > std::max(faces[0], faces[1]));
 }

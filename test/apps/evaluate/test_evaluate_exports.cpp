@@ -2,7 +2,7 @@
 #include <filesystem>
 #include <string>
 
-#include "modules/mesh/ply_file.hpp"
+#include "modules/mesh/mesh_file.hpp"
 #include "test/modules/evaluation/mesh/shapes.hpp"
 #include "test/modules/sensors/euroc_folder.hpp"
 #include "test/support/command.hpp"
@@ -37,7 +37,7 @@ TEST_CASE("objects compares objects in the frame of the truth", "[evaluate]") {
   CHECK(placed.exit_code == 0);
   CHECK_THAT(placed.output, Catch::Contains("all       1      1    1.00"));
   const auto mesh = folder.path() / "far.ply";  // the chair is not in it
-  write_ply(mesh, room());
+  write_mesh(mesh, room());
   CHECK_THAT(run_command(command + " --mesh " + mesh.string()).output,
              Catch::Contains("all       0      0    0.00"));
   folder.write("true.json", "{}");
@@ -51,7 +51,7 @@ TEST_CASE("colmap writes the keyframes of a run that have images", "[evaluate]")
   folder.write("alice/optimized_keyframes.tum",
                "10.050000000 1 2 3 0 0 0 1\n10.150000000 1 2 4 0 0 0 1\n10.99 0 0 0 0 0 0 1\n");
   const auto mesh = folder.path() / "mesh.ply";
-  write_ply(mesh, room());
+  write_mesh(mesh, room());
   const auto output = folder.path() / "out";
   const std::string command = kExportTool + "colmap --results " +
                               (folder.path() / "alice").string() + " --output " + output.string() +

@@ -4,7 +4,7 @@
 #include <opencv2/core.hpp>
 #include <string>
 
-#include "modules/mesh/ply_file.hpp"
+#include "modules/mesh/mesh_file.hpp"
 #include "test/modules/evaluation/mesh/shapes.hpp"
 #include "test/support/command.hpp"
 #include "test/support/image_file.hpp"
@@ -21,13 +21,13 @@ const char* const kPalette =
 // A room, true and as two robots have it: one shifted by 3 cm, the other only its floor.
 struct Meshes {
   Meshes() {
-    write_ply(truth, room());
+    write_mesh(truth, room());
     LabelledMesh shifted = room();
     shifted.transform(make_pose(Eigen::Matrix3d::Identity(), {0.03, 0.02, 0.01}));
     folder.write("a/x", "");
     folder.write("b/x", "");
-    write_ply(a, shifted);
-    write_ply(b, rectangle({0, 0, 0}, {4, 0, 0}, {0, 3, 0}, 8, 1));
+    write_mesh(a, shifted);
+    write_mesh(b, rectangle({0, 0, 0}, {4, 0, 0}, {0, 3, 0}, 8, 1));
   }
 
   TemporaryFolder folder;
@@ -61,7 +61,7 @@ TEST_CASE("mesh starts registration at the transform of the trajectories", "[eva
   const Meshes meshes;
   LabelledMesh far = room();
   far.transform(make_pose(Eigen::Matrix3d::Identity(), {50, 0, 0}));
-  write_ply(meshes.a, far);
+  write_mesh(meshes.a, far);
   const auto truth = meshes.folder.write(
       "truth.tum", "1 0 0 1 0 0 0 1\n2 2 0 1 0 0 0 1\n3 2 2 1 0 0 0 1\n4 0 2 2 0 0 0 1\n");
   const auto moved = meshes.folder.write(
@@ -96,7 +96,7 @@ TEST_CASE("mesh refuses incomparable input by name", "[evaluate]") {
              Catch::Contains("/none.csv: no such file"));
   LabelledMesh cloud = room();
   cloud.faces.clear();
-  write_ply(meshes.a, cloud);
+  write_mesh(meshes.a, cloud);
   CHECK_THAT(run_command(truth + meshes.a.string()).output,
              Catch::Contains("a/mesh: no faces, so no surface to compare"));
   CHECK(run_command(truth + meshes.b.string() + " --crop 0").exit_code == 1);
@@ -127,7 +127,7 @@ TEST_CASE("render stands a map upright by a reference trajectory", "[evaluate]")
   LabelledMesh lying = room();
   lying.transform(
       make_pose(Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitY()).matrix(), {0, 0, 0}));
-  write_ply(meshes.a, lying);
+  write_mesh(meshes.a, lying);
   const auto upright = meshes.folder.write("odometry.tum", "1 1 1 1 0 0 0 1\n2 3 2 1 0 0 0 1\n");
   // The same two poses after a quarter turn about y.
   const auto turned = meshes.folder.write(

@@ -5,7 +5,7 @@
 #include <sstream>
 
 #include "modules/core/text_table.hpp"
-#include "modules/mesh/ply_file.hpp"
+#include "modules/mesh/mesh_file.hpp"
 #include "test/modules/sensors/euroc_folder.hpp"
 #include "test/support/temporary_folder.hpp"
 
@@ -78,7 +78,7 @@ struct Team {
     folder.write(robot + "/optimized.tum", straight_line(optimized_lift_m));
   }
   void leave(const std::string& robot, const char* file, const LabelledMesh& mesh) const {
-    write_ply(folder.path() / robot / file, moved(mesh, -shift));
+    write_mesh(folder.path() / robot / file, moved(mesh, -shift));
   }
   TeamResult collect() const {
     return collect_results(plan, std::vector<RobotRun>(plan.robots.size()));
@@ -306,7 +306,7 @@ TEST_CASE("Closures are judged in the robots' common world", "[team]") {
 TEST_CASE("Meshes are compared with the true one, before and after their correction", "[team]") {
   Team team;
   team.plan.truth_mesh = team.folder.path() / "world.ply";
-  write_ply(team.plan.truth_mesh, corner());
+  write_mesh(team.plan.truth_mesh, corner());
   LabelledMesh mislabelled = moved(corner(), {0.1, 0.1, 0.1});
   mislabelled.labels.assign(mislabelled.labels.size(), 2);
   team.leave("a", "mesh.ply", corner());

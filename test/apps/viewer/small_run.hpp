@@ -10,7 +10,7 @@
 #include "modules/journal/journal_file.hpp"
 #include "modules/map_2d/map_server_files.hpp"
 #include "modules/mesh/map_file.hpp"
-#include "modules/mesh/ply_file.hpp"
+#include "modules/mesh/mesh_file.hpp"
 #include "modules/objects/object_file.hpp"
 #include "test/support/temporary_folder.hpp"
 
@@ -87,7 +87,7 @@ class SmallRun {
         mesh.vertices.emplace_back(x + dx, dy + 0.1F, 0.1F);
       mesh.faces.push_back({first, first + 1, first + 2});
     }
-    write_ply(of(robot) / "mesh_optimized.ply", mesh);
+    write_mesh(of(robot) / "mesh_optimized.ply", mesh);
     if (robot == 0) write_layers(mesh);
     const std::size_t vertices = mesh.vertices.size();
     write_map_file(of(robot) / kMapFile,
@@ -108,8 +108,8 @@ class SmallRun {
     LabelledMesh slice;
     slice.vertices = {{0, 0, 1}, {0.5F, 0, 1}};
     slice.colors = {{255, 0, 0}, {0, 255, 0}};
-    write_ply(of(0) / kDistanceSlice, slice);
-    write_ply(of(0) / kTeamMesh, mesh);
+    write_mesh(of(0) / kDistanceSlice, slice);
+    write_mesh(of(0) / kTeamMesh, mesh);
   }
 
   // The results that the report of a team reads.

@@ -1,7 +1,7 @@
 #include <catch2/catch.hpp>
 
 #include "modules/core/input_file.hpp"
-#include "modules/mesh/ply_file.hpp"
+#include "modules/mesh/mesh_file.hpp"
 #include "test/support/corrupted_input.hpp"
 
 namespace km {
@@ -24,7 +24,7 @@ LabelledMesh tetrahedron() {
 
 std::string binary() {
   const TemporaryFolder folder;
-  write_ply(folder.path() / "mesh.ply", tetrahedron());
+  write_mesh(folder.path() / "mesh.ply", tetrahedron());
   return folder.read("mesh.ply");
 }
 
@@ -35,7 +35,7 @@ TEST_CASE("A corrupted PLY file is refused by name or is a mesh of finite number
   check_corrupted<InputFileError>(
       GENERATE(values<std::string>({kAscii, binary()})), "corrupted.ply",
       [&](const std::string& bytes) {
-        const LabelledMesh mesh = read_ply(folder.write("corrupted.ply", bytes));
+        const LabelledMesh mesh = read_mesh(folder.write("corrupted.ply", bytes));
         for (const auto& vertex : mesh.vertices) CHECK(vertex.squaredNorm() < 1e19F);
         for (const auto& face : mesh.faces)
           for (const std::uint32_t corner : face) CHECK(corner < mesh.vertices.size());
@@ -48,12 +48,12 @@ TEST_CASE("A vertex beyond the range of float is refused") {
   const TemporaryFolder folder;
   std::string text = kAscii;
   text.replace(text.find("1.5 0 0"), 3, "1e300");
-  CHECK_THROWS_WITH(read_ply(folder.write("a.ply", text)),
+  CHECK_THROWS_WITH(read_mesh(folder.write("a.ply", text)),
                     Catch::EndsWith("a.ply: vertex 1 is beyond 1e+09 m"));
 }
 
 TEST_CASE("A path that is no mesh file is refused by name") {
-  check_no_files<InputFileError>(".ply", [](const auto& place) { (void)read_ply(place); });
+  check_no_files<InputFileError>(".ply", [](const auto& place) { (void)read_mesh(place); });
 }
 
 }  // namespace km

@@ -6,7 +6,6 @@
 
 #include "modules/mesh/labelled_mesh.hpp"
 #include "modules/mesh/mesh_file.hpp"
-#include "modules/mesh/ply_file.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/temporary_folder.hpp"
 
@@ -77,8 +76,8 @@ TEST_CASE("A mesh is equal after writing and reading") {
   mesh.faces = {{0, 1, 2}, {1, 3, 2}};
   if (GENERATE(false, true)) mesh = LabelledMesh{};
   const TemporaryFolder folder;
-  write_ply(folder.path() / "a.ply", mesh);
-  const LabelledMesh read = read_ply(folder.path() / "a.ply");
+  write_mesh(folder.path() / "a.ply", mesh);
+  const LabelledMesh read = read_mesh(folder.path() / "a.ply");
   CHECK(read.vertices == mesh.vertices);
   CHECK(read.labels == mesh.labels);
   CHECK(read.colors == mesh.colors);
@@ -88,14 +87,14 @@ TEST_CASE("A mesh is equal after writing and reading") {
 TEST_CASE("The three encodings of one recorded mesh give the same mesh") {
   const auto folder = shared_data("meshes");
   if (!folder) return;
-  const LabelledMesh little = read_ply(*folder / "platonic_shelf.ply");
-  const LabelledMesh ascii = read_ply(*folder / "platonic_shelf_ascii.ply");
-  const LabelledMesh big = read_ply(*folder / "platonic_shelf_big_endian.ply");
+  const LabelledMesh little = read_mesh(*folder / "platonic_shelf.ply");
+  const LabelledMesh ascii = read_mesh(*folder / "platonic_shelf_ascii.ply");
+  const LabelledMesh big = read_mesh(*folder / "platonic_shelf_big_endian.ply");
   REQUIRE(little.faces.size() > 10);
   CHECK(little.faces == ascii.faces);
   CHECK(little.vertices == big.vertices);
   CHECK(little.faces == big.faces);
-  const LabelledMesh cube = read_ply(*folder / "cube.ply");
+  const LabelledMesh cube = read_mesh(*folder / "cube.ply");
   CHECK(cube.vertices.size() == 8);
   CHECK(cube.colors.size() == 8);
 }
@@ -103,10 +102,10 @@ TEST_CASE("The three encodings of one recorded mesh give the same mesh") {
 TEST_CASE("Text with mixed types is read, polygons become fans") {
   const TemporaryFolder folder;
   std::string text = kAsciiHeader + "0 0 0 4\n1 0 0 4\n1 1 0 9\n3 0 1 2\n";
-  CHECK(read_ply(write_text(folder, text)).labels == std::vector<LabelId>{4, 4, 9});
+  CHECK(read_mesh(write_text(folder, text)).labels == std::vector<LabelId>{4, 4, 9});
   text.replace(text.find("vertex 3"), 8, "vertex 4");
   text.replace(text.find("3 0 1 2"), 7, "0 1 0 9\n4 0 1 2 3");
-  const LabelledMesh fan = read_ply(write_text(folder, text));
+  const LabelledMesh fan = read_mesh(write_text(folder, text));
   CHECK(fan.faces == std::vector<LabelledMesh::Face>{{0, 1, 2}, {0, 2, 3}});
 }
 
@@ -114,7 +113,7 @@ TEST_CASE("A file that is no mesh is refused with the file and the reason") {
   const TemporaryFolder folder;
   const auto refuses = [&](const std::string& text, const std::string& why) {
     const auto file = write_text(folder, text);
-    CHECK_THROWS_WITH(read_ply(file), Contains("mesh.ply: ") && Contains(why));
+    CHECK_THROWS_WITH(read_mesh(file), Contains("mesh.ply: ") && Contains(why));
   };
   refuses("", "end_header");
   refuses("solid stl\n", "not a PLY file");
@@ -127,35 +126,16 @@ TEST_CASE("A file that is no mesh is refused with the file and the reason") {
   refuses(kAsciiHeader + "0 0 0 4\n1 0 0 4\n1 1 0 9\n3 0 1 3\n", "names vertex 3");
   refuses(kAsciiHeader + "0 0 0 4\n1 0 0 4\n1 1 0 9\n2 0 1\n", "fewer than 3");
   refuses(kAsciiHeader + "0 0 0 4\n1 0 0 4\n1 1 0 9\n-3 0 1\n", "list of -3");
-  CHECK_THROWS_WITH(read_ply(folder.path() / "none.ply"), Contains("cannot be opened"));
-}
-
-TEST_CASE("The extension of a mesh file determines its format") {
-  const TemporaryFolder folder;
-  const LabelledMesh triangle{.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}},
-                              .labels = {},
-                              .colors = {},
-                              .faces = {{0, 1, 2}}};
-  for (const MeshFormat& format : mesh_formats()) {
-    CAPTURE(std::string(format.extension));
-    const auto file = folder.path() / ("mesh" + std::string(format.extension));
-    write_mesh(file, triangle);
-    CHECK(read_mesh(file).faces == triangle.faces);
-    CHECK(read_mesh(file).vertices == triangle.vertices);
-    CHECK(format.read(file).vertices == triangle.vertices);
-  }
-  CHECK_THROWS_WITH(write_mesh(folder.path() / "mesh.xyz", triangle),
-                    Contains("mesh.xyz: the extension is none of .ply"));
-  CHECK_FALSE(std::filesystem::exists(folder.path() / "mesh.xyz"));
-  std::filesystem::rename(folder.path() / "mesh.ply", folder.path() / "mesh.backup");
-  CHECK(read_mesh(folder.path() / "mesh.backup").vertices == triangle.vertices);
+  CHECK_THROWS_WITH(read_mesh(folder.path() / "none.ply"), Contains("cannot be opened"));
 }
 
 TEST_CASE("A mesh that cannot be written leaves no file") {
   const TemporaryFolder folder;
-  CHECK_THROWS_AS(write_ply(folder.path() / "none" / "a.ply", {}), std::system_error);
+  CHECK_THROWS_AS(write_mesh(folder.path() / "none" / "a.ply", {}), std::system_error);
+  CHECK_THROWS_WITH(write_mesh(folder.path() / "mesh.xyz", {}), Contains("is not .ply"));
+  CHECK_FALSE(std::filesystem::exists(folder.path() / "mesh.xyz"));
   std::filesystem::create_directory(folder.path() / "taken.ply");
-  CHECK_THROWS_AS(write_ply(folder.path() / "taken.ply", {}), std::system_error);
+  CHECK_THROWS_AS(write_mesh(folder.path() / "taken.ply", {}), std::system_error);
   CHECK_FALSE(std::filesystem::exists(folder.path() / "taken.ply.part"));
 }
 
