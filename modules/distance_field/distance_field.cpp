@@ -17,11 +17,6 @@ bool less(const Eigen::Vector3i& a, const Eigen::Vector3i& b) {
   return std::tie(a.z(), a.y(), a.x()) < std::tie(b.z(), b.y(), b.x());
 }
 
-void sort_unique(std::vector<Eigen::Vector3i>& positions) {
-  std::ranges::sort(positions, less);
-  positions.erase(std::unique(positions.begin(), positions.end()), positions.end());
-}
-
 bool any(const BlockBits& bits) {
   return std::ranges::any_of(bits, [](std::uint64_t word) { return word != 0; });
 }
@@ -35,12 +30,6 @@ double checked_voxel(double voxel_m, double max_m) {
     throw std::invalid_argument("distance field: " + shortest_text(max_m) + " m in voxels of " +
                                 shortest_text(voxel_m) + " m");
   return voxel_m;
-}
-
-// Squared distance between the nearest voxels of two blocks.
-int gap_squared(const Eigen::Vector3i& between) {
-  return between.unaryExpr([](int d) { return d == 0 ? 0 : (std::abs(d) - 1) * kBlockSide + 1; })
-      .squaredNorm();
 }
 
 }  // namespace
@@ -63,36 +52,6 @@ DistanceField::DistanceField(double max_distance_m, double voxel_size_m)
 const DistanceField::Block* DistanceField::find(const Eigen::Vector3i& position) const {
   const auto found = blocks_.find(position);
   return found == blocks_.end() ? nullptr : found->second.get();
-}
-
-// The result of replace().
-struct DistanceField::Replaced {
-  std::size_t new_blocks = 0;
-  std::vector<Eigen::Vector3i> touched;       // all blocks
-  std::vector<Eigen::Vector3i> lost_surface;  // blocks that had surface voxels and are erased
-};
-
-DistanceField::Replaced DistanceField::replace(const SpaceChanges& changes) {
-  Replaced replaced;
-  for (const BlockSpace& change : changes) {
-    replaced.touched.push_back(change.position);
-    if (!any(change.observed)) {
-      const auto found = blocks_.find(change.position);
-      if (found == blocks_.end()) continue;
-      if (any(found->second->surface)) replaced.lost_surface.push_back(change.position);
-      blocks_.erase(found);
-      continue;
-    }
-    auto& block = blocks_[change.position];
-    if (block == nullptr) {
-      block = std::make_unique<Block>();
-      ++replaced.new_blocks;
-    }
-    block->observed = change.observed;
-    for (std::size_t z = 0; z < change.inside.size(); ++z)
-      block->inside[z] = change.inside[z] & change.observed[z];
-  }
-  return replaced;
 }
 
 // Voxels behind a surface beside an observed voxel in front of it, by shifted copies of the bits.
@@ -123,62 +82,30 @@ BlockBits DistanceField::surface_of(const Eigen::Vector3i& position, const Block
   return surface;
 }
 
-// Derives the surface voxels of touched blocks and those beside them. Returns the blocks in which
-// they have changed.
-std::vector<Eigen::Vector3i> DistanceField::find_changed_surface(Replaced replaced) {
-  std::vector<Eigen::Vector3i> candidates;
-  for (const Eigen::Vector3i& position : replaced.touched) {
-    candidates.push_back(position);
-    for (int axis = 0; axis < 3; ++axis)
-      for (const int step : {-1, 1}) {
-        candidates.push_back(position);
-        candidates.back()[axis] += step;
-      }
+void DistanceField::set(const SpaceChanges& changes) {
+  for (const BlockSpace& change : changes) {
+    if (!any(change.observed)) {
+      blocks_.erase(change.position);
+      continue;
+    }
+    auto& block = blocks_[change.position];
+    if (block == nullptr) block = std::make_unique<Block>();
+    block->observed = change.observed;
+    for (std::size_t z = 0; z < change.inside.size(); ++z)
+      block->inside[z] = change.inside[z] & change.observed[z];
   }
-  sort_unique(candidates);
-  std::vector<Eigen::Vector3i> changed = std::move(replaced.lost_surface);
-  for (const Eigen::Vector3i& position : candidates) {
-    const auto found = blocks_.find(position);
-    if (found == blocks_.end()) continue;
-    const BlockBits surface = surface_of(position, *found->second);
-    if (surface == found->second->surface) continue;
-    found->second->surface = surface;
-    changed.push_back(position);
-  }
-  sort_unique(changed);
-  return changed;
+  is_surface_outdated_ = true;
+  for (const auto& [position, block] : blocks_) block->outdated = true;
 }
 
-// Outdated are the blocks within reach of changed surface. Changed surface that is farther than the
-// largest distance in a block was and is the nearest nowhere.
-std::size_t DistanceField::set(const SpaceChanges& changes) {
-  Replaced replaced = replace(changes);
-  std::size_t outdated = replaced.new_blocks;
-  for (const Eigen::Vector3i& position : find_changed_surface(std::move(replaced)))
-    for (int z = -reach_blocks_; z <= reach_blocks_; ++z)
-      for (int y = -reach_blocks_; y <= reach_blocks_; ++y)
-        for (int x = -reach_blocks_; x <= reach_blocks_; ++x) {
-          const auto found = blocks_.find(position + Eigen::Vector3i(x, y, z));
-          if (found == blocks_.end() || found->second->outdated ||
-              found->second->largest < gap_squared({x, y, z}))
-            continue;
-          found->second->outdated = true;
-          ++outdated;
-        }
-  return outdated;
-}
-
-std::size_t DistanceField::update() {
-  std::vector<Eigen::Vector3i> targets;
-  for (const auto& [position, block] : blocks_)
-    if (block->outdated) targets.push_back(position);
-  const std::size_t computed = targets.size();
-  compute(std::move(targets));
-  return computed;
+void DistanceField::find_surface() {
+  for (const auto& [position, block] : blocks_) block->surface = surface_of(position, *block);
+  is_surface_outdated_ = false;
 }
 
 void DistanceField::compute(std::vector<Eigen::Vector3i> targets) {
   if (targets.empty()) return;
+  if (is_surface_outdated_) find_surface();
   Box box{targets.front(), targets.front()};
   for (const Eigen::Vector3i& target : targets)
     box = {box.low.cwiseMin(target), box.high.cwiseMax(target)};
@@ -232,11 +159,7 @@ void DistanceField::compute_part(const Box& box, const std::vector<Eigen::Vector
   for (const Eigen::Vector3i& target : targets)
     outputs.push_back({target, &blocks_.at(target)->squared});
   find_surface_distances(surface_near(box), reach_, outputs);
-  for (const Eigen::Vector3i& target : targets) {
-    Block& block = *blocks_.at(target);
-    block.largest = *std::ranges::max_element(block.squared);
-    block.outdated = false;
-  }
+  for (const Eigen::Vector3i& target : targets) blocks_.at(target)->outdated = false;
 }
 
 double DistanceField::signed_distance(const Block& block, int x, int y, int z) const {

@@ -33,15 +33,11 @@ struct PointDistance {
 /// from anywhere. In the map d is exact, so that the field differs from the true distance to the
 /// surface of the TSDF by less than half a voxel along an axis.
 ///
-/// Incremental as Voxblox (Oleynikova et al., "Voxblox: Incremental 3D Euclidean Signed Distance
-/// Fields for On-Board MAV Planning", 2017, Sec. IV): only blocks within max_distance of a changed
-/// surface voxel become outdated, and of them only those with a distance that may change. Voxblox
-/// and FIESTA (Han et al., 2019) propagate distances from voxel to voxel in a queue. Here whole
-/// blocks are computed exactly, see find_surface_distances(). So the result equals that of a
-/// computation from scratch, bit by bit, and no voxel stores its nearest obstacle.
+/// Voxblox (Oleynikova et al., 2017) and FIESTA (Han et al., 2019) propagate distances from voxel
+/// to voxel in a queue. Here whole blocks are computed exactly, see find_surface_distances().
 ///
-/// Lazy: set() only marks outdated blocks, and they are computed when a distance in them is asked
-/// for. A block that changes several times before is computed once.
+/// Lazy: set() makes all blocks outdated, because a keyframe changes surface in nearly all blocks
+/// in view. They are computed when a distance in them is asked for.
 ///
 /// Memory: 1.2 kB per observed block of 8^3 voxels. Not thread-safe.
 class DistanceField {
@@ -51,13 +47,8 @@ class DistanceField {
 
   static constexpr int kMaxReach = 100;  ///< [voxels] its square is below kBeyondReach
 
-  /// Replaces what is known of these blocks. Returns the number of blocks that are outdated by it
-  /// and were not before.
-  std::size_t set(const SpaceChanges& changes);
-
-  /// Computes all outdated blocks at once, which takes less time than one after the other. Returns
-  /// their number.
-  std::size_t update();
+  /// Replaces what is known of these blocks.
+  void set(const SpaceChanges& changes);
 
   /// Distance and gradient at a point of the map's frame, by trilinear interpolation of the eight
   /// voxels around it. nullopt if one of them was never observed: the distance is unknown.
@@ -83,10 +74,7 @@ class DistanceField {
     BlockBits observed = {}, inside = {};
     BlockBits surface = {};  // surface voxels, derived from the other two
     bool outdated = true;    // the distances are not valid
-    SquaredDistances squared;
-    std::uint16_t largest = kBeyondReach;  // The largest of `squared`.
-
-    Block() { squared.fill(kBeyondReach); }
+    SquaredDistances squared = {};
   };
   struct PositionHash {
     std::size_t operator()(const Eigen::Vector3i& position) const noexcept;
@@ -98,9 +86,7 @@ class DistanceField {
 
   [[nodiscard]] const Block* find(const Eigen::Vector3i& position) const;
   [[nodiscard]] BlockBits surface_of(const Eigen::Vector3i& position, const Block& block) const;
-  struct Replaced;
-  Replaced replace(const SpaceChanges& changes);
-  [[nodiscard]] std::vector<Eigen::Vector3i> find_changed_surface(Replaced replaced);
+  void find_surface();
   [[nodiscard]] SurfaceBox surface_near(const Box& box) const;
   void compute(std::vector<Eigen::Vector3i> targets);
   void compute_parts(const Box& box, std::vector<Eigen::Vector3i> targets);
@@ -110,6 +96,7 @@ class DistanceField {
   const double voxel_m_, max_m_;
   const int reach_;         // max_distance in voxels, rounded up
   const int reach_blocks_;  // and in blocks
+  bool is_surface_outdated_ = false;
   std::unordered_map<Eigen::Vector3i, std::unique_ptr<Block>, PositionHash> blocks_;
 };
 

@@ -36,7 +36,7 @@ void DistanceFieldNode::step(const SpaceUpdate& update) {
   if (update.is_first)
     field_.emplace(std::min(kMaxDistance_m, DistanceField::kMaxReach * voxel_size_m_),
                    voxel_size_m_);
-  (void)field_->set(update.changes);
+  field_->set(update.changes);
   newest_ = update.stamp;
   camera_z_m_ = update.camera_z_m;
   if (!published_ || seconds_between(*published_, update.stamp) >= kSlice_s) publish_slice();

@@ -60,11 +60,6 @@ TEST_CASE("Points too close for a screen are dropped in maps but not in lines", 
     CHECK(kept[i][0].get<double>() - kept[i - 1][0].get<double>() > 0.024);  // a 4000th of 100 m
 }
 
-TEST_CASE("A map without extent keeps its points", "[charts]") {
-  const Plot plot{.is_map = true, .series = {{.points = {{1, 2}, {1, 2}, {kNan, kNan}}}}};
-  CHECK(points_of(plot).size() == 3);
-}
-
 TEST_CASE("No text of a plot can leave its place in the page", "[charts]") {
   const std::string page = chart_page(
       kHostileText,
@@ -79,17 +74,6 @@ TEST_CASE("No text of a plot can leave its place in the page", "[charts]") {
 
 TEST_CASE("A page of charts needs no other file and no network", "[charts]") {
   CHECK(references_of_page(chart_page("t", {Plot{}})) == 0);
-}
-
-TEST_CASE("Bytes are encoded in a page as in RFC 4648", "[charts]") {
-  const auto [bytes, text] = GENERATE(table<std::string, std::string>(
-      {{"", ""}, {"f", "Zg=="}, {"fo", "Zm8="}, {"foo", "Zm9v"}, {"foob\xff", "Zm9vYv8="}}));
-  CHECK(data_uri("image/png", bytes) == "data:image/png;base64," + text);
-}
-
-TEST_CASE("A request for a file that no page has is an error", "[charts]") {
-  CHECK_FALSE(page_file(chart_files(), "charts.js").empty());
-  CHECK_THROWS_AS(page_file(chart_files(), "carts.js"), std::logic_error);
 }
 
 // The plots that charts_in_browser.mjs examines, in this order.

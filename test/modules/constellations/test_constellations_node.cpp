@@ -30,23 +30,6 @@ struct NodeChannels {
 
 }  // namespace
 
-TEST_CASE("The node publishes a place of two robots as a closure with its outcome", "[node]") {
-  std::mt19937 rng(1);
-  const auto scene = square(24, rng);
-  NodeChannels channels;
-  ConstellationsNode node({}, 1, channels.ends());
-  const auto own = message_of(1, scene, random_upright(rng), 1.0, 0.1, rng);
-  const auto peer = message_of(2, scene, random_upright(rng), -1.0, 0.1, rng);
-  node.step(std::make_shared<const RobotObjects>(own), 0.0);
-  node.step(std::make_shared<const RobotObjects>(peer), 0.0);
-  for (double now_s = 100.0; now_s < 1e6; now_s *= 2.0)
-    node.step(ConstellationsNode::Tick(), now_s);
-  REQUIRE(channels.made.messages().size() == 1);
-  REQUIRE(channels.reported.messages().size() == 1);
-  CHECK(channels.reported.messages()[0].id == channels.made.messages()[0].id());
-  CHECK(channels.reported.messages()[0].stage == ClosureStage::kVerified);
-}
-
 TEST_CASE("The started node finds the place, and is then done", "[node]") {
   std::mt19937 rng(2);
   const auto scene = square(24, rng);

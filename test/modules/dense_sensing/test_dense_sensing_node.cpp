@@ -100,32 +100,5 @@ TEST_CASE("Due frames are dropped and counted while odometry needs the processor
   CHECK(bench.published.size() == 7);
 }
 
-TEST_CASE("The thread handles queued frames before it stops", "[dense_sensing_node]") {
-  Bench bench;
-  bench.node->start();
-  for (int i = 0; i < 20; ++i) bench.located.publish(bench.frame(i, true));
-  bench.node->stop();
-  CHECK(bench.published.size() == 5);
-  CHECK(bench.node->error() == nullptr);
-  CHECK(bench.node->timing().count() == 5);
-}
-
-TEST_CASE("A sensor that is too slow drops the oldest frames", "[dense_sensing_node]") {
-  Bench bench(Overflow::kDropOldest);
-  for (int i = 0; i < 400; ++i) bench.located.publish(bench.frame(i, true));  // without waiting
-  bench.node->start();
-  bench.node->stop();
-  REQUIRE(bench.published.size() == 1);  // the four newest lie within one interval
-  CHECK(bench.published[0].stamp == 396 * kPeriod);
-}
-
-TEST_CASE("An invalid rate is refused", "[dense_sensing_node]") {
-  Bench bench;
-  const double rate_hz = GENERATE(0.0, -5.0, std::numeric_limits<double>::infinity());
-  CHECK_THROWS_AS(DenseSensingNode(DenseSensor(bench.rig, {}), LabelsFrom::kNone, rate_hz,
-                                   Overflow::kBlock, bench.topics()),
-                  std::invalid_argument);
-}
-
 }  // namespace
 }  // namespace km

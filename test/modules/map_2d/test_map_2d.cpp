@@ -52,16 +52,6 @@ TEST_CASE("A room is free inside, its walls are occupied, and the outside is unk
   CHECK(grid.at({100, -100}) == kUnknown);
 }
 
-TEST_CASE("A wall that is seen from both sides is occupied once", "[map_2d]") {
-  Surfaces surfaces;
-  surfaces.room(0, 0, 6, 4);
-  surfaces.wall(3, 0, 3, 4, 0, 2).wall(3.1F, 4, 3.1F, 0, 0, 2);
-  const OccupancyGrid grid = map_of(surfaces);
-  CHECK(values(grid, 2.5, 1, 2.95, 3) == Values{kFree});
-  CHECK(values(grid, 3.0, 1, 3.05, 3) == Values{kOccupied});
-  CHECK(values(grid, 3.15, 1, 3.5, 3) == Values{kFree});
-}
-
 TEST_CASE("A table is an obstacle only for robots that do not fit under it", "[map_2d]") {
   Surfaces surfaces;
   surfaces.room(0, 0, 6, 6).level(2, 2, 3.5F, 3, 0.75F, kWallLabel);
@@ -115,13 +105,6 @@ TEST_CASE("Ramps and stairs that are labelled as floor are free", "[map_2d]") {
   CHECK(found.contains(kFree) == labelled);
 }
 
-TEST_CASE("A gentle ramp joins two floors without labels", "[map_2d]") {
-  Surfaces surfaces;
-  surfaces.level(0, 0, 4, 4, 0, 0).add({4, 0, 0}, {4, 0, 1}, {0, 4, 0}, 0).level(8, 0, 12, 4, 1, 0);
-  surfaces.without_labels();
-  CHECK(values(map_of(surfaces), 0.1, 0.1, 11.9, 3.9) == Values{kFree});
-}
-
 TEST_CASE("Two floors are free, and the step between them is not", "[map_2d]") {
   Surfaces surfaces;
   surfaces.level(0, 0, 5, 4, 0, kFloorLabel).level(5, 0, 10, 4, 0.6F, kFloorLabel);
@@ -134,12 +117,6 @@ TEST_CASE("Two floors are free, and the step between them is not", "[map_2d]") {
   climber.max_step_m = 0.7;
   if (!surfaces.mesh.labels.empty())
     CHECK(values(map_of(surfaces, climber), 0.1, 0.1, 9.9, 3.9) == Values{kFree});
-}
-
-TEST_CASE("The height of a map is the median of its floor", "[map_2d]") {
-  Surfaces surfaces;
-  surfaces.level(0, 0, 6, 4, 0.25F, kFloorLabel).level(6, 0, 9, 4, 0.75F, kFloorLabel);
-  CHECK(map_of(surfaces).z_m == Approx(0.25).margin(0.03));  // layers of surface have a thickness
 }
 
 TEST_CASE("Rays through the band free cells, and follow the poses of their keyframes", "[map_2d]") {

@@ -20,15 +20,6 @@ LabelledMesh triangle() {
   return mesh;
 }
 
-TEST_CASE("A face has the label of most of its vertices") {
-  LabelledMesh mesh = triangle();
-  CHECK(mesh.face_label(0) == 5);
-  mesh.labels = {3, 4, 5};
-  CHECK(mesh.face_label(0) == 3);
-  mesh.labels.clear();
-  CHECK(mesh.face_label(0) == 0);
-}
-
 TEST_CASE("Appending keeps faces on their vertices and fills the arrays that one mesh lacks") {
   LabelledMesh mesh = triangle();
   LabelledMesh other = triangle();
@@ -40,14 +31,6 @@ TEST_CASE("Appending keeps faces on their vertices and fills the arrays that one
   REQUIRE(mesh.colors.size() == 6);
   CHECK(mesh.colors[2] == LabelledMesh::Color{0, 0, 0});
   CHECK(mesh.colors[3] == LabelledMesh::Color{1, 2, 3});
-}
-
-TEST_CASE("A mesh is moved by the transform") {
-  LabelledMesh mesh = triangle();
-  const Eigen::Matrix3d quarter_turn =
-      Eigen::AngleAxisd(std::acos(-1.0) / 2, Eigen::Vector3d::UnitZ()).toRotationMatrix();
-  mesh.transform(make_pose(quarter_turn, {1, 2, 3}));
-  CHECK((mesh.vertices[1] - Eigen::Vector3f(1, 3, 3)).norm() < 1e-6);
 }
 
 TEST_CASE("Vertices take the colour of their class, black outside the palette") {

@@ -13,14 +13,6 @@ namespace {
 
 constexpr DecimationScale kScale{1.0, 50};
 
-MapMesh triangle() {
-  MapMesh map;
-  map.mesh.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
-  map.mesh.faces = {{0, 1, 2}};
-  map.seen_by.assign(3, {0, 0});
-  return map;
-}
-
 double nearest_other_m(const std::vector<MeshNode>& nodes, std::size_t i) {
   double nearest = std::numeric_limits<double>::infinity();
   for (std::size_t j = 0; j < nodes.size(); ++j)
@@ -40,16 +32,6 @@ void check_complete(const SimplifiedMesh& simplified, const MapMesh& map) {
 
 }  // namespace
 
-TEST_CASE("A mesh coarser than the spacing keeps all its vertices", "[mesh_deformation]") {
-  const MapMesh map = triangle();
-  SimplifiedMesh simplified;
-  extend(simplified, map, {0.1, 50});
-  CHECK(simplified.nodes.size() == 3);
-  check_complete(simplified, map);
-  const auto edges = region_edges(simplified, map.mesh.faces, 50);
-  CHECK(edges == std::vector<std::array<std::uint32_t, 2>>{{0, 1}, {0, 2}, {1, 2}});
-}
-
 TEST_CASE("Nodes spread over flat surface at about the spacing", "[mesh_deformation]") {
   const SheetSize size{.columns = 200, .rows = 100, .step_m = 0.1, .keyframe_step_m = 0.5};
   const MapMesh map = sheet(size);  // 20 m x 10 m
@@ -67,18 +49,6 @@ TEST_CASE("Nodes spread over flat surface at about the spacing", "[mesh_deformat
     const MeshNode& node = simplified.nodes[simplified.node_of_vertex[v]];
     CHECK((node.position - map.mesh.vertices[v].cast<double>()).norm() < 3.0);
   }
-}
-
-TEST_CASE("Every node of a connected surface has neighbours", "[mesh_deformation]") {
-  const MapMesh map = sheet({.columns = 100, .rows = 50, .step_m = 0.1, .keyframe_step_m = 0.5});
-  SimplifiedMesh simplified;
-  extend(simplified, map, kScale);
-  std::set<std::uint32_t> reached = {0};
-  const auto edges = region_edges(simplified, map.mesh.faces, kScale.max_gap_keyframes);
-  for (std::size_t round = 0; round < simplified.nodes.size(); ++round)
-    for (const auto& [a, b] : edges)
-      if (reached.contains(a) != reached.contains(b)) reached.insert({a, b});
-  CHECK(reached.size() == simplified.nodes.size());
 }
 
 TEST_CASE("Surfaces of distant times have separate nodes and no common edge",
@@ -102,33 +72,6 @@ TEST_CASE("Surfaces of distant times have separate nodes and no common edge",
   for (const auto& [a, b] : region_edges(simplified, map.mesh.faces, kScale.max_gap_keyframes))
     CHECK(keyframe_gap(simplified.nodes[a].seen_by, simplified.nodes[b].seen_by) <=
           kScale.max_gap_keyframes);
-}
-
-TEST_CASE("New surface extends the simplified mesh without changing its nodes",
-          "[mesh_deformation]") {
-  const SheetSize size{.columns = 100, .rows = 20, .step_m = 0.1, .keyframe_step_m = 0.5};
-  const MapMesh whole = sheet(size);
-  SheetSize half_size = size;
-  half_size.columns = 50;
-  const MapMesh half = sheet(half_size);  // the first half of the vertices of `whole`
-
-  SimplifiedMesh simplified;
-  extend(simplified, half, kScale);
-  const std::vector<MeshNode> before = simplified.nodes;
-  const std::vector<std::uint32_t> regions_before = simplified.node_of_vertex;
-  extend(simplified, whole, kScale);
-  REQUIRE(simplified.nodes.size() > before.size());
-  for (std::size_t n = 0; n < before.size(); ++n)
-    CHECK(simplified.nodes[n].position == before[n].position);
-  CHECK(
-      std::equal(regions_before.begin(), regions_before.end(), simplified.node_of_vertex.begin()));
-  const auto edges = region_edges(simplified, whole.mesh.faces, kScale.max_gap_keyframes);
-  CHECK(std::ranges::any_of(edges, [&](const auto& edge) {
-    return edge[0] < before.size() && edge[1] >= before.size();
-  }));
-  const std::size_t count = simplified.nodes.size();
-  extend(simplified, whole, kScale);
-  CHECK(simplified.nodes.size() == count);
 }
 
 TEST_CASE("Faces that form no manifold are decimated too", "[mesh_deformation]") {

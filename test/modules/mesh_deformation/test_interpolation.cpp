@@ -23,12 +23,6 @@ struct Scene {
     nodes.push_back({g, seen});
     T_world_node.push_back(T);
   }
-  [[nodiscard]] std::vector<Eigen::Vector3f> deformed(std::size_t k, KeyframeIndex window) const {
-    Interpolation interpolation(k, window);
-    interpolation.bind(vertices, seen_by, nodes);
-    const std::vector<SE3> still(1000, SE3::Identity());
-    return interpolation.deform(vertices, seen_by, nodes, T_world_node, still);
-  }
 };
 
 SE3 moved_to(double x, double y, double z) {
@@ -65,38 +59,6 @@ void check_same(const Interpolation& a, const Interpolation& b) {
 }
 
 }  // namespace
-
-TEST_CASE("Vertices between nodes with equal motion move with them", "[mesh_deformation]") {
-  const auto k = GENERATE(std::size_t{1}, std::size_t{3}, std::size_t{4});
-  CAPTURE(k);
-  Scene scene;
-  for (int i = 0; i < 100; ++i) scene.add_vertex({static_cast<float>(i), 0, 0}, {0, 0});
-  for (int i = 0; i < 100; i += 10)
-    scene.add_node({static_cast<double>(i), 0, 0}, {0, 0}, moved_to(i, 1, 0));
-  const auto deformed = scene.deformed(k, 0);
-  for (int i = 0; i < 100; ++i) {
-    const Eigen::Vector3f& v = deformed[static_cast<std::size_t>(i)];
-    CHECK(v.y() == Approx(1.0).margin(1e-9));
-    CHECK(v.x() == Approx(i).margin(1e-5));  // stored as float, up to 100 m
-    CHECK(v.z() == 0.0F);
-  }
-}
-
-TEST_CASE("Nodes do not move surface seen on another visit", "[mesh_deformation]") {
-  Scene scene;
-  for (int i = 0; i < 100; ++i)
-    scene.add_vertex({static_cast<float>(i), 0, 0}, i < 50 ? SeenBy{0, 0} : SeenBy{20, 20});
-  for (int i = 0; i < 100; i += 10) {
-    const bool first = i <= 50;
-    scene.add_node({static_cast<double>(i), 0, 0}, first ? SeenBy{0, 0} : SeenBy{20, 20},
-                   moved_to(i, first ? -1 : 1, 0));
-  }
-  const auto deformed = scene.deformed(3, 10);
-  for (std::size_t i = 0; i < 100; ++i) {
-    CAPTURE(i);
-    if (i != 50) CHECK(deformed[i].y() == Approx(i < 50 ? -1.0 : 1.0).margin(1e-9));
-  }
-}
 
 TEST_CASE("Weights are (1 - d/d_max)^2, normalised", "[mesh_deformation]") {
   Scene scene;

@@ -251,55 +251,6 @@ TEST_CASE("Copies stay until a further visit exceeds their share", "[mesh_deform
   CHECK(result->mesh.faces.size() == one);
 }
 
-TEST_CASE("A correction from scratch searches for copies regardless of earlier corrections",
-          "[mesh_deformation]") {
-  TwoVisits visits;
-  const std::vector<SE3> T_world_kf = visits.T_world_kf;
-  MeshDeformationConfig config;
-  config.duplicate_faces = 0;
-  CopyLimits limits{.copies = 1};
-  MeshCorrector corrector(config, limits);
-  visits.T_world_kf = visits.T_odom_kf;  // with drift the two visits are different surfaces
-  REQUIRE(corrector.correct(visits.input())->superseded_faces == 0);
-  visits.T_world_kf = T_world_kf;
-  CHECK(corrector.correct_from_scratch(visits.input()).superseded_faces == visits.one());
-}
-
-// Repeated visits: the mapper drops superseded surface, and the graph follows.
-TEST_CASE("The deformation graph does not grow in a place visited repeatedly",
-          "[mesh_deformation]") {
-  TwoVisits visits;
-  const std::uint64_t count = visits.map.ids.size() / 2;
-  MeshDeformationConfig config;
-  config.duplicate_faces = 0;
-  CopyLimits limits{.copies = 1};
-  MeshCorrector corrector(config, limits);
-  std::size_t nodes_at_first = 0, most_nodes = 0;
-  for (std::uint64_t visit = 0; visit < 8; ++visit) {
-    const auto result = corrector.correct(visits.input());
-    REQUIRE(result);
-    CHECK(result->mesh.faces.size() == visits.one());
-    if (visit == 0) nodes_at_first = result->report.nodes;
-    most_nodes = std::max(most_nodes, result->report.nodes);
-    // The older copy was dropped, the newer one becomes the older one, and a third one is added.
-    const auto keyframes = static_cast<KeyframeIndex>(keyframe_count(kSheet)) + TwoVisits::kAway;
-    for (std::uint64_t& id : visits.map.ids) id += count;
-    for (SeenBy& seen : visits.map.seen_by) seen = {seen[0] + keyframes, seen[1] + keyframes};
-    visits.T_odom_kf.resize(visits.T_odom_kf.size() + TwoVisits::kAway, visits.T_odom_kf.back());
-    for (SE3 pose : keyframes_above(kSheet)) {
-      visits.T_world_kf.push_back(pose);
-      pose.translation().z() +=
-          static_cast<double>(TwoVisits::kDrift_m) * static_cast<double>(visit + 2);
-      visits.T_odom_kf.push_back(pose);
-    }
-    visits.T_world_kf.insert(visits.T_world_kf.end() - std::ssize(keyframes_above(kSheet)),
-                             TwoVisits::kAway, visits.T_world_kf.back());
-    for (Eigen::Vector3f& p : visits.map.mesh.vertices) p.z() += TwoVisits::kDrift_m;
-    ++visits.version;
-  }
-  CHECK(most_nodes <= 2 * nodes_at_first);
-}
-
 constexpr MotionScale kMotionScale{.translation_m = 0.01, .rotation_rad = 0.005};
 constexpr double kRounding = 1e-9;  // in units of the scale, for poses within 10 m
 
@@ -338,32 +289,6 @@ TEST_CASE("One keyframe that moves against many others is found", "[mesh_deforma
     after[7].linear() *= so3_exp({0.0, 0.0, 0.015});
     CHECK(keyframe_motion(before, after, kMotionScale).non_rigid == Approx(3.0).epsilon(0.02));
   }
-}
-
-TEST_CASE("The common motion weights rotations against translations", "[mesh_deformation]") {
-  // Two keyframes 2 m apart on x. Their positions rotate by +a about z, their axes by -a. In the
-  // sum of squares, (1 m * sin)^2 / translation^2 for each position competes with sin^2 /
-  // rotation^2.
-  const double a = 0.01;
-  const std::vector<SE3> before = {make_pose(Eigen::Matrix3d::Identity(), {1, 0, 0}),
-                                   make_pose(Eigen::Matrix3d::Identity(), {-1, 0, 0})};
-  const Eigen::Matrix3d R = so3_exp({0, 0, a});
-  const std::vector<SE3> after = {make_pose(R.transpose(), R * Eigen::Vector3d(1, 0, 0)),
-                                  make_pose(R.transpose(), R * Eigen::Vector3d(-1, 0, 0))};
-  const double w_t = 1.0 / (0.01 * 0.01);
-  const double w_r = 1.0 / (0.005 * 0.005);
-  const KeyframeMotion motion = keyframe_motion(before, after, kMotionScale);
-  const double angle = so3_log(motion.T_after_before.linear()).z();
-  CHECK(angle == Approx(a * (w_t - w_r) / (w_t + w_r)).epsilon(1e-3));
-}
-
-TEST_CASE("Solutions are compared over the keyframes both have", "[mesh_deformation]") {
-  std::mt19937 rng(1);
-  const std::vector<SE3> before = random_poses(rng, 5);
-  std::vector<SE3> after = before;
-  after.push_back(random_pose(rng));
-  CHECK(keyframe_motion(before, after, kMotionScale).non_rigid < kRounding);
-  CHECK(keyframe_motion({}, after, kMotionScale).non_rigid == 0.0);
 }
 
 TEST_CASE("The difference of two motions is that at the pose where they differ most",

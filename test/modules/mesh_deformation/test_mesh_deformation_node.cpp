@@ -139,18 +139,6 @@ TEST_CASE("A map that arrives before its keyframes waits for them", "[node]") {
   CHECK(robot.results().size() == 1);
 }
 
-TEST_CASE("An incomplete trajectory is completed by odometry", "[node]") {
-  Robot robot;
-  MeshDeformationNode node(every_two_seconds(), kSelf, robot.topics());
-  Hours hours(node);
-  show_map(robot, node);
-  Trajectory behind = *robot.solution(20.0);
-  behind.T_world_kf.resize(5);
-  node.step(std::make_shared<const Trajectory>(behind), 0.0);
-  hours.tick();
-  CHECK(robot.results().size() == 1);
-}
-
 TEST_CASE("The last correction is from scratch and no other follows", "[node]") {
   Robot robot;
   MeshDeformationNode node(every_two_seconds(), kSelf, robot.topics());

@@ -119,15 +119,6 @@ TEST_CASE("A scrap of few faces goes with the copy around it, and a larger one s
   CHECK(stays == (lifted == 4));
 }
 
-TEST_CASE("A scrap that no copy surrounds stays", "[mesh_deformation]") {
-  const MapMesh scrap =
-      sheet({.columns = 1, .rows = 1, .step_m = kVoxel_m, .keyframe_step_m = 0.5});
-  MapMesh lifted = scrap;
-  for (Eigen::Vector3f& p : lifted.mesh.vertices) p.z() = 0.3F;
-  CHECK(cleaned(visits({lifted, sheet_at({0, 0, 0})})).faces.size() ==
-        sheet_at({0, 0, 0}).mesh.faces.size() + 2);
-}
-
 TEST_CASE("The replacement of a vertex is its copy by id", "[mesh_deformation]") {
   const MapMesh map = visits({sheet_at({0, 0, 0}), sheet_at({0.05, 0.03, 0.1})});
   const auto count = static_cast<std::uint32_t>(map.ids.size() / 2);
@@ -192,29 +183,6 @@ TEST_CASE("A copy of a convex edge is dropped as a whole", "[mesh_deformation]")
   const MapMesh larger = roof(0.08), smaller = roof(0.0);
   CHECK(cleaned(visits({larger, smaller})).vertices == smaller.mesh.vertices);
   CHECK(cleaned(visits({smaller, larger})).vertices == larger.mesh.vertices);
-}
-
-TEST_CASE("About one of many noisy copies stays and all are near it", "[mesh_deformation]") {
-  const auto seed = GENERATE(range(0U, 3U));
-  CAPTURE(seed);
-  std::mt19937 rng(seed);
-  std::normal_distribution<float> noise(0.0F, 0.04F);  // distance / 6: 1.4 sigma of a difference
-  std::vector<MapMesh> copies(6, sheet_at({0, 0, 0}));
-  for (MapMesh& copy : copies)
-    for (Eigen::Vector3f& p : copy.mesh.vertices) p += Eigen::Vector3f(0, 0, noise(rng));
-  const MapMesh map = visits(copies);
-  const auto replacements = find_replacements(map.mesh, {map.seen_by, map.certainty}, kSameSurface);
-  const std::size_t one = copies[0].mesh.faces.size();
-  std::size_t left = 0;
-  for (const auto& face : map.mesh.faces) left += is_superseded(face, replacements) ? 0 : 1;
-  CHECK(left >= one);
-  CHECK(left < one + one / 20);
-  for (std::size_t v = 0; v < replacements.size(); ++v) {
-    if (replacements[v] == kNoIndex) continue;
-    CHECK(map.seen_by[replacements[v]][0] > map.seen_by[v][1]);
-    CHECK((map.mesh.vertices[replacements[v]] - map.mesh.vertices[v]).norm() <
-          1.5F * float{kVoxel_m});
-  }
 }
 
 // The certainty of a vertex depends on few frames and differs between neighbours. No copy is then

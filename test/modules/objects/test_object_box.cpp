@@ -7,8 +7,6 @@
 namespace km {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
-
 TEST_CASE("The enclosing box of the corners of a box is that box", "[objects]") {
   const double yaw = GENERATE(-1.5, -0.3, 0.0, 0.7, 1.5);
   const ObjectBox box{{3.0, -4.0, 0.5}, yaw, {2.0, 0.7, 1.2}};
@@ -17,26 +15,6 @@ TEST_CASE("The enclosing box of the corners of a box is that box", "[objects]") 
   CHECK((found.center - box.center).norm() < 1e-9);
   CHECK((found.size_m - box.size_m).norm() < 1e-9);
   CHECK(found.yaw_rad == Approx(yaw).margin(1e-9));
-}
-
-TEST_CASE("A point and a line have boxes without volume", "[objects]") {
-  const std::vector<Eigen::Vector3d> line = {{0, 0, 1}, {1, 1, 1}, {3, 3, 1}};
-  CHECK(enclosing_box(std::span(line).first(1)).size_m.isZero());
-  const ObjectBox box = enclosing_box(line);
-  CHECK(box.size_m.isApprox(Eigen::Vector3d(3.0 * std::sqrt(2.0), 0.0, 0.0)));
-  CHECK(box.yaw_rad == Approx(kPi / 4));
-  CHECK(intersection_over_union(box, box) == 0.0);
-}
-
-TEST_CASE("Shared volumes are those of geometry", "[objects]") {
-  const ObjectBox cube{{0, 0, 0}, 0.0, {2, 2, 2}};
-  CHECK(intersection_over_union(cube, cube) == Approx(1.0));
-  CHECK(shared_volume_m3(cube, {{1.5, 0, 0.5}, 0.0, {2, 2, 2}}) == Approx(0.5 * 2.0 * 1.5));
-  CHECK(shared_volume_m3(cube, {{2.5, 0, 0}, 0.0, {2, 2, 2}}) == 0.0);
-  CHECK(shared_volume_m3(cube, {{0, 0, 2.5}, 0.0, {2, 2, 2}}) == 0.0);
-  // Turned by 45 degrees, two equal squares share a regular octagon.
-  const ObjectBox turned{{0, 0, 0}, kPi / 4, {2, 2, 2}};
-  CHECK(shared_volume_m3(cube, turned) == Approx(2.0 * 8.0 * (std::sqrt(2.0) - 1.0)));
 }
 
 TEST_CASE("Shared volumes agree with counted points", "[objects]") {

@@ -52,13 +52,6 @@ TEST_CASE("A thin gap does not cut an object, and two close chairs stay two", "[
   }
 }
 
-TEST_CASE("Surfaces that touch are separate objects if their classes differ", "[objects]") {
-  TestMap map;
-  map.add_box({{0.0, 0.0, 0.5}, 0.0, {1.0, 1.0, 1.0}}, kChair);
-  map.add_box({{1.0, 0.0, 0.5}, 0.0, {1.0, 1.0, 1.0}}, kTable);
-  CHECK(objects_in(map).size() == 2);
-}
-
 TEST_CASE("Small or hardly seen surfaces are no objects", "[objects]") {
   TestMap map;
   map.add_sheet({0, 0, 1}, {0.2, 0, 0}, {0, 0.2, 0}, kChair, {0, 9});  // 0.04 m^2
@@ -68,15 +61,6 @@ TEST_CASE("Small or hardly seen surfaces are no objects", "[objects]") {
   all.min_surface_m2 = 0.0;
   all.min_views = 1;
   CHECK(objects_in(map, all).size() == 2);
-}
-
-TEST_CASE("Views are the keyframes in the union of the intervals of vertices", "[objects]") {
-  TestMap map;
-  map.add_sheet({0, 0, 0}, {1, 0, 0}, {0, 0, 1}, kChair, {2, 6});
-  map.add_sheet({1, 0, 0}, {0, 1, 0}, {0, 0, 1}, kChair, {4, 8});
-  map.add_sheet({1, 1, 0}, {1, 0, 0}, {0, 0, 1}, kChair, {90, 91});
-  REQUIRE(objects_in(map).size() == 1);
-  CHECK(objects_in(map)[0].views == 7 + 2);
 }
 
 TEST_CASE("Objects are the connected parts that a search over all pairs finds", "[objects]") {

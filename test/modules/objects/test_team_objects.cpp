@@ -74,22 +74,6 @@ TEST_CASE("Noisy copies of an object are one, whatever their order", "[objects]"
   CHECK(merged[1].keyframe == KeyframeId{3, 1});
 }
 
-TEST_CASE("Objects stay apart if their classes differ or their boxes only touch", "[objects]") {
-  MapObject other = object(kBox, 1);
-  other.label = kTable;
-  CHECK(merge_objects({object(kBox, 0), other}, {}).size() == 2);
-  ObjectBox beside = kBox;
-  beside.center += 0.6 * kBox.pose().linear().col(1);  // 0.1 m apart
-  CHECK(merge_objects({object(kBox, 0), object(beside, 1)}, {}).size() == 2);
-}
-
-TEST_CASE("A part that bridges two others makes all three one object", "[objects]") {
-  const auto at = [](double x) { return object({{x, 0, 0}, 0.0, {1.0, 0.5, 0.5}}, 0); };
-  const auto merged = merge_objects({at(0.0), at(1.2), at(0.6)}, {});
-  REQUIRE(merged.size() == 1);
-  CHECK(merged[0].box.size_m.x() == Approx(2.2));
-}
-
 TEST_CASE("Objects of a team are merged in the joint frame and move with their keyframes",
           "[objects]") {
   const ObjectsConfig config;

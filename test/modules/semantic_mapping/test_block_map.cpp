@@ -39,15 +39,6 @@ TEST_CASE("The block map has the same content as a std::map", "[semantic_mapping
   for (const auto& block : map.blocks()) CHECK(map.find(block->position) == block.get());
 }
 
-TEST_CASE("Blocks beyond the map's reach do not exist", "[semantic_mapping]") {
-  BlockMap map;
-  const int last = BlockMap::kReach - 1;
-  map.insert({last, -BlockMap::kReach, 0});
-  CHECK(map.find({last, -BlockMap::kReach, 0}) != nullptr);
-  CHECK(map.find({last + 1, 0, 0}) == nullptr);
-  CHECK(map.find({-BlockMap::kReach - 1, 0, 0}) == nullptr);
-}
-
 constexpr unsigned kOne = VoxelLabels::kVotesPerWeight;  // votes of weight 1
 
 TEST_CASE("Four labels are counted exactly, in any order", "[semantic_mapping]") {
@@ -88,12 +79,6 @@ TEST_CASE("Old votes fade", "[semantic_mapping]") {
   CHECK(labels.weight_of(1) <= 255.0 / kOne);
   for (int i = 0; i < 40; ++i) labels.observe(2, kOne);
   CHECK(labels.best() == 2);
-}
-
-TEST_CASE("A single class is certain", "[semantic_mapping]") {
-  VoxelLabels labels;
-  labels.observe(1, kOne);
-  CHECK(labels.probability(1, {1, 0.8}) == 1.0);
 }
 
 TEST_CASE("Votes of two vertices add up", "[semantic_mapping]") {

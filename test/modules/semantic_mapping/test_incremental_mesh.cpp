@@ -87,26 +87,6 @@ TEST_CASE("The mesh of a sphere is closed across blocks and near the sphere",
   CHECK(volume_of(result) > 0.98 * volume);
 }
 
-TEST_CASE("The mesh of a box is closed across blocks and near the box", "[semantic_mapping]") {
-  const Eigen::Vector3d half(0.93, 0.61, 1.17);
-  // Exact outside and inside (Euclidean).
-  const auto box = [&](const Eigen::Vector3d& p) {
-    const Eigen::Vector3d q = (p - kCentre).cwiseAbs() - half;
-    return q.cwiseMax(0.0).norm() + std::min(q.maxCoeff(), 0.0);
-  };
-  BlockMap map;
-  fill(map, 2, box);
-  IncrementalMesh mesh = new_mesh();
-  mesh.update(map);
-  const LabelledMesh result = mesh.snapshot(map, false).mesh;
-  CHECK(rim_of(result).empty());
-  CHECK(2 * result.vertices.size() == result.faces.size() + 4);
-  const Errors errors = errors_of(result, box);
-  CHECK(errors.mean < 0.05);     // exact on the faces
-  CHECK(errors.largest < 0.25);  // interpolation at edges and corners
-  CHECK(volume_of(result) == Approx(8.0 * half.prod()).epsilon(0.01));
-}
-
 TEST_CASE("The surface has no cracks with any signs", "[semantic_mapping]") {
   const unsigned seed = GENERATE(1U, 2U, 3U);
   CAPTURE(seed);
@@ -124,24 +104,6 @@ TEST_CASE("The surface has no cracks with any signs", "[semantic_mapping]") {
   CHECK(result.faces.size() > 10000);  // all 256 kinds of cells
   CHECK(rim_of(result).empty());
   CHECK(volume_of(result) > 0.0);
-}
-
-TEST_CASE("Marching cubes uses each edge that changes sign, and no other", "[semantic_mapping]") {
-  const MarchingCubes table;
-  for (unsigned negative = 0; negative < 256; ++negative) {
-    CAPTURE(negative);
-    unsigned used = 0, expected = 0;
-    for (const auto& triangle : table.triangles(negative))
-      for (const std::uint8_t edge : triangle) used |= 1U << edge;
-    for (int edge = 0; edge < MarchingCubes::kEdges; ++edge) {
-      const int first = MarchingCubes::first_corner_of_edge(edge);
-      const int second = first | 1 << MarchingCubes::axis_of_edge(edge);
-      CHECK(first != second);
-      if ((negative >> first & 1U) != (negative >> second & 1U)) expected |= 1U << edge;
-    }
-    CHECK(used == expected);
-    CHECK(table.triangles(negative).size() <= 5);
-  }
 }
 
 TEST_CASE("Only changed blocks are meshed again, and vertices keep their identity",
@@ -229,23 +191,6 @@ TEST_CASE("Final mesh stays when its blocks are erased and stays connected with 
   CHECK(revisited.ids.size() > before.ids.size());
   CHECK(std::includes(revisited.ids.begin(), revisited.ids.end(), before.ids.begin(),
                       before.ids.end()));
-}
-
-TEST_CASE("The faces of an erased empty block are removed", "[semantic_mapping]") {
-  const auto sphere = [](const Eigen::Vector3d& p) {
-    return (p - Eigen::Vector3d::Constant(0.4)).norm() - 0.25;
-  };
-  BlockMap map;
-  fill(map, 2, sphere);  // all of it in block (0, 0, 0)
-  IncrementalMesh mesh = new_mesh();
-  mesh.update(map);
-  CHECK(mesh.face_count() > 0);
-  mesh.forget(*map.find({0, 0, 0}), map, 1);
-  map.erase({0, 0, 0});
-  mesh.update(map);
-  CHECK(mesh.face_count() == 0);
-  CHECK(mesh.vertex_count() == 0);
-  CHECK(mesh.snapshot(map, false).mesh.vertices.empty());
 }
 
 TEST_CASE("Unobserved voxels leave a hole, not a wall", "[semantic_mapping]") {

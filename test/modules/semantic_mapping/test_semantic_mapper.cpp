@@ -201,28 +201,6 @@ TEST_CASE("Labels of another size or outside the palette are dropped and counted
   }
 }
 
-TEST_CASE("The label seen more often is chosen", "[semantic_mapping]") {
-  SemanticMappingConfig config = settings();
-  config.depth_sigma_per_m = 0.0;  // all weights are 1
-  SemanticMapper mapper(config, small_camera(), two_classes());
-  DepthAndLabels wrong = wall(2.0);
-  std::fill(wrong.labels.ids.begin(), wrong.labels.ids.end(), LabelId{2});
-  REQUIRE(integrate(mapper, wrong, at(0), 0));
-  REQUIRE(integrate(mapper, wall(2.0), at(0), 0));
-  REQUIRE(integrate(mapper, wall(2.0), at(0), 0));
-  mapper.update_mesh();
-  const MapMesh map = mapper.mesh();
-  REQUIRE(map.mesh.labels.size() > 100);
-  std::size_t inside = 0;
-  for (std::size_t i = 0; i < map.mesh.vertices.size(); ++i) {
-    const Eigen::Vector3f& p = map.mesh.vertices[i];
-    if (std::abs(p.x()) > 1.0F || std::abs(p.y()) > 0.7F) continue;  // the image's border
-    ++inside;
-    CHECK(map.mesh.labels[i] == 1);
-  }
-  CHECK(inside > 100);
-}
-
 TEST_CASE("Surface is meshed once its weights suffice", "[semantic_mapping]") {
   SemanticMappingConfig config = settings();
   config.depth_sigma_per_m = 0.0;  // all weights are 1
@@ -254,13 +232,6 @@ TEST_CASE("Carving removes an object that has gone", "[semantic_mapping]") {
   CHECK(vertices_before(map, 2.0) == 0);
   CHECK(removed > 0);
   CHECK(map.mesh.vertices.size() > vertices_before(map, 2.0) + 500);  // the wall
-}
-
-TEST_CASE("Invalid settings and cameras are refused", "[semantic_mapping]") {
-  SemanticMappingConfig config = settings();
-  config.voxel_size_m = 0.0;
-  CHECK_THROWS_AS(SemanticMapper(config, small_camera()), ConfigError);
-  CHECK_THROWS_AS(SemanticMapper(settings(), Camera{}), std::invalid_argument);
 }
 
 TEST_CASE("A repeated frame keeps every vertex and its first keyframe", "[semantic_mapping]") {

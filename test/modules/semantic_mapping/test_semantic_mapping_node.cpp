@@ -64,18 +64,6 @@ TEST_CASE("A mesh is published every few seconds and at the end and is coloured 
   CHECK(bench.last.unlabelled == 0);
 }
 
-TEST_CASE("The last published size is that of the last mesh", "[semantic_mapping_node]") {
-  Bench bench;
-  bench.node->step(frame(0));
-  DenseFrame elsewhere = frame(1);  // at the same keyframe, so it is not meshed before the end
-  elsewhere.T_odom_cam = at(20.0);
-  bench.node->step(elsewhere);
-  const std::size_t before = bench.last.size.faces;
-  bench.node->stop();
-  CHECK(bench.last.size.faces > before);
-  CHECK(bench.last.size.faces == bench.meshes.back()->mesh.faces.size());
-}
-
 TEST_CASE("Unusable frames are counted by reason", "[semantic_mapping_node]") {
   Bench bench;
   DenseFrame unlabelled = frame(0);
@@ -169,14 +157,6 @@ TEST_CASE("Space is published while it is wanted, and begins with all blocks",
   step(1);
   REQUIRE(updates.size() == 3);
   CHECK(updates[2].is_first);
-}
-
-TEST_CASE("Without frames there is no mesh", "[semantic_mapping_node]") {
-  Bench bench;
-  bench.node->start();
-  bench.node->stop();
-  CHECK(bench.meshes.empty());
-  CHECK(bench.node->error() == nullptr);
 }
 
 }  // namespace

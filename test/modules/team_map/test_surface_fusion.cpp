@@ -56,13 +56,6 @@ const Eigen::Vector3f kUp = Eigen::Vector3f::UnitZ();
 
 }  // namespace
 
-TEST_CASE("The surface of one robot stays where it is and does not grow", "[surface_fusion]") {
-  const FusedBox box = fuse({square(0, kUp, 0.617F)});
-  check_height(box, kUp, 0.617F);
-  check_area(area_along(box, kUp));
-  CHECK(area_along(box, -kUp) == 0.0);
-}
-
 TEST_CASE("Two copies of a surface become one, half way between them", "[surface_fusion]") {
   const FusedBox box = fuse({square(0, kUp, 0.60F), square(3, kUp, 0.65F)});
   check_height(box, kUp, 0.625F);

@@ -53,25 +53,6 @@ bool are_equal(const LabelledMesh& a, const LabelledMesh& b) {
 
 }  // namespace
 
-TEST_CASE("Robots with the same chunks have the same map, in whatever order they came",
-          "[team_map]") {
-  std::vector<MeshChunk> chunks;
-  for (const RobotId robot : {RobotId{0}, RobotId{1}, RobotId{2}})
-    for (MeshChunk& chunk : chunks_of(floor_from(robot, 0.01F * robot), robot))
-      chunks.push_back(std::move(chunk));
-  TeamMesh first, second;
-  add_all(first, chunks);
-  std::mt19937 rng(3);
-  std::shuffle(chunks.begin(), chunks.end(), rng);
-  // Former chunks of the first key are replaced.
-  for (MeshChunk former : chunks_of(floor_from(0.0F, 0.3F), 0))
-    if (former.key == first.placed().front().chunk->key)
-      CHECK(second.add(former) == ChunkVerdict::kTaken);
-  add_all(second, chunks);
-  CHECK(are_equal(fused(first), fused(second)));
-  CHECK(fused(first).faces.size() > 1000);
-}
-
 TEST_CASE("Copies of a floor are fused between them, and every part is there once", "[team_map]") {
   TeamMesh team;
   add_all(team, chunks_of(floor_from(0.0F, 0.0F), 0));

@@ -234,16 +234,18 @@ void time_parts(const HillyField& field, const std::vector<SE3>& before,
   for (const MeshNode& node : simplified.nodes) graph.nodes.push_back(node.position);
   graph.T_odom_kf = field.T_odom_kf;
   graph.edges = region_edges(simplified, field.map.mesh.faces, window);
-  graph.keyframe_edges = choose_keyframe_edges(simplified.nodes, 4, window);
-  const DeformationNoise noise;
-  const DeformationStop stop;
+  graph.keyframe_edges = choose_keyframe_edges(
+      simplified.nodes, static_cast<std::size_t>(config.keyframes_per_node), window);
+  const DeformationNoise noise{config.anchor_rotation_rad, config.anchor_translation_m,
+                               config.mesh_edge_m, config.keyframe_edge_m};
+  const DeformationStop stop{config.max_iterations, config.energy_tolerance};
   const DeformationSolution cold = timed(slowest.nodes_cold_s, [&] {
     return solve(graph, before, noise, stop, initial_poses(graph, before));
   });
   const DeformationSolution warm = timed(slowest.nodes_warm_s, [&] {
     return solve(graph, after, noise, stop, warm_start_poses(graph, cold.poses, before, after));
   });
-  Interpolation interpolation(4, window);
+  Interpolation interpolation(static_cast<std::size_t>(config.interpolation_nodes), window);
   interpolation.bind(field.map.mesh.vertices, field.map.seen_by, simplified.nodes);
   (void)timed(slowest.bend_s, [&] {
     return interpolation.deform(field.map.mesh.vertices, field.map.seen_by, simplified.nodes,

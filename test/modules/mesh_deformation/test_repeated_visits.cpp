@@ -1,123 +1,17 @@
 #include <catch2/catch.hpp>
 #include <cstddef>
-#include <iostream>
 #include <numbers>
 #include <set>
 #include <tuple>
-#include <utility>
 #include <vector>
 
 #include "modules/core/lie.hpp"
-#include "modules/evaluation/mesh/mesh_error.hpp"
-#include "modules/mesh_deformation/local_mesh_optimizer.hpp"
 #include "modules/mesh_deformation/mesh_corrector.hpp"
 #include "modules/semantic_mapping/semantic_mapper.hpp"
 #include "test/modules/semantic_mapping/wall_scene.hpp"
-#include "test/support/recorded_kitchen.hpp"
-#include "test/support/shared_data.hpp"
 
 namespace km {
 namespace {
-
-// A robot that maps, with every frame as a keyframe.
-struct RecordedRobot {
-  SemanticMapper mapper;
-  std::vector<SE3> T_odom_kf = {};
-  std::vector<SE3> T_world_kf = {};
-
-  void integrate(const PosedFrame& posed, const SE3& T_odom_cam) {
-    const auto keyframe = static_cast<KeyframeIndex>(T_odom_kf.size());
-    REQUIRE(mapper.integrate(*posed.frame->depth, nullptr, T_odom_cam, keyframe).status ==
-            IntegrationStatus::kIntegrated);
-    T_odom_kf.push_back(T_odom_cam);
-    T_world_kf.push_back(posed.T_world_cam);
-  }
-  [[nodiscard]] MapMesh mesh() {
-    mapper.update_mesh();
-    return mapper.mesh();
-  }
-};
-
-// Odometry with drift: lengths grow by 2 %. The heading drifts by 2 degrees in all, evenly over
-// `steps` frames, about a tilted axis.
-class Drift {
- public:
-  explicit Drift(std::size_t steps)
-      : turn_(so3_exp(2.0 * std::numbers::pi / 180.0 / static_cast<double>(steps) *
-                      Eigen::Vector3d(1, 2, 1).normalized())) {}
-
-  SE3 next(const SE3& T_world_cam) {
-    if (first_) {
-      T_odom_cam_ = T_world_cam;
-      first_ = false;
-    } else {
-      SE3 step = before_.inverse() * T_world_cam;
-      step.translation() *= 1.02;
-      step.linear() *= turn_;
-      T_odom_cam_ = T_odom_cam_ * step;
-    }
-    before_ = T_world_cam;
-    return T_odom_cam_;
-  }
-
- private:
-  Eigen::Matrix3d turn_;
-  bool first_ = true;
-  SE3 before_ = SE3::Identity();
-  SE3 T_odom_cam_ = SE3::Identity();
-};
-
-// Distances [m] from `truth` to two meshes, from its points within 20 cm of either of them, which
-// are more than half.
-std::pair<DistanceSummary, DistanceSummary> distances_to(const LabelledMesh& truth,
-                                                         const LabelledMesh& first,
-                                                         const LabelledMesh& second) {
-  const MeshInput a{"first", first}, b{"second", second};
-  const MeshChange change =
-      mesh_change(truth, {&a, 1}, {&b, 1}, {.icp = false, .registration = {}, .crop_m = 0.2});
-  REQUIRE(change.before.merged.coverage > 0.5);
-  REQUIRE(change.after.merged.coverage > 0.5);
-  return {change.before.merged.truth.surface, change.after.merged.truth.surface};
-}
-
-TEST_CASE("A recorded kitchen mapped with drift is corrected to agree with the first robot's",
-          "[mesh_deformation][slow]") {
-  const auto folder = shared_data("7scenes_redkitchen");
-  if (!folder) return;
-  RecordedKitchen kitchen(*folder);
-  SemanticMappingConfig mapping;
-  mapping.voxel_size_m = 0.05;
-  const Camera& camera = kitchen.rig().cameras[0];
-  RecordedRobot first{SemanticMapper(mapping, camera)};
-  RecordedRobot given{SemanticMapper(mapping, camera)};
-  RecordedRobot drifted{SemanticMapper(mapping, camera)};
-  const std::size_t half = kitchen.frame_count() / 4;  // half of the frames are used
-  Drift drift(half);
-  for (std::size_t frame = 0; const auto posed = kitchen.next(); ++frame) {
-    kitchen.skip(1);
-    if (frame < half) {
-      first.integrate(*posed, posed->T_world_cam);
-    } else {
-      given.integrate(*posed, posed->T_world_cam);
-      drifted.integrate(*posed, drift.next(posed->T_world_cam));
-    }
-  }
-  const LabelledMesh reference = first.mesh().mesh;
-  const LabelledMesh undrifted = given.mesh().mesh;
-  const MapMesh map = drifted.mesh();
-  LocalMeshOptimizer optimizer;
-  const DeformedMesh corrected = optimizer.optimize(map, drifted.T_odom_kf, drifted.T_world_kf);
-  CHECK(corrected.report.status == DeformationStatus::kConverged);
-  const auto [before, after] = distances_to(reference, map.mesh, corrected.mesh);
-  const double floor_m = distances_to(reference, map.mesh, undrifted).second.median_m;
-  std::cout << "kitchen, distance between the robots' meshes, median and mean: " << 1e3 * floor_m
-            << " mm with the given poses (median); " << 1e3 * before.median_m << ", "
-            << 1e3 * before.mean_m << " with drift; " << 1e3 * after.median_m << ", "
-            << 1e3 * after.mean_m << " corrected with " << corrected.report.nodes << " nodes\n";
-  CHECK(before.median_m > 1.5 * after.median_m);
-  CHECK(before.mean_m > after.mean_m);
-  CHECK(after.median_m < 1.5 * floor_m);
-}
 
 constexpr int kFramesPerLap = 50;
 
