@@ -54,20 +54,6 @@ DepthError error_on(const StereoRig& rig, const StereoDepthConfig& config,
   return compare(stereo.compute(frame.left, frame.right), stereo, plane, T_world_body);
 }
 
-TEST_CASE("Planes at any distance and slant have the right depth", "[stereo_depth]") {
-  const double depth_m = GENERATE(1.0, 2.0, 4.0);
-  const double slant_rad = GENERATE(0.0, 0.5);
-  CAPTURE(depth_m, slant_rad);
-  TexturedPlane plane;
-  plane.depth_m = depth_m;
-  plane.cell_m = 0.03 * depth_m;
-  const SE3 T_world_body =
-      make_pose(so3_exp(slant_rad * Eigen::Vector3d(0.6, 0.8, 0.0)), Eigen::Vector3d::Zero());
-  const DepthError error = error_on(test_rig(), {}, plane, T_world_body);
-  CHECK(error.median_px < kMatchedMedian_px);
-  CHECK(error.share > kMatchedShare);
-}
-
 TEST_CASE("With any lens a plane has the right depth", "[stereo_depth]") {
   struct Case {
     double focal_px;

@@ -140,19 +140,6 @@ TEST_CASE("Distances equal brute force while obstacles come and go", "[distance_
   }
 }
 
-TEST_CASE("A removed block is unknown, and its surface does not count any more",
-          "[distance_field]") {
-  World world(3);
-  world.inside.insert({4, 4, 4});
-  DistanceField field(1.0, kVoxel_m);
-  field.set(world.all());
-  CHECK(*field.at_voxel({9, 4, 4}) == Approx(0.45));
-  field.set({BlockSpace{.position = {0, 0, 0}}});
-  CHECK_FALSE(field.at_voxel({4, 4, 4}));
-  CHECK(*field.at_voxel({9, 4, 4}) == 1.0);
-  CHECK(field.blocks() == 26);
-}
-
 TEST_CASE("Distance and gradient at a point in front of a wall", "[distance_field]") {
   World world(3);  // wall at x >= 12, with its surface at x = 11.5 voxels
   for (int x = 12; x < world.side(); ++x)

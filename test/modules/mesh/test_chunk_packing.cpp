@@ -119,31 +119,4 @@ TEST_CASE("A sorted and packed chunk takes less than a third of its bytes", "[me
   CHECK(wire_bytes(chunk) >= packed(chunk).size() + kMeshKeyframeBytes * chunk.keyframes.size());
 }
 
-TEST_CASE("Bytes that are not those of a chunk are not unpacked", "[mesh]") {
-  const MeshChunk chunk = shuffled_chunk();
-  std::vector<std::uint8_t> bytes = packed(chunk);
-  ChunkCounts counts = counts_of(chunk);
-  MeshChunk result;
-  REQUIRE(unpack(bytes, counts, result));
-  SECTION("other numbers of elements") {
-    ++counts.vertices;
-  }
-  SECTION("more than a chunk may have") {
-    counts.faces = 65535;
-  }
-  SECTION("no elements") {
-    counts = {};
-  }
-  SECTION("a frame without its end") {
-    bytes.pop_back();
-  }
-  SECTION("bytes after the frame") {
-    bytes.push_back(7);
-  }
-  SECTION("nothing") {
-    bytes.clear();
-  }
-  CHECK_FALSE(unpack(bytes, counts, result));
-}
-
 }  // namespace km

@@ -98,19 +98,6 @@ TEST_CASE("A mesh whose keyframes all move equally is moved as a whole", "[mesh_
   }
 }
 
-TEST_CASE("A refused correction changes nothing", "[mesh_deformation]") {
-  Corridor corridor;
-  MeshCorrector corrector(MeshDeformationConfig{});
-  Corridor without;
-  without.T_world_kf.clear();
-  CHECK_THROWS_AS(corrector.correct(without.input()), std::invalid_argument);
-  CHECK(corrector.correct(corridor.input()));
-  ++without.version;
-  CHECK_THROWS_AS(corrector.correct(without.input()), std::invalid_argument);
-  CHECK_THROWS_AS(corrector.correct_from_scratch(without.input()), std::invalid_argument);
-  CHECK_FALSE(corrector.correct(corridor.input()));
-}
-
 TEST_CASE("A mesh corrected from scratch does not depend on earlier corrections",
           "[mesh_deformation]") {
   Corridor corridor;

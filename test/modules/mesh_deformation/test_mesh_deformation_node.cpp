@@ -171,13 +171,6 @@ TEST_CASE("A last map that cannot be corrected is reported", "[node]") {
   CHECK(robot.results().empty());
 }
 
-TEST_CASE("The mesh deformation node refuses a gap between keyframes", "[node]") {
-  Robot robot;
-  MeshDeformationNode node(every_two_seconds(), kSelf, robot.topics());
-  node.step(robot.keyframe(0), 0.0);
-  CHECK_THROWS_AS(node.step(robot.keyframe(2), 0.0), std::invalid_argument);
-}
-
 TEST_CASE("The mesh deformation node works as a thread", "[node]") {
   Robot robot;
   MeshDeformationConfig config;
