@@ -7,6 +7,8 @@
 #include <string>
 #include <tuple>
 
+#include "modules/core/config.hpp"
+
 namespace km {
 namespace {
 
