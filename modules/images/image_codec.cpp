@@ -14,6 +14,10 @@
 namespace km {
 namespace {
 
+// Longest text, colour profile or other part beside the pixels of a PNG file, and largest sum of
+// all of them, unpacked [B]. Without a limit, a file of 8 MB takes 8 GB of memory.
+constexpr std::size_t kMaxUnpackedText = std::size_t{8} << 20U;
+
 using Png = std::unique_ptr<spng_ctx, decltype(&spng_ctx_free)>;
 using Jpeg = std::unique_ptr<void, decltype(&tjDestroy)>;
 
@@ -30,6 +34,16 @@ void require_side(int width, int height) {
   if (width > kMaxImageSide_px || height > kMaxImageSide_px)
     throw ImageCodecError(std::to_string(width) + 'x' + std::to_string(height) + " px, at most " +
                           std::to_string(kMaxImageSide_px) + " are decoded");
+}
+
+// An image for decoded pixels.
+cv::Mat blank(int width, int height, int type) {
+  const std::size_t bytes =
+      static_cast<std::size_t>(width) * static_cast<std::size_t>(height) * CV_ELEM_SIZE(type);
+  if (bytes > kMaxDecodedBytes)
+    throw ImageCodecError(std::to_string(width) + 'x' + std::to_string(height) + " px, at most " +
+                          std::to_string(kMaxDecodedBytes >> 20U) + " MiB are decoded");
+  return cv::Mat(height, width, type);
 }
 
 cv::Mat converted(const cv::Mat& image, int code) {
@@ -69,13 +83,16 @@ cv::Mat decode_png(std::string_view file, DecodedPixels pixels) {
   const Png png(spng_ctx_new(0), spng_ctx_free);
   if (!png) throw ImageCodecError("PNG: no memory");
   require_png(spng_set_image_limits(png.get(), kMaxImageSide_px, kMaxImageSide_px));
+  require_png(spng_set_chunk_limits(png.get(), kMaxUnpackedText, kMaxUnpackedText));
   require_png(spng_set_png_buffer(png.get(), file.data(), file.size()));
   spng_ihdr header{};
   require_png(spng_get_ihdr(png.get(), &header));
   spng_trns transparency{};
-  const bool is_transparent = spng_get_trns(png.get(), &transparency) == SPNG_OK;
+  const int transparency_status = spng_get_trns(png.get(), &transparency);
+  if (transparency_status != SPNG_ECHUNKAVAIL) require_png(transparency_status);
+  const bool is_transparent = transparency_status == SPNG_OK;
   const auto [format, type] = pixels_of(header, is_transparent);
-  cv::Mat image(static_cast<int>(header.height), static_cast<int>(header.width), type);
+  cv::Mat image = blank(static_cast<int>(header.width), static_cast<int>(header.height), type);
   require_png(spng_decode_image(png.get(), image.data, image.total() * image.elemSize(), format,
                                 type == CV_8UC4 ? SPNG_DECODE_TRNS : 0));
   return as_wanted(image, pixels);
@@ -92,7 +109,7 @@ cv::Mat decode_jpeg(std::string_view file, DecodedPixels pixels) {
   require_side(width, height);
   if (colors == TJCS_CMYK || colors == TJCS_YCCK) throw ImageCodecError("JPEG: colours of print");
   const bool gray = pixels == DecodedPixels::kGray || colors == TJCS_GRAY;
-  cv::Mat image(height, width, gray ? CV_8UC1 : CV_8UC3);
+  cv::Mat image = blank(width, height, gray ? CV_8UC1 : CV_8UC3);
   const int status =
       tjDecompress2(jpeg.get(), bytes, file.size(), image.data, width, static_cast<int>(image.step),
                     height, gray ? TJPF_GRAY : TJPF_BGR, TJFLAG_ACCURATEDCT);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <opencv2/core.hpp>
@@ -27,6 +28,9 @@ enum class DecodedPixels {
 
 /// Longest side of an image that is decoded [px].
 constexpr int kMaxImageSide_px = 16384;
+
+/// Largest size of the pixels of an image that is decoded [B].
+constexpr std::size_t kMaxDecodedBytes = std::size_t{48} << 20U;
 
 /// Decodes a PNG or JPEG file. Neither the orientation in an EXIF tag nor the gamma of a PNG file
 /// changes pixels. Throws ImageCodecError.
