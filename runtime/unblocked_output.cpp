@@ -5,53 +5,25 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cerrno>
 #include <condition_variable>
 #include <cstdint>
-#include <deque>
 #include <mutex>
 #include <sstream>
-#include <string_view>
-#include <utility>
+#include <string>
+
+// Header only, because this is the only file that uses spdlog: nothing else waits for its headers.
+#define SPDLOG_FMT_EXTERNAL
+#define FMT_HEADER_ONLY
+#include <spdlog/async_logger.h>
+#include <spdlog/details/thread_pool.h>
+#include <spdlog/sinks/base_sink.h>
 
 #include "runtime/clock.hpp"
 #include "runtime/thread.hpp"
 
 namespace km {
-
-struct OutputQueue::State {
-  struct Piece {
-    std::string text;
-    std::uint64_t lines = 0;  // lines of `text`, counted as lost if it cannot be written
-  };
-
-  State(int descriptor_, std::size_t capacity_) : descriptor(descriptor_), capacity(capacity_) {}
-
-  const int descriptor;
-  const std::size_t capacity;  // [bytes]
-  std::mutex mutex;            // guards the members below
-  std::condition_variable changed;
-  std::deque<Piece> waiting;
-  std::size_t bytes = 0;  // bytes that wait or are being written
-  std::uint64_t lost = 0;
-  bool writing = false;
-  bool closed = false;
-
-  void push(std::string text, std::uint64_t lines) {
-    bytes += text.size();
-    waiting.push_back({std::move(text), lines});
-    changed.notify_all();
-  }
-  void report_losses() {
-    const std::uint64_t lines = std::exchange(lost, 0);
-    if (lines > 0)
-      push(std::to_string(lines) + (lines == 1 ? " line" : " lines") +
-               " lost: output blocked or failed\n",
-           lines);
-  }
-  void run();
-};
-
 namespace {
 
 // Blocks while the reader does not read. False if the rest cannot be written.
@@ -70,82 +42,119 @@ bool write_all(int descriptor, std::string_view text) {
   return true;
 }
 
+std::uint64_t lines_of(std::string_view text) {
+  return std::max<std::uint64_t>(
+      1, static_cast<std::uint64_t>(std::count(text.begin(), text.end(), '\n')));
+}
+
+// Used on the thread of spdlog only, except for the members that say so.
+class DescriptorSink final : public spdlog::sinks::base_sink<spdlog::details::null_mutex> {
+ public:
+  explicit DescriptorSink(int descriptor) : descriptor_(descriptor) {}
+
+  // Discards what follows, because the descriptor may be reused for another file. Thread-safe.
+  void close() { closed_ = true; }
+  // False if the first `count` texts and flushes are not written or lost after `grace_s`.
+  // Thread-safe.
+  bool wait_for(std::uint64_t count, double grace_s) {
+    std::unique_lock lock(mutex_);
+    return changed_.wait_for(lock, steady_duration(grace_s),
+                             [&] { return handled_ + overrun_() >= count; });
+  }
+  void set_overrun(std::function<std::size_t()> overrun) { overrun_ = std::move(overrun); }
+
+ private:
+  void sink_it_(const spdlog::details::log_msg& message) override {
+    if (closed_) return;
+    const std::string_view text(message.payload.data(), message.payload.size());
+    report_losses();
+    if (!write_all(descriptor_, text)) failed_ += lines_of(text);
+    count();
+  }
+  void flush_() override {
+    if (closed_) return;
+    report_losses();
+    count();
+  }
+  void count() {
+    const std::lock_guard lock(mutex_);
+    ++handled_;
+    changed_.notify_all();
+  }
+  void report_losses() {
+    const std::uint64_t lost = failed_ + overrun_() - reported_;
+    if (lost == 0) return;
+    if (write_all(descriptor_, std::to_string(lost) + (lost == 1 ? " line" : " lines") +
+                                   " lost: output blocked or failed\n"))
+      reported_ += lost;
+  }
+
+  const int descriptor_;
+  std::function<std::size_t()> overrun_;  // number of texts that made room for newer ones
+  std::uint64_t failed_ = 0, reported_ = 0;
+  std::atomic<bool> closed_ = false;
+  std::mutex mutex_;  // guards handled_
+  std::condition_variable changed_;
+  std::uint64_t handled_ = 0;  // texts and flushes
+};
+
 }  // namespace
 
-void OutputQueue::State::run() {
-  name_this_thread("output");
-  std::unique_lock lock(mutex);
-  while (true) {
-    changed.wait(lock, [this] { return closed || !waiting.empty(); });
-    if (waiting.empty()) return;
-    const Piece piece = std::move(waiting.front());
-    waiting.pop_front();
-    writing = true;
-    lock.unlock();
-    const bool written = write_all(descriptor, piece.text);
-    lock.lock();
-    writing = false;
-    bytes -= piece.text.size();
-    if (!written)
-      lost += piece.lines;
-    else if (waiting.empty())
-      report_losses();
-    changed.notify_all();
+struct UnblockedOutput::Queue {
+  Queue(int descriptor, std::size_t capacity)
+      : sink(std::make_shared<DescriptorSink>(descriptor)),
+        // Without signals, a closed pipe is an error of write() and does not end the process.
+        pool([&] {
+          const SignalsBlocked blocked;
+          return std::make_shared<spdlog::details::thread_pool>(capacity, 1,
+                                                                [] { name_this_thread("output"); });
+        }()),
+        logger(std::make_shared<spdlog::async_logger>(
+            "", sink, pool, spdlog::async_overflow_policy::overrun_oldest)) {
+    sink->set_overrun([queue = pool.get()] { return queue->overrun_counter(); });
   }
+
+  const std::shared_ptr<DescriptorSink> sink;
+  const std::shared_ptr<spdlog::details::thread_pool> pool;
+  const std::shared_ptr<spdlog::async_logger> logger;
+  std::atomic<std::uint64_t> posted = 0;  // texts and flushes
+};
+
+UnblockedOutput::UnblockedOutput(int descriptor, std::size_t capacity)
+    : queue_(std::make_shared<Queue>(descriptor, capacity)) {}
+
+UnblockedOutput::~UnblockedOutput() {
+  if (drain()) return;
+  queue_->sink->close();
+  new std::shared_ptr<Queue>(std::move(queue_));  // never destroyed: its thread may never end
 }
 
-OutputQueue::OutputQueue(int descriptor, std::size_t capacity_bytes)
-    : state_(std::make_shared<State>(descriptor, capacity_bytes)),
-      // Without signals, a closed pipe is an error of write() and does not end the process.
-      writer_(start_without_signals([state = state_] { state->run(); })) {}
-
-OutputQueue::~OutputQueue() {
-  const bool drained = drain(kGrace_s);
-  {
-    const std::lock_guard lock(state_->mutex);
-    state_->closed = true;
-    state_->waiting.clear();  // because `descriptor` may be reused for another file
-    state_->changed.notify_all();
-  }
-  if (drained)
-    writer_.join();
-  else
-    writer_.detach();
+void UnblockedOutput::write(std::string_view text) {
+  ++queue_->posted;
+  queue_->logger->log(spdlog::level::info, spdlog::string_view_t(text.data(), text.size()));
 }
 
-void OutputQueue::write(std::string text) {
-  const auto lines = std::max<std::uint64_t>(
-      1, static_cast<std::uint64_t>(std::count(text.begin(), text.end(), '\n')));
-  const std::lock_guard lock(state_->mutex);
-  if (state_->bytes + text.size() > state_->capacity) {
-    state_->lost += lines;
-    return;
-  }
-  state_->report_losses();
-  state_->push(std::move(text), lines);
-}
-
-bool OutputQueue::drain(double grace_s) {
-  std::unique_lock lock(state_->mutex);
-  return state_->changed.wait_for(lock, steady_duration(grace_s),
-                                  [this] { return state_->waiting.empty() && !state_->writing; });
+bool UnblockedOutput::drain(double grace_s) {
+  const std::uint64_t count = ++queue_->posted;
+  queue_->logger->flush();  // reports losses
+  return queue_->sink->wait_for(count, grace_s);
 }
 
 namespace {
 
 // Forwards the written text at every flush.
-class QueueBuffer final : public std::stringbuf {
+class OutputBuffer final : public std::stringbuf {
  public:
-  explicit QueueBuffer(OutputQueue& queue) : std::stringbuf(std::ios::out), queue_(queue) {}
+  explicit OutputBuffer(UnblockedOutput& output) : std::stringbuf(std::ios::out), to_(output) {}
 
  private:
   int sync() override {
-    if (std::string text = str(); !text.empty()) queue_.write(std::move(text));
+    if (const std::string text = str(); !text.empty()) to_.write(text);
     str({});
     return 0;
   }
 
-  OutputQueue& queue_;
+  UnblockedOutput& to_;
 };
 
 bool are_same_file(int a, int b) {
@@ -156,12 +165,12 @@ bool are_same_file(int a, int b) {
 }
 
 struct StandardStreams {
-  std::shared_ptr<OutputQueue> out_queue = std::make_shared<OutputQueue>(STDOUT_FILENO);
-  std::shared_ptr<OutputQueue> err_queue = are_same_file(STDOUT_FILENO, STDERR_FILENO)
-                                               ? out_queue
-                                               : std::make_shared<OutputQueue>(STDERR_FILENO);
-  QueueBuffer out_buffer{*out_queue};
-  QueueBuffer err_buffer{*err_queue};
+  std::shared_ptr<UnblockedOutput> to_out = std::make_shared<UnblockedOutput>(STDOUT_FILENO);
+  std::shared_ptr<UnblockedOutput> to_err = are_same_file(STDOUT_FILENO, STDERR_FILENO)
+                                                ? to_out
+                                                : std::make_shared<UnblockedOutput>(STDERR_FILENO);
+  OutputBuffer out_buffer{*to_out};
+  OutputBuffer err_buffer{*to_err};
   std::ostream out{&out_buffer};
   std::ostream err{&err_buffer};
 };
@@ -190,10 +199,9 @@ std::ostream& unblocked_stderr() {
 }
 
 void drain_standard_output() {
-  const double end_s = steady_now_s() + OutputQueue::kGrace_s;
-  for (OutputQueue* queue :
-       {standard_streams().out_queue.get(), standard_streams().err_queue.get()})
-    queue->drain(std::max(0.0, end_s - steady_now_s()));
+  const StandardStreams& streams = standard_streams();
+  streams.to_out->drain();
+  if (streams.to_err != streams.to_out) streams.to_err->drain();
 }
 
 }  // namespace km
