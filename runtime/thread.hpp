@@ -13,28 +13,23 @@
 
 namespace km {
 
-/// Threads that are started in its lifetime by the calling thread receive no signals of the
-/// process, because another thread handles them.
-class SignalsBlocked {
- public:
-  SignalsBlocked() {
-    sigset_t all;
-    sigfillset(&all);
-    pthread_sigmask(SIG_SETMASK, &all, &before_);
-  }
-  ~SignalsBlocked() { pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
-  SignalsBlocked(const SignalsBlocked&) = delete;
-  SignalsBlocked& operator=(const SignalsBlocked&) = delete;
-
- private:
-  sigset_t before_{};
-};
+/// The calling thread, and threads that it starts from now on, receive no signals of the process,
+/// because another thread handles them. Returns the signals that were blocked before.
+inline sigset_t block_signals() {
+  sigset_t all;
+  sigset_t before;
+  sigfillset(&all);
+  pthread_sigmask(SIG_SETMASK, &all, &before);
+  return before;
+}
 
 /// Starts a thread that receives no signals of the process.
 template <typename Work>
 [[nodiscard]] std::thread start_without_signals(Work&& work) {
-  const SignalsBlocked blocked;
-  return std::thread(std::forward<Work>(work));
+  const sigset_t before = block_signals();
+  std::thread thread(std::forward<Work>(work));
+  pthread_sigmask(SIG_SETMASK, &before, nullptr);
+  return thread;
 }
 
 /// Names the calling thread for debuggers and top; Linux keeps 15 characters.

@@ -1,17 +1,15 @@
 #include "runtime/unblocked_output.hpp"
 
 #include <poll.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
-#include <algorithm>
-#include <atomic>
 #include <cerrno>
-#include <condition_variable>
 #include <cstdint>
-#include <mutex>
+#include <memory>
 #include <sstream>
 #include <string>
+#include <string_view>
+#include <thread>
 
 // Header only, because this is the only file that uses spdlog: nothing else waits for its headers.
 #define SPDLOG_FMT_EXTERNAL
@@ -25,6 +23,8 @@
 
 namespace km {
 namespace {
+
+using Pool = spdlog::details::thread_pool;
 
 // Blocks while the reader does not read. False if the rest cannot be written.
 bool write_all(int descriptor, std::string_view text) {
@@ -42,148 +42,72 @@ bool write_all(int descriptor, std::string_view text) {
   return true;
 }
 
-std::uint64_t lines_of(std::string_view text) {
-  return std::max<std::uint64_t>(
-      1, static_cast<std::uint64_t>(std::count(text.begin(), text.end(), '\n')));
-}
+// Queue of the text of both streams, so that their order is kept, and the thread that writes it.
+struct OutputQueue {
+  static constexpr std::size_t kTexts = 4096;
 
-// Used on the thread of spdlog only, except for the members that say so.
+  // Without signals, a closed pipe is an error of write() and does not end the process.
+  std::shared_ptr<Pool> pool = std::make_shared<Pool>(kTexts, 1, [] {
+    block_signals();
+    name_this_thread("output");
+  });
+  std::uint64_t failed = 0, reported = 0;  // lost lines; used by the thread only
+};
+
 class DescriptorSink final : public spdlog::sinks::base_sink<spdlog::details::null_mutex> {
  public:
-  explicit DescriptorSink(int descriptor) : descriptor_(descriptor) {}
-
-  // Discards what follows, because the descriptor may be reused for another file. Thread-safe.
-  void close() { closed_ = true; }
-  // False if the first `count` texts and flushes are not written or lost after `grace_s`.
-  // Thread-safe.
-  bool wait_for(std::uint64_t count, double grace_s) {
-    std::unique_lock lock(mutex_);
-    return changed_.wait_for(lock, steady_duration(grace_s),
-                             [&] { return handled_ + overrun_() >= count; });
-  }
-  void set_overrun(std::function<std::size_t()> overrun) { overrun_ = std::move(overrun); }
+  DescriptorSink(int descriptor, OutputQueue& queue) : descriptor_(descriptor), queue_(queue) {}
 
  private:
   void sink_it_(const spdlog::details::log_msg& message) override {
-    if (closed_) return;
-    const std::string_view text(message.payload.data(), message.payload.size());
-    report_losses();
-    if (!write_all(descriptor_, text)) failed_ += lines_of(text);
-    count();
+    const std::uint64_t lost = queue_.failed + queue_.pool->overrun_counter() - queue_.reported;
+    if (lost > 0 && write_all(descriptor_, std::to_string(lost) + (lost == 1 ? " line" : " lines") +
+                                               " lost: output blocked or failed\n"))
+      queue_.reported += lost;
+    if (!write_all(descriptor_, {message.payload.data(), message.payload.size()})) ++queue_.failed;
   }
-  void flush_() override {
-    if (closed_) return;
-    report_losses();
-    count();
-  }
-  void count() {
-    const std::lock_guard lock(mutex_);
-    ++handled_;
-    changed_.notify_all();
-  }
-  void report_losses() {
-    const std::uint64_t lost = failed_ + overrun_() - reported_;
-    if (lost == 0) return;
-    if (write_all(descriptor_, std::to_string(lost) + (lost == 1 ? " line" : " lines") +
-                                   " lost: output blocked or failed\n"))
-      reported_ += lost;
-  }
+  void flush_() override {}
 
   const int descriptor_;
-  std::function<std::size_t()> overrun_;  // number of texts that made room for newer ones
-  std::uint64_t failed_ = 0, reported_ = 0;
-  std::atomic<bool> closed_ = false;
-  std::mutex mutex_;  // guards handled_
-  std::condition_variable changed_;
-  std::uint64_t handled_ = 0;  // texts and flushes
+  OutputQueue& queue_;
 };
 
-}  // namespace
-
-struct UnblockedOutput::Queue {
-  Queue(int descriptor, std::size_t capacity)
-      : sink(std::make_shared<DescriptorSink>(descriptor)),
-        // Without signals, a closed pipe is an error of write() and does not end the process.
-        pool([&] {
-          const SignalsBlocked blocked;
-          return std::make_shared<spdlog::details::thread_pool>(capacity, 1,
-                                                                [] { name_this_thread("output"); });
-        }()),
-        logger(std::make_shared<spdlog::async_logger>(
-            "", sink, pool, spdlog::async_overflow_policy::overrun_oldest)) {
-    sink->set_overrun([queue = pool.get()] { return queue->overrun_counter(); });
-  }
-
-  const std::shared_ptr<DescriptorSink> sink;
-  const std::shared_ptr<spdlog::details::thread_pool> pool;
-  const std::shared_ptr<spdlog::async_logger> logger;
-  std::atomic<std::uint64_t> posted = 0;  // texts and flushes
-};
-
-UnblockedOutput::UnblockedOutput(int descriptor, std::size_t capacity)
-    : queue_(std::make_shared<Queue>(descriptor, capacity)) {}
-
-UnblockedOutput::~UnblockedOutput() {
-  if (drain()) return;
-  queue_->sink->close();
-  new std::shared_ptr<Queue>(std::move(queue_));  // never destroyed: its thread may never end
-}
-
-void UnblockedOutput::write(std::string_view text) {
-  ++queue_->posted;
-  queue_->logger->log(spdlog::level::info, spdlog::string_view_t(text.data(), text.size()));
-}
-
-bool UnblockedOutput::drain(double grace_s) {
-  const std::uint64_t count = ++queue_->posted;
-  queue_->logger->flush();  // reports losses
-  return queue_->sink->wait_for(count, grace_s);
-}
-
-namespace {
-
-// Forwards the written text at every flush.
+// Queues the written text at every flush.
 class OutputBuffer final : public std::stringbuf {
  public:
-  explicit OutputBuffer(UnblockedOutput& output) : std::stringbuf(std::ios::out), to_(output) {}
+  OutputBuffer(int descriptor, OutputQueue& queue)
+      : std::stringbuf(std::ios::out),
+        logger_(std::make_shared<spdlog::async_logger>(
+            "", std::make_shared<DescriptorSink>(descriptor, queue), queue.pool,
+            spdlog::async_overflow_policy::overrun_oldest)) {}
+
+  // Queues a mark that the thread takes when it has written the texts before it.
+  void mark() { logger_->flush(); }
 
  private:
   int sync() override {
-    if (const std::string text = str(); !text.empty()) to_.write(text);
+    const std::string text = str();
+    if (!text.empty()) logger_->log(spdlog::level::info, spdlog::string_view_t(text));
     str({});
     return 0;
   }
 
-  UnblockedOutput& to_;
+  const std::shared_ptr<spdlog::async_logger> logger_;
 };
 
-bool are_same_file(int a, int b) {
-  struct stat of_a {};
-  struct stat of_b {};
-  return fstat(a, &of_a) == 0 && fstat(b, &of_b) == 0 && of_a.st_dev == of_b.st_dev &&
-         of_a.st_ino == of_b.st_ino;
-}
-
 struct StandardStreams {
-  std::shared_ptr<UnblockedOutput> to_out = std::make_shared<UnblockedOutput>(STDOUT_FILENO);
-  std::shared_ptr<UnblockedOutput> to_err = are_same_file(STDOUT_FILENO, STDERR_FILENO)
-                                                ? to_out
-                                                : std::make_shared<UnblockedOutput>(STDERR_FILENO);
-  OutputBuffer out_buffer{*to_out};
-  OutputBuffer err_buffer{*to_err};
+  OutputQueue queue;
+  OutputBuffer out_buffer{STDOUT_FILENO, queue};
+  OutputBuffer err_buffer{STDERR_FILENO, queue};
   std::ostream out{&out_buffer};
   std::ostream err{&err_buffer};
 };
 
 StandardStreams& standard_streams() {
-  // Never destroyed, because destructors may log while the program ends.
+  // Never destroyed: destructors may log while the program ends, and the thread may be blocked.
   static auto* const streams = new StandardStreams;
   static const struct AtExit {
-    ~AtExit() {
-      streams->out.flush();
-      streams->err.flush();
-      drain_standard_output();
-    }
+    ~AtExit() { drain_standard_output(); }
   } at_exit;
   return *streams;
 }
@@ -199,9 +123,14 @@ std::ostream& unblocked_stderr() {
 }
 
 void drain_standard_output() {
-  const StandardStreams& streams = standard_streams();
-  streams.to_out->drain();
-  if (streams.to_err != streams.to_out) streams.to_err->drain();
+  constexpr double kGrace_s = 2.0;
+  StandardStreams& streams = standard_streams();
+  streams.out.flush();
+  streams.err.flush();
+  streams.err_buffer.mark();
+  const double end_s = steady_now_s() + kGrace_s;
+  while (streams.queue.pool->queue_size() > 0 && steady_now_s() < end_s)
+    std::this_thread::sleep_for(steady_duration(0.002));
 }
 
 }  // namespace km
