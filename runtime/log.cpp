@@ -10,7 +10,6 @@
 #include <utility>
 
 #include "runtime/clock.hpp"
-#include "runtime/log_listener.hpp"
 #include "runtime/unblocked_output.hpp"
 
 namespace km {
@@ -38,7 +37,7 @@ constexpr double kLimitedInterval_s = 5.0;
 struct Console {
   std::mutex mutex;  // guards the members below
   std::ostream* log_output = &unblocked_stderr();
-  log::Listener listener;
+  std::function<void(const log::Entry&)> listener;
   RateLimit rate_limit{kLimitedInterval_s};
   std::ostream* status_output = nullptr;
   bool status_in_place = false;
@@ -100,8 +99,6 @@ void print_status(Console& c) {
 
 namespace log {
 
-Line::Line(Level level, std::string_view tag) : Line(level, tag, {}) {}
-
 Line::Line(Level level, std::string_view tag, std::string key)
     : level_(level), tag_(tag), key_(std::move(key)), enabled_(level <= level_limit()) {}
 
@@ -121,7 +118,7 @@ Line::~Line() {
   if (c.listener) c.listener({level_, tag_, text_.str()});
 }
 
-void set_listener(Listener listener) {
+void set_listener(std::function<void(const Entry&)> listener) {
   const std::lock_guard lock(console().mutex);
   console().listener = std::move(listener);
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <map>
 #include <ostream>
 #include <sstream>
@@ -36,9 +37,8 @@ enum class Level { kError, kWarn, kInfo, kDebug };
 /// One line, written as a whole when it goes out of scope: "12:00:01.123 warn pcm: text".
 class Line {
  public:
-  Line(Level level, std::string_view tag);
-  /// `key` limits the rate: see limited().
-  Line(Level level, std::string_view tag, std::string key);
+  /// `key`, unless empty, limits the rate: see limited().
+  Line(Level level, std::string_view tag, std::string key = {});
   ~Line();
   Line(const Line&) = delete;
   Line& operator=(const Line&) = delete;
@@ -57,15 +57,18 @@ class Line {
   std::ostringstream text_;
 };
 
+/// The run is compromised.
 inline Line error(std::string_view tag) {
   return {Level::kError, tag};
-}  ///< The run is compromised.
+}
+/// Data lost or refused.
 inline Line warn(std::string_view tag) {
   return {Level::kWarn, tag};
-}  ///< Data lost or refused.
+}
+/// A few lines per minute.
 inline Line info(std::string_view tag) {
   return {Level::kInfo, tag};
-}  ///< A few per minute.
+}
 inline Line debug(std::string_view tag) {
   return {Level::kDebug, tag};
 }
@@ -77,6 +80,16 @@ inline Line limited(Level level, std::string_view tag, std::string key) {
 
 /// Lines less important than `level` are dropped. Default kInfo. Thread-safe.
 void set_level(Level level);
+
+struct Entry {
+  Level level = Level::kInfo;
+  std::string tag, text;
+};
+
+/// `listener` receives every line written from now on, one at a time, on the thread that writes it:
+/// it must only enqueue, and not log. An empty one removes the listener. Thread-safe; after the
+/// return the former listener is not called any more.
+void set_listener(std::function<void(const Entry&)> listener);
 
 /// Sets the output of log lines, by default unblocked_stderr(), so that no thread waits for the
 /// reader of the log. Returns the former output. For tests.

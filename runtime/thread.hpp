@@ -13,13 +13,20 @@
 
 namespace km {
 
-/// Starts a thread that receives no signals of the process, because another thread handles them.
-template <typename Work>
-[[nodiscard]] std::thread start_without_signals(Work&& work) {
+/// The calling thread, and threads that it starts from now on, receive no signals of the process,
+/// because another thread handles them. Returns the signals that were blocked before.
+inline sigset_t block_signals() {
   sigset_t all;
   sigset_t before;
   sigfillset(&all);
   pthread_sigmask(SIG_SETMASK, &all, &before);
+  return before;
+}
+
+/// Starts a thread that receives no signals of the process.
+template <typename Work>
+[[nodiscard]] std::thread start_without_signals(Work&& work) {
+  const sigset_t before = block_signals();
   std::thread thread(std::forward<Work>(work));
   pthread_sigmask(SIG_SETMASK, &before, nullptr);
   return thread;

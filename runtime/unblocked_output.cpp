@@ -1,58 +1,30 @@
 #include "runtime/unblocked_output.hpp"
 
 #include <poll.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <cerrno>
-#include <condition_variable>
 #include <cstdint>
-#include <deque>
-#include <mutex>
+#include <memory>
 #include <sstream>
+#include <string>
 #include <string_view>
-#include <utility>
+#include <thread>
+
+// Header only, because this is the only file that uses spdlog: nothing else waits for its headers.
+#define SPDLOG_FMT_EXTERNAL
+#define FMT_HEADER_ONLY
+#include <spdlog/async_logger.h>
+#include <spdlog/details/thread_pool.h>
+#include <spdlog/sinks/base_sink.h>
 
 #include "runtime/clock.hpp"
 #include "runtime/thread.hpp"
 
 namespace km {
-
-struct OutputQueue::State {
-  struct Piece {
-    std::string text;
-    std::uint64_t lines = 0;  // lines of `text`, counted as lost if it cannot be written
-  };
-
-  State(int descriptor_, std::size_t capacity_) : descriptor(descriptor_), capacity(capacity_) {}
-
-  const int descriptor;
-  const std::size_t capacity;  // [bytes]
-  std::mutex mutex;            // guards the members below
-  std::condition_variable changed;
-  std::deque<Piece> waiting;
-  std::size_t bytes = 0;  // bytes that wait or are being written
-  std::uint64_t lost = 0;
-  bool writing = false;
-  bool closed = false;
-
-  void push(std::string text, std::uint64_t lines) {
-    bytes += text.size();
-    waiting.push_back({std::move(text), lines});
-    changed.notify_all();
-  }
-  void report_losses() {
-    const std::uint64_t lines = std::exchange(lost, 0);
-    if (lines > 0)
-      push(std::to_string(lines) + (lines == 1 ? " line" : " lines") +
-               " lost: output blocked or failed\n",
-           lines);
-  }
-  void run();
-};
-
 namespace {
+
+using Pool = spdlog::details::thread_pool;
 
 // Blocks while the reader does not read. False if the rest cannot be written.
 bool write_all(int descriptor, std::string_view text) {
@@ -70,111 +42,72 @@ bool write_all(int descriptor, std::string_view text) {
   return true;
 }
 
-}  // namespace
+// Queue of the text of both streams, so that their order is kept, and the thread that writes it.
+struct OutputQueue {
+  static constexpr std::size_t kTexts = 4096;
 
-void OutputQueue::State::run() {
-  name_this_thread("output");
-  std::unique_lock lock(mutex);
-  while (true) {
-    changed.wait(lock, [this] { return closed || !waiting.empty(); });
-    if (waiting.empty()) return;
-    const Piece piece = std::move(waiting.front());
-    waiting.pop_front();
-    writing = true;
-    lock.unlock();
-    const bool written = write_all(descriptor, piece.text);
-    lock.lock();
-    writing = false;
-    bytes -= piece.text.size();
-    if (!written)
-      lost += piece.lines;
-    else if (waiting.empty())
-      report_losses();
-    changed.notify_all();
-  }
-}
+  // Without signals, a closed pipe is an error of write() and does not end the process.
+  std::shared_ptr<Pool> pool = std::make_shared<Pool>(kTexts, 1, [] {
+    block_signals();
+    name_this_thread("output");
+  });
+  std::uint64_t failed = 0, reported = 0;  // lost lines; used by the thread only
+};
 
-OutputQueue::OutputQueue(int descriptor, std::size_t capacity_bytes)
-    : state_(std::make_shared<State>(descriptor, capacity_bytes)),
-      // Without signals, a closed pipe is an error of write() and does not end the process.
-      writer_(start_without_signals([state = state_] { state->run(); })) {}
-
-OutputQueue::~OutputQueue() {
-  const bool drained = drain(kGrace_s);
-  {
-    const std::lock_guard lock(state_->mutex);
-    state_->closed = true;
-    state_->waiting.clear();  // because `descriptor` may be reused for another file
-    state_->changed.notify_all();
-  }
-  if (drained)
-    writer_.join();
-  else
-    writer_.detach();
-}
-
-void OutputQueue::write(std::string text) {
-  const auto lines = std::max<std::uint64_t>(
-      1, static_cast<std::uint64_t>(std::count(text.begin(), text.end(), '\n')));
-  const std::lock_guard lock(state_->mutex);
-  if (state_->bytes + text.size() > state_->capacity) {
-    state_->lost += lines;
-    return;
-  }
-  state_->report_losses();
-  state_->push(std::move(text), lines);
-}
-
-bool OutputQueue::drain(double grace_s) {
-  std::unique_lock lock(state_->mutex);
-  return state_->changed.wait_for(lock, steady_duration(grace_s),
-                                  [this] { return state_->waiting.empty() && !state_->writing; });
-}
-
-namespace {
-
-// Forwards the written text at every flush.
-class QueueBuffer final : public std::stringbuf {
+class DescriptorSink final : public spdlog::sinks::base_sink<spdlog::details::null_mutex> {
  public:
-  explicit QueueBuffer(OutputQueue& queue) : std::stringbuf(std::ios::out), queue_(queue) {}
+  DescriptorSink(int descriptor, OutputQueue& queue) : descriptor_(descriptor), queue_(queue) {}
+
+ private:
+  void sink_it_(const spdlog::details::log_msg& message) override {
+    const std::uint64_t lost = queue_.failed + queue_.pool->overrun_counter() - queue_.reported;
+    if (lost > 0 && write_all(descriptor_, std::to_string(lost) + (lost == 1 ? " line" : " lines") +
+                                               " lost: output blocked or failed\n"))
+      queue_.reported += lost;
+    if (!write_all(descriptor_, {message.payload.data(), message.payload.size()})) ++queue_.failed;
+  }
+  void flush_() override {}
+
+  const int descriptor_;
+  OutputQueue& queue_;
+};
+
+// Queues the written text at every flush.
+class OutputBuffer final : public std::stringbuf {
+ public:
+  OutputBuffer(int descriptor, OutputQueue& queue)
+      : std::stringbuf(std::ios::out),
+        logger_(std::make_shared<spdlog::async_logger>(
+            "", std::make_shared<DescriptorSink>(descriptor, queue), queue.pool,
+            spdlog::async_overflow_policy::overrun_oldest)) {}
+
+  // Queues a mark that the thread takes when it has written the texts before it.
+  void mark() { logger_->flush(); }
 
  private:
   int sync() override {
-    if (std::string text = str(); !text.empty()) queue_.write(std::move(text));
+    const std::string text = str();
+    if (!text.empty()) logger_->log(spdlog::level::info, spdlog::string_view_t(text));
     str({});
     return 0;
   }
 
-  OutputQueue& queue_;
+  const std::shared_ptr<spdlog::async_logger> logger_;
 };
 
-bool are_same_file(int a, int b) {
-  struct stat of_a {};
-  struct stat of_b {};
-  return fstat(a, &of_a) == 0 && fstat(b, &of_b) == 0 && of_a.st_dev == of_b.st_dev &&
-         of_a.st_ino == of_b.st_ino;
-}
-
 struct StandardStreams {
-  std::shared_ptr<OutputQueue> out_queue = std::make_shared<OutputQueue>(STDOUT_FILENO);
-  std::shared_ptr<OutputQueue> err_queue = are_same_file(STDOUT_FILENO, STDERR_FILENO)
-                                               ? out_queue
-                                               : std::make_shared<OutputQueue>(STDERR_FILENO);
-  QueueBuffer out_buffer{*out_queue};
-  QueueBuffer err_buffer{*err_queue};
+  OutputQueue queue;
+  OutputBuffer out_buffer{STDOUT_FILENO, queue};
+  OutputBuffer err_buffer{STDERR_FILENO, queue};
   std::ostream out{&out_buffer};
   std::ostream err{&err_buffer};
 };
 
 StandardStreams& standard_streams() {
-  // Never destroyed, because destructors may log while the program ends.
+  // Never destroyed: destructors may log while the program ends, and the thread may be blocked.
   static auto* const streams = new StandardStreams;
   static const struct AtExit {
-    ~AtExit() {
-      streams->out.flush();
-      streams->err.flush();
-      drain_standard_output();
-    }
+    ~AtExit() { drain_standard_output(); }
   } at_exit;
   return *streams;
 }
@@ -190,10 +123,14 @@ std::ostream& unblocked_stderr() {
 }
 
 void drain_standard_output() {
-  const double end_s = steady_now_s() + OutputQueue::kGrace_s;
-  for (OutputQueue* queue :
-       {standard_streams().out_queue.get(), standard_streams().err_queue.get()})
-    queue->drain(std::max(0.0, end_s - steady_now_s()));
+  constexpr double kGrace_s = 2.0;
+  StandardStreams& streams = standard_streams();
+  streams.out.flush();
+  streams.err.flush();
+  streams.err_buffer.mark();
+  const double end_s = steady_now_s() + kGrace_s;
+  while (streams.queue.pool->queue_size() > 0 && steady_now_s() < end_s)
+    std::this_thread::sleep_for(steady_duration(0.002));
 }
 
 }  // namespace km

@@ -15,7 +15,7 @@ namespace km {
 ///     | out: place 81.3 kB, verify 210.4 kB, pgo 5.0 kB, other 2.1 kB, waiting 12.1 kB | 143 MB
 /// Closures are counted as candidates > verified > inliers for each robot, by the robot that found
 /// them. Bytes that wait for the budget are shown if there are any. The last number is the resident
-/// memory.
+/// memory. kimera_multi_team reads the first number.
 [[nodiscard]] std::string status_text(double dataset_time_s, const RunRecord& record,
                                       const std::vector<Peer>& peers,
                                       const TrafficSnapshot& traffic, std::uint64_t resident_bytes);

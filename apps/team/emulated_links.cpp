@@ -48,6 +48,11 @@ const LinkEmulator& EmulatedLinks::finish() {
   return emulator_;
 }
 
+void EmulatedLinks::set_progress(std::size_t robot, double recorded_s) {
+  const std::lock_guard lock(mutex_);
+  emulator_.set_progress(robot, steady_now_s() - start_s_, recorded_s);
+}
+
 void EmulatedLinks::stop() {
   if (!carrier_.joinable()) return;
   stopped_ = true;
@@ -57,10 +62,14 @@ void EmulatedLinks::stop() {
 
 void EmulatedLinks::carry() {
   while (!stopped_) {
-    const double now_s = steady_now_s() - start_s_;
-    for (const SentFrame& delivery : emulator_.due(now_s)) deliver(delivery);
-    for (std::size_t robot = 0; robot < networks_.size(); ++robot) take_frames(robot, now_s);
-    const auto next_s = emulator_.next_s();
+    std::optional<double> next_s;
+    {
+      const std::lock_guard lock(mutex_);
+      const double now_s = steady_now_s() - start_s_;
+      for (const SentFrame& delivery : emulator_.due(now_s)) deliver(delivery);
+      for (std::size_t robot = 0; robot < networks_.size(); ++robot) take_frames(robot, now_s);
+      next_s = emulator_.next_s();
+    }
     if (next_s)
       wait_for_frames(*next_s - (steady_now_s() - start_s_));
     else

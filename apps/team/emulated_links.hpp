@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <vector>
 
@@ -24,6 +25,9 @@ class EmulatedLinks {
 
   [[nodiscard]] const RobotNetwork& network(std::size_t robot) const { return networks_[robot]; }
 
+  /// The recording of a robot is at `recorded_s` [s since its start]. Thread-safe.
+  void set_progress(std::size_t robot, double recorded_s);
+
   /// Ends the thread; frames in flight do not arrive. Returns the emulator with its counts. Throws
   /// std::runtime_error if frames could not be carried to the end.
   const LinkEmulator& finish();
@@ -35,7 +39,8 @@ class EmulatedLinks {
   void wait_for_frames(std::optional<double> due_in_s);
   void stop();
 
-  LinkEmulator emulator_;  // used by the thread only, until it has ended
+  std::mutex mutex_;  // guards emulator_ until the thread has ended
+  LinkEmulator emulator_;
   std::vector<RobotNetwork> networks_;
   Descriptor wake_;
   double start_s_;

@@ -84,22 +84,18 @@ LinkPartition partition_of(const LinksFile& file, const PartitionKeys& keys) {
   return partition;
 }
 
-// The true positions of a robot over the time of the run, if its recording plays without a break.
-std::vector<TimedPosition> path_of(const RobotPlan& robot, const std::string& rate,
-                                   const std::string& file) {
+// The true positions of a robot over the time of its recording.
+std::vector<PathPoint> path_of(const RobotPlan& robot, const std::string& file) {
   if (robot.truth.empty())
     throw ConfigError(file + ": range_m needs the true poses of " + robot.name +
                       ": give its truth in the team file, or --truth");
-  if (rate == "max")
-    throw ConfigError(file + ": range_m needs a run in real time: give a --rate that is not max");
-  const double speed = rate == "auto" ? 1.0 : std::strtod(rate.c_str(), nullptr);
   const std::vector<StampedPose> poses = read_trajectory(robot.truth);
   const auto window = recorded_window(robot);
   const Stamp start = window ? window->from : poses.front().stamp;
-  std::vector<TimedPosition> path;
+  std::vector<PathPoint> path;
   path.reserve(poses.size());
   for (const StampedPose& pose : poses)
-    path.push_back({seconds_between(start, pose.stamp) / speed, pose.T.translation()});
+    path.push_back({seconds_between(start, pose.stamp), pose.T.translation()});
   return path;
 }
 
@@ -121,9 +117,11 @@ LinkScript make_script(const LinksFile& keys, const TeamPlan& plan, const std::s
   for (const PartitionKeys& partition : keys.partitions)
     script.partitions.push_back(partition_of(keys, partition));
   const auto has_range = [](const LinkPlan& link) { return std::isfinite(link.range_m); };
-  if (std::ranges::any_of(script.links, has_range))
-    for (const RobotPlan& robot : plan.robots)
-      script.paths.push_back(path_of(robot, plan.rate, file));
+  if (!std::ranges::any_of(script.links, has_range)) return script;
+  if (plan.rate == "max")
+    throw ConfigError(file + ": range_m needs a run in real time: give a --rate that is not max");
+  if (plan.rate != "auto") script.rate = std::strtod(plan.rate.c_str(), nullptr);
+  for (const RobotPlan& robot : plan.robots) script.paths.push_back(path_of(robot, file));
   return script;
 }
 

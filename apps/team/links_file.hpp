@@ -46,9 +46,8 @@ struct LinkKeys {
     visitor.field(
         "range_m", range_m, {0.0, 1e9},
         "[m] robots further apart by their true poses do not receive each other; default: no "
-        "limit. Time is that of the recording from its start: --rate must not be max, and at auto "
-        "a "
-        "recording that waits for processors is late");
+        "limit. The pose of a robot is that of the present instant of its recording: --rate must "
+        "not be max");
     visitor.field("trace", trace, Input{},
                   "recorded link: CSV with columns time_s, bytes_per_s, delay_s, interpolated "
                   "linearly; replaces delay_s and rate_bytes_per_s");

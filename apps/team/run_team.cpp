@@ -39,8 +39,8 @@ void remove_earlier_run(const TeamPlan& plan) {
 class RunningTeam {
  public:
   RunningTeam(const fs::path& binary, const TeamPlan& plan, SignalWatch& signals,
-              TeamDisplay& display, const EmulatedLinks* links)
-      : plan_(plan), signals_(signals), display_(display) {
+              TeamDisplay& display, EmulatedLinks* links)
+      : plan_(plan), signals_(signals), display_(display), links_(links) {
     remove_earlier_run(plan);
     for (const RobotPlan& robot : plan.robots) {
       std::function<bool()> enter_network;
@@ -104,7 +104,11 @@ class RunningTeam {
 
   void read(std::size_t i) {
     if (robots_[i]->exit()) return;
-    for (const std::string& line : robots_[i]->read()) display_.update(i, line);
+    for (const std::string& line : robots_[i]->read()) {
+      display_.update(i, line);
+      const auto recorded_s = recorded_s_of(line);
+      if (links_ != nullptr && recorded_s) links_->set_progress(i, *recorded_s);
+    }
     if (robots_[i]->exit() && !robots_[i]->exit()->ok())
       display_.update(i, "FAILED: " + to_string(*robots_[i]->exit()) + why(*robots_[i]));
   }
@@ -124,6 +128,7 @@ class RunningTeam {
   const TeamPlan& plan_;
   SignalWatch& signals_;
   TeamDisplay& display_;
+  EmulatedLinks* const links_;  // may be null
   std::vector<std::unique_ptr<RobotProcess>> robots_;
   bool asked_to_end_ = false;
 };
@@ -174,10 +179,19 @@ std::vector<std::string> robot_command(const fs::path& binary, const TeamPlan& p
 }
 
 std::vector<RobotRun> run_team(const fs::path& binary, const TeamPlan& plan, SignalWatch& signals,
-                               TeamDisplay& display, const EmulatedLinks* links) {
+                               TeamDisplay& display, EmulatedLinks* links) {
   RunningTeam team(binary, plan, signals, display, links);
   team.wait();
   return team.results();
+}
+
+std::optional<double> recorded_s_of(const std::string& status_line) {
+  const auto unit = status_line.find(" s, ");
+  if (unit == std::string::npos) return std::nullopt;
+  const std::string number = status_line.substr(0, unit);
+  char* end = nullptr;
+  const double s = std::strtod(number.c_str(), &end);
+  return unit > 0 && end == number.c_str() + unit ? std::optional(s) : std::nullopt;
 }
 
 std::vector<RobotRun> finished_runs(const TeamPlan& plan) {

@@ -2,6 +2,7 @@
 
 #include <deque>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -40,8 +41,11 @@ struct RobotRun {
 /// process cannot be started; no process is left then.
 [[nodiscard]] std::vector<RobotRun> run_team(const std::filesystem::path& binary,
                                              const TeamPlan& plan, SignalWatch& signals,
-                                             TeamDisplay& display,
-                                             const EmulatedLinks* links = nullptr);
+                                             TeamDisplay& display, EmulatedLinks* links = nullptr);
+
+/// Time since the start of the recording in a status line of a robot [s]: the number with which the
+/// line begins ("7.4 s, 148 images"). nullopt for another line.
+[[nodiscard]] std::optional<double> recorded_s_of(const std::string& status_line);
 
 /// Ends of the robots of a run that has ended elsewhere, on other hosts or in containers, from
 /// their folders below `plan.output`; in the order of the plan. The exit code is the content of the

@@ -33,7 +33,7 @@ void check_script(const LinkScript& script) {
   require(!ranges || script.paths.size() == n, "a range needs the path of every robot");
   for (const auto& path : script.paths) {
     require(!path.empty(), "a path has no position");
-    require(std::ranges::is_sorted(path, {}, &TimedPosition::time_s), "a path goes back in time");
+    require(std::ranges::is_sorted(path, {}, &PathPoint::time_s), "a path goes back in time");
   }
   for (const LinkPartition& partition : script.partitions)
     require(partition.group_of.size() == n, "a partition needs the group of every robot");
@@ -74,13 +74,18 @@ std::array<std::uint8_t, 6> ethernet_address(std::size_t robot) {
           static_cast<std::uint8_t>(robot)};
 }
 
-LinkEmulator::LinkEmulator(LinkScript script) : script_(std::move(script)) {
+LinkEmulator::LinkEmulator(LinkScript script)
+    : script_(std::move(script)), progress_(script_.robots) {
   check_script(script_);
   for (std::size_t from = 0; from < script_.robots; ++from)
     for (std::size_t to = 0; to < script_.robots; ++to) {
       std::seed_seq seed{script_.seed, static_cast<unsigned>(from), static_cast<unsigned>(to)};
       states_.push_back({.rng = std::mt19937(seed)});
     }
+}
+
+void LinkEmulator::set_progress(std::size_t robot, double now_s, double recorded_s) {
+  progress_.at(robot) = {now_s, recorded_s};
 }
 
 void LinkEmulator::send(std::size_t from, double now_s, const EthernetFrame& frame) {
@@ -127,12 +132,14 @@ std::optional<LinkLoss> LinkEmulator::loss_of(const LinkPlan& link, std::size_t 
 }
 
 Eigen::Vector3d LinkEmulator::position(std::size_t robot, double now_s) const {
-  const std::vector<TimedPosition>& path = script_.paths[robot];
-  const auto after = std::ranges::upper_bound(path, now_s, {}, &TimedPosition::time_s);
+  const std::vector<PathPoint>& path = script_.paths[robot];
+  const Progress& progress = progress_[robot];
+  const double time_s = progress.recorded_s + script_.rate * (now_s - progress.at_s);
+  const auto after = std::ranges::upper_bound(path, time_s, {}, &PathPoint::time_s);
   if (after == path.begin()) return path.front().p_world;
   if (after == path.end()) return path.back().p_world;
-  const TimedPosition &a = *std::prev(after), &b = *after;
-  const double share = (now_s - a.time_s) / (b.time_s - a.time_s);
+  const PathPoint &a = *std::prev(after), &b = *after;
+  const double share = (time_s - a.time_s) / (b.time_s - a.time_s);
   return a.p_world + share * (b.p_world - a.p_world);
 }
 

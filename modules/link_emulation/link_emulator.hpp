@@ -45,9 +45,9 @@ struct LinkPartition {
   std::vector<std::size_t> group_of;  ///< Group of each robot.
 };
 
-/// Position of a robot in the common world frame at an instant of the run.
-struct TimedPosition {
-  double time_s = 0.0;
+/// Position of a robot in the common world frame at an instant of its recording.
+struct PathPoint {
+  double time_s = 0.0;                                ///< [s since the start of the recording]
   Eigen::Vector3d p_world = Eigen::Vector3d::Zero();  ///< [m]
 };
 
@@ -57,9 +57,10 @@ struct LinkScript {
   std::size_t robots = 0;
   std::vector<LinkPlan> links;  ///< The link from a to b is at [a * robots + b].
   std::vector<LinkPartition> partitions = {};
+  double rate = 1.0;  ///< Seconds of the recordings per second of the run.
   /// Positions of each robot with increasing times. They are interpolated linearly, and constant
   /// before the first and after the last. Required if a link has a range.
-  std::vector<std::vector<TimedPosition>> paths = {};
+  std::vector<std::vector<PathPoint>> paths = {};
 
   [[nodiscard]] LinkPlan& link(std::size_t from, std::size_t to) {
     return links[from * robots + to];
@@ -128,6 +129,10 @@ class LinkEmulator {
   /// has no group for a robot. Also throws it for a path that is empty or goes back in time.
   explicit LinkEmulator(LinkScript script);
 
+  /// The recording of `robot` is at `recorded_s` [s since its start] and goes on at the rate of the
+  /// script. Without this call it starts with the run and never waits.
+  void set_progress(std::size_t robot, double now_s, double recorded_s);
+
   /// Sends a frame of robot `from` to the robot whose ethernet_address() it bears, or, by broadcast
   /// and multicast, to all others. Frames to other addresses are dropped and not counted. Times
   /// must not decrease.
@@ -144,6 +149,10 @@ class LinkEmulator {
   [[nodiscard]] const LinkCounts& counts(std::size_t from, std::size_t to) const;
 
  private:
+  struct Progress {
+    double at_s = 0.0;
+    double recorded_s = 0.0;
+  };
   struct State {
     std::mt19937 rng;
     /// capacity_until() of the link at the time when the last queued frame has been sent [bytes].
@@ -156,6 +165,7 @@ class LinkEmulator {
   [[nodiscard]] Eigen::Vector3d position(std::size_t robot, double now_s) const;
 
   LinkScript script_;
+  std::vector<Progress> progress_;              // last known progress of each robot
   std::vector<State> states_;                   // states in the order of the script's links
   std::multimap<double, SentFrame> in_flight_;  // deliveries by time; those of equal time in
                                                 // the order of insertion

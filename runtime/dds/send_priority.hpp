@@ -36,4 +36,24 @@ inline constexpr std::size_t kSendPriorities = 7;
   return SendPriority::kMesh;
 }
 
+/// Messages of this priority are sent while all sent bytes are below this share of
+/// budget.bytes_per_run.
+[[nodiscard]] constexpr double share_of_run(SendPriority priority) {
+  switch (priority) {
+    case SendPriority::kPresence:
+    case SendPriority::kClosures:
+      return 1.0;
+    case SendPriority::kPoses:
+      return 0.95;
+    case SendPriority::kVerification:
+      return 0.9;
+    case SendPriority::kWords:
+    case SendPriority::kBacklog:
+      return 0.8;
+    case SendPriority::kMesh:
+      break;
+  }
+  return 0.6;
+}
+
 }  // namespace km

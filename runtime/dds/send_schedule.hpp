@@ -14,15 +14,19 @@
 #include <vector>
 
 #include "modules/core/ids.hpp"
-#include "runtime/dds/send_budget.hpp"
+#include "runtime/dds/budget_config.hpp"
 #include "runtime/dds/send_priority.hpp"
 #include "runtime/dds/traffic.hpp"
+#include "runtime/token_bucket.hpp"
 
 namespace km {
 
 /// Messages to be sent, the most important first, each as soon as the budget permits it. Messages
 /// of one priority keep their order, except for bags of words: those that have waited for kNew_s
 /// follow newer ones.
+///
+/// A message is sent if there is no debt, however large it is: the next ones wait until the debt is
+/// paid. So in any time of t seconds at most bytes_per_s * (t + kBurst_s) and one message are sent.
 ///
 /// With a budget no sender waits for room: each priority has a bound, beyond which the oldest
 /// messages are dropped. Requests that are too old to be answered are dropped, too. For a state,
@@ -38,6 +42,9 @@ class SendSchedule {
   static constexpr double kNew_s = 5.0;                   ///< Age up to which a bag of words is
                                                           ///< new.
 
+  /// Amount that may be sent at once after a silence, in seconds of the limit.
+  static constexpr double kBurst_s = 0.2;
+
   struct Entry {
     TopicId topic = {};
     SendPriority priority = SendPriority::kMesh;
@@ -49,8 +56,13 @@ class SendSchedule {
     Message message = {};
   };
 
+  /// Throws ConfigError if `config` is out of bounds.
   explicit SendSchedule(const BudgetConfig& config)
-      : limited_(config.is_limited()), budget_(config) {}
+      : budget_(checked(config)), limited_(config.is_limited()) {
+    // The bucket begins empty, so that the limit also holds in the first second of a run.
+    if (config.bytes_per_s > 0.0)
+      bucket_.emplace(config.bytes_per_s, kBurst_s * config.bytes_per_s, 0.0);
+  }
 
   void push(Entry entry, double now_s) {
     Lane& lane = lane_of(entry.priority);
@@ -80,8 +92,11 @@ class SendSchedule {
   /// waits for the budget.
   [[nodiscard]] std::optional<double> wait_s() const { return wait_s_; }
 
-  /// See SendBudget.
-  void settle(std::uint64_t sent_bytes, double now_s) { budget_.settle(sent_bytes, now_s); }
+  /// Updates the sum of all sent bytes, which is counted elsewhere: bytes that DDS has sent by
+  /// itself, or again, are charged now.
+  void settle(std::uint64_t sent_bytes, double now_s) {
+    if (sent_bytes > spent_bytes_) charge(sent_bytes - spent_bytes_, now_s);
+  }
 
   /// Drops all waiting messages at the end.
   void drop_all() {
@@ -160,10 +175,11 @@ class SendSchedule {
       const Waiting& first = lane.messages.front();
       const std::optional<std::vector<RobotId>> readers = readers_of(first.entry);
       if (!readers) return false;
-      const auto wait = budget_.wait_s(lane.priority, first.entry.bytes, *readers, now_s);
+      const std::uint64_t bytes = first.entry.bytes * readers->size();
+      const auto wait = wait_s(lane.priority, bytes, now_s);
       if (wait && now_s - first.since_s <= first.entry.useful_s) {
         if (*wait <= 0.0) {
-          budget_.charge(lane.priority, first.entry.bytes, *readers, now_s);
+          charge(bytes, now_s);
           return true;
         }
         ++lane.stops;
@@ -173,6 +189,23 @@ class SendSchedule {
       drop_front(lane);
     }
     return false;
+  }
+
+  // Time until a message may be sent. nullopt: never, because its priority has used up its share of
+  // the run's total.
+  std::optional<double> wait_s(SendPriority priority, std::uint64_t bytes, double now_s) {
+    // A slightly negative balance counts as no debt, because sums of doubles do not reach zero.
+    constexpr double kNoDebt_bytes = -1e-3;
+    if (priority == SendPriority::kPresence) return 0.0;
+    const auto total = static_cast<double>(spent_bytes_ + bytes);
+    if (budget_.bytes_per_run > 0.0 && total > share_of_run(priority) * budget_.bytes_per_run)
+      return std::nullopt;
+    return bucket_ ? bucket_->wait_s(kNoDebt_bytes, now_s) : 0.0;
+  }
+
+  void charge(std::uint64_t bytes, double now_s) {
+    spent_bytes_ += bytes;
+    if (bucket_) bucket_->spend(static_cast<double>(bytes), now_s);
   }
 
   void drop_surplus(Lane& lane) {
@@ -208,8 +241,10 @@ class SendSchedule {
 
   static constexpr std::uint64_t kHeld = std::numeric_limits<std::uint64_t>::max();
 
-  bool limited_;
-  SendBudget budget_;
+  const BudgetConfig budget_;
+  const bool limited_;
+  std::optional<TokenBucket> bucket_;
+  std::uint64_t spent_bytes_ = 0;
   std::array<Lane, kSendPriorities> lanes_ = make_lanes();
   std::map<Name, Place> newest_;
   std::map<TopicId, HeldBack> held_;

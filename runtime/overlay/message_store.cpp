@@ -14,15 +14,33 @@ constexpr std::size_t kMaxUnmet = 10'000;
 }  // namespace
 
 bool MessageStore::Numbered::put(OverlayMessage message, std::size_t max_bytes) {
-  const std::size_t bytes = stored_bytes(message);
-  const auto known = messages_.find(message.number);
-  const std::size_t freed = known == messages_.end() ? 0 : stored_bytes(known->second);
-  if (bytes_ - freed + bytes > max_bytes) return false;
-  bytes_ += bytes - freed;
   const std::uint32_t number = message.number;
+  const std::size_t bytes = stored_bytes(message);
+  const auto known = messages_.find(number);
+  const std::size_t freed = known == messages_.end() ? 0 : stored_bytes(known->second);
+  if (number < first_ || bytes > max_bytes) return false;
+  for (auto oldest = messages_.begin(); bytes_ - freed + bytes > max_bytes;) {
+    if (oldest->first >= number) return false;
+    bytes_ -= stored_bytes(oldest->second);
+    first_ = oldest->first + 1;
+    oldest = messages_.erase(oldest);
+  }
+  bytes_ += bytes - freed;
   messages_.insert_or_assign(number, std::move(message));
-  while (messages_.contains(whole_)) ++whole_;
+  extend_whole(first_);
   return true;
+}
+
+void MessageStore::Numbered::extend_whole(std::uint32_t least) {
+  whole_ = std::max(whole_, least);
+  while (messages_.contains(whole_)) ++whole_;
+}
+
+void MessageStore::Numbered::skip_gap(double now_s) {
+  const auto next = messages_.lower_bound(whole_);
+  if (next == messages_.end()) return gap_.reset();
+  if (std::exchange(gap_, whole_) != whole_) gap_since_s_ = now_s;
+  if (now_s - gap_since_s_ >= kGapPatience_s) extend_whole(next->first);
 }
 
 const OverlayMessage* MessageStore::Numbered::find(std::uint32_t number) const {
@@ -57,6 +75,8 @@ void MessageStore::step(double now_s) {
   for (const Recent& unmet : unmet_)
     if (is_met(unmet.message.to, now_s)) met.insert(unmet.message.to);
   for (const RobotId robot : met) settle_unmet(robot, false);
+  for (auto& [robot, held] : held_)
+    for (Numbered* messages : {&held.bags, &held.reliable}) messages->skip_gap(now_s);
 }
 
 void MessageStore::disconnected(RobotId robot, double now_s) {
@@ -73,6 +93,7 @@ void MessageStore::disconnected(RobotId robot, double now_s) {
 
 void MessageStore::forget_content(const TeamPeer& peer) {
   held_.erase(peer.robot);
+  drop_carried(peer.robot);
   drop_messages_to_former_incarnations(peer);
 }
 
@@ -91,40 +112,38 @@ void MessageStore::drop_messages_to_former_incarnations(const TeamPeer& peer) {
 
 OverlayArrival MessageStore::arrive(const OverlayMessage& message, bool is_direct) {
   const RobotId robot = message.origin.robot;
-  if (!is_direct && !has_room_for(message)) {
-    ++given_up_;
-    return OverlayArrival::kNoRoom;
-  }
+  const std::size_t room = is_direct ? kMaxFarBytes : room_for(robot);
   Held& held = held_[robot];
-  if (!is_reliable(message.stream)) return keep(held.bags, kMaxBagBytes, message);
+  const bool is_bag = !is_reliable(message.stream);
+  Numbered& stored = is_bag ? held.bags : held.reliable;
+  if (stored.has(message.number)) return OverlayArrival::kRepeated;
   OverlayMessage kept = message;
   // Only the addressee needs the content. With keys it is kept, because the signature covers it.
-  if (message.to == robots_.self().robot && !robots_.has_keys()) kept.content = {};
-  return keep(held.reliable, kMaxReliableBytes, std::move(kept));
-}
-
-OverlayArrival MessageStore::keep(Numbered& kept, std::size_t max_bytes, OverlayMessage message) {
-  if (kept.has(message.number)) return OverlayArrival::kRepeated;
-  if (kept.put(std::move(message), max_bytes)) return OverlayArrival::kNew;
+  if (!is_bag && message.to == robots_.self().robot && !robots_.has_keys()) kept.content = {};
+  const std::size_t limit = is_bag ? kMaxBagBytes : kMaxReliableBytes;
+  if (stored.put(std::move(kept), std::min(limit, stored.bytes() + room)))
+    return OverlayArrival::kNew;
   ++given_up_;
   return OverlayArrival::kNoRoom;
 }
 
-bool MessageStore::has_room_for(const OverlayMessage& message) const {
-  if (receives(message.origin.robot)) return true;
-  std::size_t bytes = stored_bytes(message);
+// Bytes that further messages of a robot may take.
+std::size_t MessageStore::room_for(RobotId origin) const {
+  if (receives(origin)) return kMaxFarBytes;
+  std::size_t bytes = 0;
   for (const auto& [robot, held] : held_)
-    if (!receives(robot)) bytes += held.bags.bytes() + held.reliable.bytes() + held.replies.bytes();
-  return bytes <= kMaxFarBytes;
+    if (!receives(robot)) bytes += held.bytes();
+  return kMaxFarBytes - std::min(bytes, kMaxFarBytes);
 }
 
 void MessageStore::hold_reply(OverlayMessage reply) {
+  const std::size_t room = room_for(reply.origin.robot);
   Numbered& replies = held_[reply.origin.robot].replies;
   // A reply contains only keypoints chosen for its requester, so the largest reply serves other
   // requesters best.
   const OverlayMessage* before = replies.find(reply.number);
   if (before != nullptr && before->content.size() >= reply.content.size()) return;
-  if (!has_room_for(reply) || !replies.put(std::move(reply), kMaxReplyBytes)) ++given_up_;
+  if (!replies.put(std::move(reply), std::min(kMaxReplyBytes, replies.bytes() + room))) ++given_up_;
 }
 
 void MessageStore::write(OverlayStream stream, const TeamPeer& to, std::uint64_t slot,
@@ -139,7 +158,7 @@ void MessageStore::write(OverlayStream stream, const TeamPeer& to, std::uint64_t
   if (is_met(to.robot, now_s)) return add_reliable(slot, std::move(message));
   unmet_.push_back({now_s, slot, std::move(message)});
   if (unmet_.size() <= kMaxUnmet) return;
-  unmet_.pop_back();
+  unmet_.pop_front();
   ++given_up_;
 }
 
@@ -155,14 +174,19 @@ void MessageStore::settle_unmet(RobotId robot, bool direct) {
 }
 
 void MessageStore::add_reliable(std::uint64_t slot, OverlayMessage message) {
-  message.number = own_reliable_.whole();
-  const auto [last, first] =
-      own_slots_.try_emplace({message.stream, message.to, slot}, message.number);
-  if (!first) empty_reliable(std::exchange(last->second, message.number));
+  const std::tuple key(message.stream, message.to, slot);
+  const std::uint32_t number = message.number = own_reliable_.whole();
+  const std::uint32_t oldest = own_reliable_.first();
   robots_.sign(message);
-  if (own_reliable_.put(std::move(message), kMaxReliableBytes)) return;
-  ++given_up_;
-  own_slots_.erase(last);
+  if (!own_reliable_.put(std::move(message), kMaxReliableBytes)) {
+    ++given_up_;
+    return;
+  }
+  if (own_reliable_.first() != oldest)
+    std::erase_if(own_slots_,
+                  [&](const auto& entry) { return entry.second < own_reliable_.first(); });
+  const auto [former, is_first] = own_slots_.try_emplace(key, number);
+  if (!is_first) empty_reliable(std::exchange(former->second, number));
 }
 
 // The number of the message stays in use, because messages are sent in the order of their numbers.
@@ -225,10 +249,14 @@ void MessageStore::forward(RobotId to, const TeamPeer& origin, bool reliable,
   if (overdue) progress.since_s = now_s;
 
   std::size_t under_way = 0;
-  for (std::uint32_t number = reported; number < progress.sent; ++number)
+  const std::uint32_t first = std::max(reported, messages.first());
+  for (std::uint32_t number = first; number < progress.sent; ++number)
     if (const OverlayMessage* sent = messages.find(number)) under_way += stored_bytes(*sent);
+  progress.sent = std::max(progress.sent, first);
   for (; progress.sent < messages.whole() && under_way < kWindowBytes; ++progress.sent) {
-    OverlayMessage message = *messages.find(progress.sent);
+    const OverlayMessage* stored = messages.find(progress.sent);
+    if (stored == nullptr) continue;
+    OverlayMessage message = *stored;
     message.origin = origin;  // Current boot id of the origin.
     under_way += stored_bytes(message);
     send(to, std::move(message));
@@ -286,17 +314,31 @@ OverlayArrival MessageStore::route(OverlayMessage message, std::optional<RobotId
 }
 
 OverlayArrival MessageStore::carry(OverlayMessage message) {
-  auto& waiting = carried_[message.to];
-  const auto key = std::tuple(message.stream, message.origin.robot, message.number);
-  const auto before = waiting.find(key);
-  const std::size_t freed = before == waiting.end() ? 0 : stored_bytes(before->second);
-  if (carried_bytes_ - freed + stored_bytes(message) > kMaxCarriedBytes) {
+  const std::size_t bytes = stored_bytes(message);
+  if (bytes > kMaxCarriedBytes) {
     ++given_up_;
     return OverlayArrival::kNoRoom;
   }
-  carried_bytes_ += stored_bytes(message) - freed;
-  waiting.insert_or_assign(key, std::move(message));
+  const std::tuple key(message.to, message.stream, message.origin.robot, message.number);
+  const auto [entry, is_new] = carried_.try_emplace(key);
+  if (!is_new) carried_bytes_ -= stored_bytes(entry->second.message);
+  carried_bytes_ += bytes;
+  entry->second = {++carried_count_, std::move(message)};
+  for (; carried_bytes_ > kMaxCarriedBytes; ++given_up_) {
+    const auto oldest = std::ranges::min_element(
+        carried_, {}, [](const auto& carried) { return carried.second.count; });
+    carried_bytes_ -= stored_bytes(oldest->second.message);
+    carried_.erase(oldest);
+  }
   return OverlayArrival::kNew;
+}
+
+void MessageStore::drop_carried(RobotId to) {
+  std::erase_if(carried_, [&](const auto& entry) {
+    const OverlayMessage& message = entry.second.message;
+    if (message.to == to) carried_bytes_ -= stored_bytes(message);
+    return message.to == to;
+  });
 }
 
 bool MessageStore::answer(const OverlayMessage& request) {
@@ -314,18 +356,16 @@ bool MessageStore::answer(const OverlayMessage& request) {
 }
 
 void MessageStore::renew_routes() {
-  for (auto entry = carried_.begin(); entry != carried_.end();) {
-    const auto next = robots_.next_hop(entry->first);
-    if (!next) {
-      ++entry;
-      continue;
-    }
-    for (auto& [key, message] : entry->second) {
-      carried_bytes_ -= stored_bytes(message);
-      send(*next, std::move(message));
-    }
-    entry = carried_.erase(entry);
-  }
+  std::map<RobotId, std::optional<RobotId>> next_to;
+  std::erase_if(carried_, [&](const auto& entry) {
+    const OverlayMessage& message = entry.second.message;
+    const auto [next, is_new] = next_to.try_emplace(message.to);
+    if (is_new) next->second = robots_.next_hop(message.to);
+    if (!next->second) return false;
+    carried_bytes_ -= stored_bytes(message);
+    send(*next->second, message);
+    return true;
+  });
 }
 
 std::vector<OverlayHeld> MessageStore::holds() const {
@@ -337,6 +377,12 @@ std::vector<OverlayHeld> MessageStore::holds() const {
       holds.push_back({{robot, known.identity.boot}, bags, reliable});
   }
   return holds;
+}
+
+std::size_t MessageStore::memory_bytes() const {
+  std::size_t bytes = own_reliable_.bytes() + carried_bytes_;
+  for (const auto& [robot, held] : held_) bytes += held.bytes();
+  return bytes;
 }
 
 void MessageStore::send(RobotId neighbour, OverlayMessage message) {

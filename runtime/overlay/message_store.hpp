@@ -29,12 +29,13 @@ namespace km {
 /// If all robots receive each other directly all the time, it sends nothing.
 ///
 /// Memory is bounded for each origin and stream, and for all robots out of range together. When it
-/// is full, new messages are refused and counted as given up. Deterministic; time comes in [s],
-/// with any origin, and does not decrease. Not thread-safe.
+/// is full, the oldest messages of the same origin and stream are discarded, because they have most
+/// likely arrived. A robot that has missed them gets the later messages. Deterministic; time comes
+/// in [s], with any origin, and does not decrease. Not thread-safe.
 class MessageStore {
  public:
-  /// Storage for one origin [bytes]: an hour of bags at 4 Hz; thousands of closures; hundreds of
-  /// keyframes.
+  /// Storage for the newest messages of one origin [bytes]: an hour of bags at 4 Hz; thousands of
+  /// closures; hundreds of keyframes.
   static constexpr std::size_t kMaxBagBytes = 8U << 20U;
   static constexpr std::size_t kMaxReliableBytes = 4U << 20U;
   static constexpr std::size_t kMaxReplyBytes = 8U << 20U;
@@ -52,6 +53,9 @@ class MessageStore {
   static constexpr double kPatience_s = 3.0;
   /// A message sent to a robot within this time before its link failed may not have arrived.
   static constexpr double kDoubt_s = 30.0;
+  /// Time after which missing messages are skipped if later ones of their origin have arrived: the
+  /// neighbours have discarded them.
+  static constexpr double kGapPatience_s = 60.0;
 
   /// Both outlive this object; the packets to send are appended to `packets`.
   MessageStore(KnownRobots& robots, std::vector<OverlayPacket>& packets)
@@ -70,6 +74,7 @@ class MessageStore {
   void forget_content(const TeamPeer& peer);
   void forget(RobotId robot) {
     held_.erase(robot);
+    drop_carried(robot);
     introduced_s_.erase(robot);
   }
 
@@ -91,29 +96,48 @@ class MessageStore {
   void forward(RobotId to, double now_s);
 
   [[nodiscard]] std::vector<OverlayHeld> holds() const;
-  /// Number of messages refused because the storage was full.
+  /// Number of messages refused, or discarded although they were not sent, because the storage was
+  /// full.
   [[nodiscard]] std::uint64_t given_up() const { return given_up_; }
+  /// Memory of all stored messages [bytes].
+  [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
-  // Messages of one stream and one origin by number, with the length of the first run without a
-  // gap.
+  // The newest messages of one stream and one origin, by number.
   class Numbered {
    public:
-    [[nodiscard]] bool has(std::uint32_t number) const { return messages_.contains(number); }
+    // True if the message is stored, or may have been and was discarded.
+    [[nodiscard]] bool has(std::uint32_t number) const {
+      return number < first_ || messages_.contains(number);
+    }
+    // Least number of a message that has not been discarded.
+    [[nodiscard]] std::uint32_t first() const { return first_; }
+    // Number of messages up to the first gap, with the discarded ones.
     [[nodiscard]] std::uint32_t whole() const { return whole_; }
     [[nodiscard]] std::size_t bytes() const { return bytes_; }
-    /// False if the messages would exceed `max_bytes`.
+    // Discards older messages if there are more than `max_bytes`. False if the message is too large
+    // or older than these.
     [[nodiscard]] bool put(OverlayMessage message, std::size_t max_bytes);
-    /// Null if the message is missing.
+    // Null if the message is missing.
     [[nodiscard]] const OverlayMessage* find(std::uint32_t number) const;
+    // Extends whole() over a gap that has existed for kGapPatience_s.
+    void skip_gap(double now_s);
 
    private:
+    void extend_whole(std::uint32_t least);
+
     std::map<std::uint32_t, OverlayMessage> messages_;
+    std::uint32_t first_ = 0;
     std::uint32_t whole_ = 0;
     std::size_t bytes_ = 0;
+    std::optional<std::uint32_t> gap_;  // whole() at the present gap
+    double gap_since_s_ = 0.0;
   };
   struct Held {
     Numbered bags = {}, reliable = {}, replies = {};
+    [[nodiscard]] std::size_t bytes() const {
+      return bags.bytes() + reliable.bytes() + replies.bytes();
+    }
   };
   struct Progress {
     std::uint32_t reported = 0;  // Number of messages that the neighbour reports.
@@ -131,11 +155,16 @@ class MessageStore {
     OverlayMessage message;
   };
 
+  struct Carried {
+    std::uint64_t count = 0;  // ascends with each call that is kept
+    OverlayMessage message;
+  };
+
   [[nodiscard]] bool receives(RobotId robot) const { return robots_.receives(robot); }
   [[nodiscard]] bool is_met(RobotId robot, double now_s) const;
   [[nodiscard]] const Numbered& messages_of(RobotId robot, bool reliable) const;
-  OverlayArrival keep(Numbered& kept, std::size_t max_bytes, OverlayMessage message);
   OverlayArrival carry(OverlayMessage message);
+  void drop_carried(RobotId to);
   void settle_unmet(RobotId robot, bool direct);
   void add_reliable(std::uint64_t slot, OverlayMessage message);
   void empty_reliable(std::uint32_t number);
@@ -143,7 +172,7 @@ class MessageStore {
   void forward(RobotId to, const TeamPeer& origin, double now_s);
   void forward(RobotId to, const TeamPeer& origin, bool reliable, std::uint32_t reported,
                double now_s);
-  [[nodiscard]] bool has_room_for(const OverlayMessage& message) const;
+  [[nodiscard]] std::size_t room_for(RobotId origin) const;
   [[nodiscard]] bool another_should(RobotId to, const OverlayHeld& held) const;
   [[nodiscard]] bool answer(const OverlayMessage& request);
   void send(RobotId neighbour, OverlayMessage message);
@@ -158,10 +187,10 @@ class MessageStore {
   // Messages to robots that are unknown or were introduced less than kGrace_s ago, oldest first.
   std::deque<Recent> unmet_;
   std::map<RobotId, double> introduced_s_;  // Robots that were never received directly.
-  // Messages kept for other robots, by addressee, then by stream, origin and number.
-  std::map<RobotId, std::map<std::tuple<OverlayStream, RobotId, std::uint32_t>, OverlayMessage>>
-      carried_;
+  // Calls kept for other robots, by addressee, stream, origin and number.
+  std::map<std::tuple<RobotId, OverlayStream, RobotId, std::uint32_t>, Carried> carried_;
   std::size_t carried_bytes_ = 0;
+  std::uint64_t carried_count_ = 0;
   std::uint64_t given_up_ = 0;
 };
 

@@ -129,6 +129,8 @@ class Overlay {
   }
   /// Number of messages refused because the storage was full.
   [[nodiscard]] std::uint64_t given_up() const { return store_.given_up(); }
+  /// Memory of the stored events and calls [bytes].
+  [[nodiscard]] std::size_t memory_bytes() const { return store_.memory_bytes(); }
 
  private:
   bool meet(const RobotIdentity& peer);

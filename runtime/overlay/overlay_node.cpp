@@ -173,7 +173,7 @@ void OverlayNode::carry_out(const OverlayOutput& output, std::uint64_t given_up)
         PeerEvent{PeerEventKind::kReturned, {.robot = robot, .name = {}}, {}, false});
   if (given_up > 0)
     log::limited(log::Level::kWarn, kTag, "given up")
-        << given_up << " messages for others are not kept, for want of room";
+        << "the storage for other robots is full: " << given_up << " messages are lost";
 }
 
 void OverlayNode::send(const OverlayPacket& packet) {

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "runtime/log.hpp"
-#include "runtime/log_listener.hpp"
 #include "test/support/captured_log.hpp"
 
 namespace km {

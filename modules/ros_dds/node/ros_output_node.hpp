@@ -24,7 +24,7 @@
 #include "modules/ros_dds/live_frames.hpp"
 #include "modules/ros_dds/ros_sink.hpp"
 #include "modules/ros_dds/surface_pieces.hpp"
-#include "runtime/log_listener.hpp"
+#include "runtime/log.hpp"
 #include "runtime/node.hpp"
 #include "runtime/periodic.hpp"
 #include "runtime/token_bucket.hpp"

@@ -62,6 +62,12 @@ struct ScriptedTeam {
 
 }  // namespace
 
+TEST_CASE("The time of the recording is read from the status line of a robot", "[team]") {
+  CHECK(recorded_s_of("7.4 s, 148 images, 21 keyframes | peers: none yet") == 7.4);
+  for (const char* other : {"", "started", "pause of 7.4 s, done", " s, 3", "7.4 m, 2 s, 3"})
+    CHECK_FALSE(recorded_s_of(other));
+}
+
 TEST_CASE("A team runs its robots, shows their lines and prints the table", "[team]") {
   const ScriptedTeam team("exit 0");
   const std::string json = (team.folder.path() / "out/team.json").string();

@@ -279,6 +279,20 @@ TEST_CASE("Robots receive each other within range", "[link_emulation]") {
   CHECK(lost(emulator, LinkLoss::kRange) == 2);
 }
 
+TEST_CASE("A recording that waits moves its robot later", "[link_emulation]") {
+  LinkPlan link;
+  link.range_m = 5.0;
+  LinkScript script = script_of(2, link);
+  script.rate = 2.0;
+  script.paths = {{{0.0, {0.0, 0.0, 0.0}}}, {{0.0, {0.0, 0.0, 0.0}}, {10.0, {10.0, 0.0, 0.0}}}};
+  LinkEmulator emulator(script);
+  CHECK(passes(emulator, 2.4));
+  CHECK_FALSE(passes(emulator, 2.6));
+  emulator.set_progress(1, 3.0, 4.0);  // it has waited for 1 s
+  CHECK(passes(emulator, 3.4));
+  CHECK_FALSE(passes(emulator, 3.6));
+}
+
 TEST_CASE("Equal seeds and frames give equal runs", "[link_emulation]") {
   LinkPlan link = limited(50e3, 0.02);
   link.jitter_s = 0.05;

@@ -71,7 +71,7 @@ TEST_CASE("After a silence little more than the budget is sent at once", "[budge
   for (int k = 0; k < 1000; ++k) schedule.push(entry(kWords, k), 60.0);
   CHECK(sent(schedule, 60.0).size() == 1);  // a debt from the start
   CHECK(sent(schedule, 120.0).size() ==
-        static_cast<std::size_t>(1e4 * SendBudget::kBurst_s / 100 + 1));
+        static_cast<std::size_t>(1e4 * Schedule::kBurst_s / 100 + 1));
   REQUIRE(schedule.wait_s());
   CHECK(*schedule.wait_s() == Approx(0.01).margin(1e-6));
 }
@@ -181,32 +181,6 @@ TEST_CASE("A run's total is kept, and the most important has some of it left", "
   CHECK(offer(kPresence) == 300);
 }
 
-TEST_CASE("Each kind and each peer has a limit of its own", "[budget]") {
-  Schedule schedule({.words_bytes_per_s = 1000.0, .peer_bytes_per_s = 2000.0});
-  for (int k = 0; k < 3; ++k) schedule.push(entry(kWords, k), 0.0);
-  for (int k = 10; k < 13; ++k) schedule.push(entry(kMesh, k), 0.0);
-  const auto to_all = [](const Entry&) { return std::optional(std::vector<RobotId>{7, 8}); };
-  const auto next = [&](double now_s) {
-    const auto message = schedule.pop(now_s, to_all);
-    return message ? message->message : -1;
-  };
-  CHECK(next(0.0) == 0);
-  CHECK(next(0.0) == -1);    // both peers are in debt
-  CHECK(next(0.051) == 10);  // words for 0.2 s, as two robots get them
-  CHECK(next(0.051) == -1);
-  CHECK(next(0.102) == 11);
-  CHECK(next(0.201) == 1);
-  Schedule one({.peer_bytes_per_s = 1000.0});
-  one.push(entry(kPoses, 1), 0.0);
-  one.push(entry(kMesh, 2), 0.0);
-  const auto pop_for = [&](std::vector<RobotId> readers) {
-    return one.pop(0.0, [&](const Entry&) { return std::optional(readers); }).has_value();
-  };
-  CHECK(pop_for({7}));
-  CHECK_FALSE(pop_for({7}));
-  CHECK(pop_for({8}));
-}
-
 TEST_CASE("Messages without room and messages left at the end are dropped and counted",
           "[budget]") {
   Schedule schedule({.bytes_per_s = 1.0});
@@ -264,7 +238,7 @@ TEST_CASE("Without a budget nothing is dropped, replaced or counted", "[budget]"
 }
 
 TEST_CASE("A budget out of bounds is refused", "[budget]") {
-  CHECK_THROWS_AS(SendBudget({.bytes_per_s = -1.0}), ConfigError);
+  CHECK_THROWS_AS(Schedule({.bytes_per_s = -1.0}), ConfigError);
 }
 
 }  // namespace

@@ -88,11 +88,11 @@ class Network {
     settle();
   }
   // Publishes a bag to the robots that receive this one directly, as DDS does.
-  void send_bag(RobotId robot, std::uint32_t index) {
+  void send_bag(RobotId robot, std::uint32_t index, std::size_t size = 600) {
     const auto content = signed_content({.stream = OverlayStream::kBag,
                                          .origin = {robot, boots_.at(robot)},
                                          .number = index,
-                                         .content = octets(600)});
+                                         .content = octets(size)});
     for (auto& [other, overlay] : overlays_)
       if (linked(robot, other)) (void)overlay.keep_bag(identity(robot), index, content);
   }
