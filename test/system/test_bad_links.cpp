@@ -1,19 +1,13 @@
 #include <catch2/catch.hpp>
 
-#include <csignal>
-#include <fstream>
 #include <iostream>
 #include <map>
-#include <sstream>
 #include <string>
-#include <thread>
 #include <utility>
 #include <vector>
 
-#include "modules/core/config.hpp"
 #include "modules/core/text_rows.hpp"
 #include "test/support/own_networks.hpp"
-#include "test/support/process.hpp"
 #include "test/support/random_team.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/system/team_run.hpp"
@@ -66,38 +60,7 @@ SplitGraph pair_of_robots() {
   return random_team(22, {0, 1}, 40, {{0, 1}});
 }
 
-// True if a process runs with `text` on its command line.
-bool is_running(const std::string& text) {
-  for (const auto& process : fs::directory_iterator("/proc")) {
-    std::ostringstream command;
-    command << std::ifstream(process.path() / "cmdline").rdbuf();  // empty if the process has ended
-    if (command.str().find(text) != std::string::npos) return true;
-  }
-  return false;
-}
-
 }  // namespace
-
-TEST_CASE("Robots in networks of their own end when their team is killed", "[system][namespaces]") {
-  const TemporaryFolder folder;
-  const std::string team = write_team(pair_of_robots(), folder, kSettings).string();
-  const std::string output = (folder.path() / "out").string();
-  Process program({"sh", "-c",
-                   "exec " KM_BIN_DIR "/kimera_multi_team --config " + team + " --links " +
-                       folder.write("links.yaml", "").string() + " --rate max --output " + output +
-                       " 2>&1"});
-  const auto is_status = [](const std::string& line) {
-    return line.find("peers: robot1 alive") != line.npos || !had_own_networks(line);
-  };
-  const auto line = program.wait_until(is_status);
-  REQUIRE(line.has_value());
-  if (line->text.find("alive") == line->text.npos) return;
-  program.kill(SIGKILL);
-  program.wait();
-  while (is_running(output)) std::this_thread::yield();  // fails by the time limit of the test
-  for (const int robot : {0, 1})
-    CHECK(fs::exists(fs::path(output) / robot_name(robot) / "summary.json"));
-}
 
 TEST_CASE("A team that loses a fifth of all frames loses nothing else", "[system][namespaces]") {
   const SplitGraph graph = pair_of_robots();
