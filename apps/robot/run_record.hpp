@@ -14,6 +14,7 @@
 
 #include "apps/robot/run_findings.hpp"
 #include "modules/core/closure_verdicts.hpp"
+#include "modules/core/live_frames.hpp"
 #include "modules/core/odometry.hpp"
 #include "modules/core/pose_changes.hpp"
 #include "modules/core/pose_graph.hpp"
@@ -25,7 +26,6 @@
 #include "modules/mesh/map_mesh.hpp"
 #include "modules/mesh_deformation/mesh_corrector.hpp"
 #include "modules/place_recognition/place_database.hpp"
-#include "modules/ros_dds/live_frames.hpp"
 #include "modules/semantic_mapping/semantic_mapper.hpp"
 #include "modules/vio/vio_statistics.hpp"
 #include "runtime/dds/peer_table.hpp"
