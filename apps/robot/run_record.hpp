@@ -217,9 +217,11 @@ class RecorderNode final : public Node {
   }
   template <typename T>
   void record(In<T> topic) {
-    topic.subscribe([this](const std::shared_ptr<const T>& message) {
-      if (!frozen_) worker_.post([this, message] { record_.add(*message); });
-    });
+    topic.subscribe([this](const std::shared_ptr<const T>& message) { add(message); });
+  }
+  template <typename T>
+  void add(std::shared_ptr<const T> message) {
+    if (!frozen_) worker_.post([this, message] { record_.add(*message); });
   }
 
   /// Later messages are not recorded: the results stay as they are when the robot leaves.

@@ -64,9 +64,6 @@ ViewNode::ViewNode(const ViewConfig& config, const DdsParticipant& participant,
   topics.outcomes.subscribe(post);
   topics.restored_outcomes.subscribe(post);
   topics.closures.subscribe(post);
-  topics.judgements.subscribe(post);
-  topics.pose_changes.subscribe(post);
-  topics.samples.subscribe(post);
   topics.restarts.subscribe(post);
   topics.objects.subscribe(post);
   topics.maps_2d.subscribe(post);

@@ -34,9 +34,6 @@ struct ViewTopics {
   In<KeyframeOdometry> keyframes;
   In<ClosureOutcome> outcomes, restored_outcomes;
   In<Closure> closures;  ///< Closures of both ends.
-  In<ClosureJudgements> judgements;
-  In<PoseChanges> pose_changes;
-  In<RobotSample> samples;
   In<PeerEvent> restarts;
   In<ObjectList> objects;
   In<OccupancyGrid> maps_2d;
@@ -67,6 +64,13 @@ class ViewNode final : public Node {
 
   /// Replaces the points of the slice (see DistanceSlice). Thread-safe; does not wait.
   void offer_slice(std::shared_ptr<const LabelledMesh> points) { worker_.post(std::move(points)); }
+
+  /// Sends an event of the recorder: ClosureJudgements, PoseChanges or RobotSample. Thread-safe;
+  /// does not wait.
+  template <typename Event>
+  void offer(const Event& event) {
+    worker_.post(std::make_shared<const Event>(event));
+  }
 
   std::string_view name() const override { return ViewConfig::kSection; }
   void start() override;

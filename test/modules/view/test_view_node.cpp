@@ -28,9 +28,6 @@ struct Watched {
               .outcomes = outcomes,
               .restored_outcomes = restored_outcomes,
               .closures = closures,
-              .judgements = judgements,
-              .pose_changes = pose_changes,
-              .samples = samples,
               .restarts = restarts,
               .objects = objects,
               .maps_2d = maps_2d,
@@ -86,9 +83,6 @@ struct Watched {
   Topic<KeyframeOdometry> keyframes;
   Topic<ClosureOutcome> outcomes, restored_outcomes;
   Topic<Closure> closures;
-  Topic<ClosureJudgements> judgements;
-  Topic<PoseChanges> pose_changes;
-  Topic<RobotSample> samples;
   Topic<PeerEvent> restarts;
   Topic<ObjectList> objects;
   Topic<OccupancyGrid> maps_2d;
