@@ -2,7 +2,9 @@
 
 #include <iostream>
 #include <map>
+#include <optional>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -64,6 +66,8 @@ SplitGraph pair_of_robots() {
 
 TEST_CASE("A team that loses a fifth of all frames loses nothing else", "[system][namespaces]") {
   const SplitGraph graph = pair_of_robots();
+  std::optional<PairRun> good;  // beside the other one, because robots mostly wait
+  std::jthread runner([&] { good.emplace(graph, ""); });
   const PairRun bad(graph,
                     "seed: 3\nloss: 0.2\ndelay_s: 0.01\njitter_s: 0.01\n"
                     "outages:\n  - {from_s: 0.5, to_s: 4}\n");
@@ -80,12 +84,12 @@ TEST_CASE("A team that loses a fifth of all frames loses nothing else", "[system
     CHECK(link.at("frames_delivered") > link.at("frames_loss"));
   }
 
-  const PairRun good(graph, "");
-  CAPTURE(good.team.result.output);
-  REQUIRE(good.team.result.exit_code == 0);
-  for (const auto& [pair, link] : good.links) CHECK(link.at("frames_delivered") > 0);
+  runner.join();
+  CAPTURE(good->team.result.output);
+  REQUIRE(good->team.result.exit_code == 0);
+  for (const auto& [pair, link] : good->links) CHECK(link.at("frames_delivered") > 0);
   const TeamResult found = read_team(bad.folder.path(), 2);
-  const TeamResult expected = read_team(good.folder.path(), 2);
+  const TeamResult expected = read_team(good->folder.path(), 2);
   CHECK(found.graph.edges.size() == expected.graph.edges.size());
   const double cost = cost_of(found.graph, found.poses);
   const double best = cost_of(expected.graph, expected.poses);
@@ -124,11 +128,11 @@ TEST_CASE(
                                 .write("links.yaml",
                                        "pairs:\n"
                                        "  - {from: a, to: b, outages: [{from_s: 0}]}\n"
-                                       "  - {from: b, to: c, outages: [{from_s: 0, to_s: 20}]}\n")
+                                       "  - {from: b, to: c, outages: [{from_s: 0, to_s: 10}]}\n")
                                 .string();
   const auto team =
       folder.write("team.yaml", "config: " + fs::absolute("config/datasets/euroc.yaml").string() +
-                                    "\narguments: [--set, run.settle_s=40]\nrobots:\n"
+                                    "\narguments: [--set, run.settle_s=20]\nrobots:\n"
                                     "  - {id: 0, name: a, dataset: \"${DATASET}\", to: 7.5}\n"
                                     "  - {id: 1, name: b, dataset: \"${DATASET}\", from: 7.5, "
                                     "to: 15.0}\n"

@@ -53,7 +53,7 @@ const char* long_soak() {
 }
 
 double seconds_of_soak() {
-  return long_soak() != nullptr ? std::atof(long_soak()) : 20.0;
+  return long_soak() != nullptr ? std::atof(long_soak()) : 10.0;
 }
 
 // The short form plays as fast as it can. It does not measure growth: the slope of the second half,
