@@ -33,6 +33,8 @@ namespace km {
 namespace {
 
 constexpr std::string_view kRecordNode = "record";
+constexpr double kLiveMesh_bytes_per_s =
+    2e6;  // average rate of the faces that viewers of ROS receive
 
 template <typename T>
 void forward(In<T> from, Out<T> to) {
@@ -109,7 +111,7 @@ Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput 
     add_ros_output("ros_output", std::make_unique<LiveSink>(std::move(input.ros)),
                    {.mesh_points = config.ros.mesh_points,
                     .mesh_faces = config.ros.mesh_faces,
-                    .mesh_bytes_per_s = config.ros.mesh_bytes_per_s},
+                    .mesh_bytes_per_s = kLiveMesh_bytes_per_s},
                    std::nullopt);
   if (options.record) add_record(options, config.ros, results);
   if (seal_ != nullptr)
