@@ -25,10 +25,7 @@ KeyframeIndex last_end(const Closure& closure, RobotId robot) {
 // at which keyframes the place was known.
 void RestoreNode::start() {
   RestoredRun run = std::exchange(run_, {});
-  // Published before the keyframes, so that the optimiser continues from the solution, and the
-  // outcome of a candidate is known when it is found again.
-  if (!run.solution.trajectory.T_world_kf.empty())
-    topics_.solution.publish(std::move(run.solution));
+  // Before the keyframes, so that the outcome of a candidate is known when it is found again.
   for (ClosureOutcome& outcome : run.outcomes) topics_.outcomes.publish(std::move(outcome));
   for (OdometryState& state : run.states) topics_.states.publish(std::move(state));
   const auto end_of = [&](const Closure& closure) { return last_end(closure, run.robot); };

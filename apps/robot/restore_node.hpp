@@ -7,7 +7,6 @@
 #include "modules/core/keyframe.hpp"
 #include "modules/core/odometry.hpp"
 #include "modules/core/pose_graph.hpp"
-#include "modules/core/team_solution.hpp"
 #include "modules/journal/restored_run.hpp"
 #include "runtime/node.hpp"
 #include "runtime/topic.hpp"
@@ -23,7 +22,6 @@ struct RestoreTopics {
   Out<Closure> peer_closures;
   Out<ClosureOutcome> outcomes;
   Out<InlierSet> inlier_sets;
-  Out<TeamSolution> solution;
 };
 
 /// Publishes a restored run once, before any source starts. The nodes that read its messages reach

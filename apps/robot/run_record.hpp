@@ -14,6 +14,7 @@
 
 #include "apps/robot/run_findings.hpp"
 #include "modules/core/closure_verdicts.hpp"
+#include "modules/core/live_frames.hpp"
 #include "modules/core/odometry.hpp"
 #include "modules/core/pose_changes.hpp"
 #include "modules/core/pose_graph.hpp"
@@ -25,7 +26,6 @@
 #include "modules/mesh/map_mesh.hpp"
 #include "modules/mesh_deformation/mesh_corrector.hpp"
 #include "modules/place_recognition/place_database.hpp"
-#include "modules/ros_dds/live_frames.hpp"
 #include "modules/semantic_mapping/semantic_mapper.hpp"
 #include "modules/vio/vio_statistics.hpp"
 #include "runtime/dds/peer_table.hpp"
@@ -217,9 +217,11 @@ class RecorderNode final : public Node {
   }
   template <typename T>
   void record(In<T> topic) {
-    topic.subscribe([this](const std::shared_ptr<const T>& message) {
-      if (!frozen_) worker_.post([this, message] { record_.add(*message); });
-    });
+    topic.subscribe([this](const std::shared_ptr<const T>& message) { add(message); });
+  }
+  template <typename T>
+  void add(std::shared_ptr<const T> message) {
+    if (!frozen_) worker_.post([this, message] { record_.add(*message); });
   }
 
   /// Later messages are not recorded: the results stay as they are when the robot leaves.

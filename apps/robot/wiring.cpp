@@ -33,6 +33,8 @@ namespace km {
 namespace {
 
 constexpr std::string_view kRecordNode = "record";
+constexpr double kLiveMesh_bytes_per_s =
+    2e6;  // average rate of the faces that viewers of ROS receive
 
 template <typename T>
 void forward(In<T> from, Out<T> to) {
@@ -109,7 +111,7 @@ Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput 
     add_ros_output("ros_output", std::make_unique<LiveSink>(std::move(input.ros)),
                    {.mesh_points = config.ros.mesh_points,
                     .mesh_faces = config.ros.mesh_faces,
-                    .mesh_bytes_per_s = config.ros.mesh_bytes_per_s,
+                    .mesh_bytes_per_s = kLiveMesh_bytes_per_s,
                     .slices = true},
                    std::nullopt);
   if (options.record) add_record(options, config.ros, results);
@@ -151,8 +153,7 @@ void Robot::add_restore() {
                            .own_closures = topics_.own_closures,
                            .peer_closures = topics_.closures,
                            .outcomes = topics_.restored_outcomes,
-                           .inlier_sets = topics_.restored_inlier_sets,
-                           .solution = topics_.restored_solution});
+                           .inlier_sets = topics_.restored_inlier_sets});
 }
 
 // Call after the nodes that find closures and before those that read them, so that none is lost at
@@ -196,7 +197,7 @@ void Robot::add_sensing(const RobotConfig& config, const PlaybackPace& pace,
                                SensorsTopics{.processed = topics_.processed_frames,
                                              .packets = topics_.packets,
                                              .load = topics_.shed_load,
-                                             .end = topics_.sensors_end});
+                                             .end = [this](const auto&) { source_ended_ = true; }});
   add_restore();
   const VioTopics odometry{.packets = topics_.packets,
                            .odometry = topics_.odometry,
@@ -222,7 +223,6 @@ void Robot::add_sensing(const RobotConfig& config, const PlaybackPace& pace,
                                                        .frames = topics_.located_frames,
                                                        .keyframes = topics_.new_keyframes},
                                 std::move(describer), std::move(keypoint_describer));
-  topics_.sensors_end.subscribe([this](const auto&) { source_ended_ = true; });
   if (restored_) features.continue_from(restored_->keyframes.back().odometry);
 }
 
@@ -250,28 +250,28 @@ void Robot::add_localization(const RobotConfig& config, FinishedMap map) {
 
 // Keyframe 0 of a resumed run is the origin, too.
 void Robot::add_fixes(FixInput input) {
-  fixes_ = &add<FixesNode>(true, std::move(input),
-                           FixesTopics{.states = topics_.odometry,
-                                       .restored_states = topics_.restored_odometry,
-                                       .keyframes = topics_.keyframe_odometry,
-                                       .received = topics_.received_fixes,
-                                       .fixes = topics_.fixes});
-  topics_.received_fixes.subscribe([this](const auto& fix) { journal_->append(*fix); });
+  fixes_ =
+      &add<FixesNode>(true, std::move(input),
+                      FixesTopics{.states = topics_.odometry,
+                                  .restored_states = topics_.restored_odometry,
+                                  .keyframes = topics_.keyframe_odometry,
+                                  .fixes = topics_.fixes,
+                                  .received = [this](const auto& fix) { journal_->append(fix); }});
 }
 
 void Robot::add_playback(const RobotConfig& config, double rate, RecordedGraph graph) {
-  auto& playback = add<GraphPlaybackNode>(true, config.graph_playback, rate, std::move(graph),
-                                          GraphPlaybackTopics{.odometry = topics_.keyframe_odometry,
-                                                              .keyframes = topics_.new_keyframes,
-                                                              .closures = topics_.measured_closures,
-                                                              .end = topics_.playback_end});
+  auto& playback = add<GraphPlaybackNode>(
+      true, config.graph_playback, rate, std::move(graph),
+      GraphPlaybackTopics{.odometry = topics_.keyframe_odometry,
+                          .keyframes = topics_.new_keyframes,
+                          .closures = topics_.measured_closures,
+                          .end = [this](const auto&) { source_ended_ = true; }});
   if (restored_) playback.continue_after(restored_->keyframes.size());
   add_restore();
   bridge_->peers().events().subscribe(
       [to = Out<PeerEvent>(topics_.candidate_restarts)](const auto& event) {
         if (event->kind == PeerEventKind::kRestarted) to.publish(event);
       });
-  topics_.playback_end.subscribe([this](const auto&) { source_ended_ = true; });
 }
 
 void Robot::add_loop_closure(const RobotConfig& config) {
@@ -317,7 +317,6 @@ void Robot::add_back_end(const RobotConfig& config) {
                  .inlier_sets = topics_.own_inlier_sets,
                  .peer_inlier_sets = topics_.shared_inlier_sets.received,
                  .restored_inlier_sets = topics_.restored_inlier_sets,
-                 .restored_solution = topics_.restored_solution,
                  .peer_events = bridge_->peers().events(),
                  .restarts = topics_.closure_restarts,
                  .links = topics_.links,
@@ -327,6 +326,7 @@ void Robot::add_back_end(const RobotConfig& config) {
                  .progress = topics_.progress,
                  .verdicts = topics_.closure_verdicts});
   team.begin_in_map(map_id_);
+  if (has_solution()) team.restore(restored_->solution);
 }
 
 void Robot::add_overlay() {
@@ -408,10 +408,9 @@ void Robot::add_network(CrossingEnds meshes) {
 
 void Robot::add_records() {
   recorder_ = &add<RecorderNode>(false, identity_.robot,
-                                 [this](JournalEntry event) { publish(std::move(event)); });
-  recorder_->record(topics_.restored_solution);
+                                 [this](const JournalEntry& event) { publish(event); });
+  if (has_solution()) recorder_->add(std::make_shared<const TeamSolution>(restored_->solution));
   recorder_->record(topics_.restored_inlier_sets);
-  recorder_->record(topics_.samples);
   recorder_->record(topics_.restored_odometry);
   recorder_->record(topics_.odometry);
   recorder_->record(topics_.keyframe_odometry);
@@ -544,9 +543,6 @@ void Robot::add_view(const RobotConfig& config, const std::optional<Camera>& cam
                                     .outcomes = t.outcomes,
                                     .restored_outcomes = t.restored_outcomes,
                                     .closures = t.closures,
-                                    .judgements = t.judgements,
-                                    .pose_changes = t.pose_changes,
-                                    .samples = t.samples,
                                     .restarts = t.closure_restarts,
                                     .objects = t.joint_objects,
                                     .maps_2d = t.maps_2d,
@@ -559,14 +555,15 @@ void Robot::add_view(const RobotConfig& config, const std::optional<Camera>& cam
   });
 }
 
-// Passes an event of the recorder to the journal and to viewers. Samples come from a topic of which
-// both read.
-void Robot::publish(JournalEntry event) {
+// Passes an event of the recorder to the journal and to viewers.
+void Robot::publish(const JournalEntry& event) {
   journal_->append(event);
-  if (auto* const judgements = std::get_if<ClosureJudgements>(&event))
-    topics_.judgements.publish(std::move(*judgements));
-  else if (auto* const changes = std::get_if<PoseChanges>(&event))
-    topics_.pose_changes.publish(std::move(*changes));
+  const auto offer = [this]<typename Event>(const Event& one) {
+    if constexpr (std::is_same_v<Event, ClosureJudgements> || std::is_same_v<Event, PoseChanges> ||
+                  std::is_same_v<Event, RobotSample>)
+      view_->offer(one);
+  };
+  if (view_ != nullptr) std::visit(offer, event);
 }
 
 std::map<std::string, std::uint64_t> Robot::sent_bytes() const {
@@ -600,7 +597,7 @@ void Robot::publish_sample() {
     if (view_ != nullptr)
       state.sent_bytes.push_back({name, static_cast<double>(view_->sent_bytes(channel))});
   add_team(state);
-  topics_.samples.publish(std::move(state));
+  recorder_->add(std::make_shared<const RobotSample>(std::move(state)));
 }
 
 void Robot::add_team(RobotSample& sample) const {

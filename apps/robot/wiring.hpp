@@ -69,10 +69,8 @@ struct TeamChannel {
 /// Every channel of a robot. Only Crossing and TeamChannel leave the process.
 struct Topics {
   Topic<SensorPacket> packets;
-  Topic<SensorsEnd> sensors_end;
   Topic<ProcessedFrame> processed_frames;
   Topic<ShedLoad> shed_load;
-  Topic<GraphPlaybackEnd> playback_end;
   Topic<OdometryState> odometry, restored_odometry;
   Topic<KeyframeOdometry> keyframe_odometry;
   Topic<Keyframe> new_keyframes, keyframes;  // keyframes: only those that are on the disk
@@ -99,17 +97,11 @@ struct Topics {
   // received ones.
   Topic<Closure> new_closures, own_closures, closures;
   Topic<PositionFix> fixes;
-  Topic<ReceivedFix> received_fixes;
   Topic<InlierSet> own_inlier_sets;
   Topic<Trajectory> trajectory;
   Topic<OptimizerProgress> progress;
   Topic<ClosureVerdicts> closure_verdicts;
   Topic<InlierSet> restored_inlier_sets;
-  Topic<TeamSolution> restored_solution;
-  // Events of the recorder.
-  Topic<RobotSample> samples;
-  Topic<ClosureJudgements> judgements;
-  Topic<PoseChanges> pose_changes;
 
   // Inputs and outputs of OverlayNode, which connects them to the crossings below.
   Topic<PeerEvent> ways;  // peer events, and peers that can be reached through other robots only
@@ -217,8 +209,12 @@ class Robot {
   void add_localization(const RobotConfig& config, FinishedMap map);
   void add_fixes(FixInput input);
   void add_past();
-  void publish(JournalEntry event);
+  void publish(const JournalEntry& event);
   void add_team(RobotSample& sample) const;
+  /// True if a former process left a solution of the pose graph.
+  [[nodiscard]] bool has_solution() const {
+    return restored_ && !restored_->solution.trajectory.T_world_kf.empty();
+  }
   void add_restore();
   void add_journal(const RobotOptions& options, const RobotInput& input, ResultWriter& results);
   void add_mapping(const RobotConfig& config, const PlaybackPace& pace, const StereoRig& rig,

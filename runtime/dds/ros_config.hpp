@@ -18,8 +18,6 @@ struct RosConfig {
   std::optional<bool> publish = {};
   int mesh_points = 200000;
   int mesh_faces = 50000;
-  double mesh_bytes_per_s = 2e6;
-  int receive_buffer_bytes = 33554432;
 
   void visit_fields(auto& visitor) {
     visitor.field("domain", domain, {0, 230}, "ROS_DOMAIN_ID of drivers and viewers");
@@ -35,11 +33,6 @@ struct RosConfig {
     visitor.field("mesh_faces", mesh_faces, {0, 1000000},
                   "maximum number of mesh faces published for viewers, 120 B each, also kept for "
                   "late ones; larger meshes are coarsened; 0: none");
-    visitor.field("mesh_bytes_per_s", mesh_bytes_per_s, {1e4, 1e9},
-                  "[B/s] average rate of these faces");
-    visitor.field("receive_buffer_bytes", receive_buffer_bytes, {65536, 1 << 28},
-                  "[B] buffer for images that arrive faster than they are read; the kernel may "
-                  "grant less: net.core.rmem_max");
   }
 };
 

@@ -44,6 +44,10 @@ constexpr std::array<KnownType, 16> kTypes = {{
 // inside this process, beyond those on the network, and its true number on the network.
 constexpr dds_domainid_t kOwnNumbers = 1000;
 
+// Buffer for images that arrive faster than they are read. The kernel may grant less:
+// net.core.rmem_max.
+constexpr int kReceiveBuffer_bytes = 32 << 20;
+
 std::string cyclone_xml(const RosConfig& config, const NetworkInterface& interface) {
   std::string peers;
   for (const std::string& peer : config.peers)
@@ -54,7 +58,7 @@ std::string cyclone_xml(const RosConfig& config, const NetworkInterface& interfa
          "/></Interfaces></General><Discovery><ExternalDomainId>" + std::to_string(config.domain) +
          "</ExternalDomainId><ParticipantIndex>" + (peers.empty() ? "none" : "auto") +
          "</ParticipantIndex>" + peers + "</Discovery><Internal><SocketReceiveBufferSize max='" +
-         std::to_string(config.receive_buffer_bytes) + "B'/></Internal></Domain></CycloneDDS>";
+         std::to_string(kReceiveBuffer_bytes) + "B'/></Internal></Domain></CycloneDDS>";
 }
 
 }  // namespace

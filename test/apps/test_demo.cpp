@@ -109,12 +109,6 @@ TEST_CASE("The demo joins three robots of a simulated world into one frame", "[d
     CHECK(std::filesystem::exists(folder.path() / file));
 }
 
-TEST_CASE("The demo prints the duration of its world", "[demo]") {
-  const auto help = run_command("apps/demo --help");
-  CHECK(help.exit_code == 0);
-  CHECK_THAT(help.output, Catch::Contains("The simulated world is 25 s long, with --short 8 s"));
-}
-
 TEST_CASE("The demo prints the commands to play a bag", "[demo]") {
   const TemporaryFolder folder;
   const auto [file, dataset] = GENERATE(table<std::string, std::string>({

@@ -11,19 +11,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-TEST_CASE("Rows are in the file after a flush", "[robot]") {
-  const TemporaryFolder folder;
-  ResultWriter results;
-  GrowingFile file(folder.path() / "a.csv", results);
-  file.rows() << "time\n" << 1 << '\n';
-  file.flush();
-  file.rows() << 2 << '\n';
-  CHECK(folder.read("a.csv") == "time\n1\n");
-  file.flush();
-  CHECK(folder.read("a.csv") == "time\n1\n2\n");
-  CHECK(results.lost().empty());
-}
-
 TEST_CASE("Rows for which there was no room are written once there is room", "[robot]") {
   const CapturedLog log;
   const TemporaryFolder folder;

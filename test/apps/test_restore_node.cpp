@@ -39,7 +39,6 @@ TEST_CASE("A restored closure follows the last keyframe on which it ends", "[rob
   Topic<Closure> own, peers;
   Topic<ClosureOutcome> outcomes;
   Topic<InlierSet> inlier_sets;
-  Topic<TeamSolution> solution;
   std::string order;
   keyframes.subscribe([&](const auto& k) { order += std::to_string(k->odometry.id.index); });
   own.subscribe([&](const auto& c) { order += c->to.id.index == 1 ? 'a' : 'b'; });
@@ -50,8 +49,7 @@ TEST_CASE("A restored closure follows the last keyframe on which it ends", "[rob
                     .own_closures = own,
                     .peer_closures = peers,
                     .outcomes = outcomes,
-                    .inlier_sets = inlier_sets,
-                    .solution = solution});
+                    .inlier_sets = inlier_sets});
   node.set(std::move(run));
   node.start();
   CHECK(order == "0d1c2b3a");

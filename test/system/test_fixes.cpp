@@ -1,6 +1,7 @@
 #include <catch2/catch.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <csignal>
 #include <cstdio>
@@ -42,8 +43,8 @@ GeodeticPoint geodetic(const Eigen::Vector3d& p_enu) {
   return point;
 }
 
-// Writes ten positions of each second of the truth, with noise. Every fifth, except for the first
-// one, is off by 2 m.
+// Writes ten positions of each second of the truth, with noise. Every seventh, except for the first
+// one, is off by 2 m: keyframes that are half a second apart do not all meet such positions.
 void write_fixes(const std::vector<StampedPose>& truth, const fs::path& file,
                  bool is_gnss = false) {
   std::mt19937 rng(5);
@@ -55,7 +56,7 @@ void write_fixes(const std::vector<StampedPose>& truth, const fs::path& file,
     Eigen::Vector3d outlier;
     for (double& c : p) c += kSigma_m * normal(rng);
     for (double& c : outlier) c = normal(rng);
-    if (k > 0 && (k / 20) % 5 == 0) p += 2.0 * outlier.normalized();
+    if (k > 0 && (k / 20) % 7 == 0) p += 2.0 * outlier.normalized();
     const GeodeticPoint point = geodetic(p);
     if (is_gnss) p = {point.latitude_deg, point.longitude_deg, point.altitude_m};
     out << truth[k].stamp << ", " << p.x() << ", " << p.y() << ", " << p.z() << '\n';
@@ -195,12 +196,20 @@ std::vector<std::string> live_command(const fs::path& dataset, const TemporaryFo
       settings));
 }
 
-// Plays seconds of the recording more slowly than they were recorded, because the host may be busy.
-std::vector<std::string> driver_command(const fs::path& dataset, int ros_domain,
+// Plays seconds of the recording more slowly than they were recorded: `rate` times as fast.
+std::vector<std::string> driver_command(const fs::path& dataset, int ros_domain, double rate,
                                         const std::string& options) {
   return words_of(KM_BIN_DIR "/kimera_multi_publish " + dataset.string() +
-                  " --interface lo --wait 1 --reliable --rate 0.5 --domain " +
-                  std::to_string(ros_domain) + ' ' + options);
+                  " --interface lo --wait 1 --reliable --rate " + std::to_string(rate) +
+                  " --domain " + std::to_string(ros_domain) + ' ' + options);
+}
+
+// A busy host loses messages, and the result then depends on which ones: a test repeats the run
+// more slowly until all messages have arrived.
+constexpr std::array kRates = {0.7, 0.35, 0.17, 0.08};
+
+bool has_lost_messages(const RunSummary& summary) {
+  return summary.sensor_faults.contains("messages lost on the way");
 }
 
 bool is_near_the_end(const std::string& line) {
@@ -219,21 +228,28 @@ TEST_CASE("fixes on live topics place a run in their frame", "[system][fixes][li
   CAPTURE(is_gnss);
   const fs::path fixes = folder.path() / "fixes.csv";
   write_fixes(truth, fixes, is_gnss);
-  const int ros_domain = random_domain();
-  Process robot(live_command(*dataset, folder, ros_domain, "--output",
-                             is_gnss ? "absolute_fixes.source=gnss absolute_fixes.correlation_s=0 "
-                                       "absolute_fixes.datum=[47.3977,8.5456,488]"
-                                     : "absolute_fixes.source=motion_capture "
-                                       "absolute_fixes.live_type=geometry_msgs/msg/PoseStamped"));
-  Process driver(driver_command(*dataset, ros_domain,
-                                "--to 12.5 --fixes " + fixes.string() +
-                                    (is_gnss ? "" : " --fix-type geometry_msgs/msg/PoseStamped")));
-  CHECK(driver.wait() == 0);
-  REQUIRE(robot.wait_until(is_near_the_end));
-  robot.kill(SIGINT);
-  REQUIRE(robot.wait() == 0);
-  const RunSummary summary = read_summary(folder.path() / "live/summary.json");
+  RunSummary summary;
+  for (const double rate : kRates) {
+    const int ros_domain = random_domain();
+    Process robot(live_command(*dataset, folder, ros_domain, "--output",
+                               is_gnss
+                                   ? "absolute_fixes.source=gnss absolute_fixes.correlation_s=0 "
+                                     "absolute_fixes.datum=[47.3977,8.5456,488]"
+                                   : "absolute_fixes.source=motion_capture "
+                                     "absolute_fixes.live_type=geometry_msgs/msg/PoseStamped"));
+    Process driver(
+        driver_command(*dataset, ros_domain, rate,
+                       "--to 12.5 --fixes " + fixes.string() +
+                           (is_gnss ? "" : " --fix-type geometry_msgs/msg/PoseStamped")));
+    CHECK(driver.wait() == 0);
+    REQUIRE(robot.wait_until(is_near_the_end));
+    robot.kill(SIGINT);
+    REQUIRE(robot.wait() == 0);
+    summary = read_summary(folder.path() / "live/summary.json");
+    if (!has_lost_messages(summary)) break;
+  }
   REQUIRE(summary.fixes);
+  CAPTURE(summary.fixes->used, summary.fixes->rejected, summary.fixes->received);
   CHECK(summary.fixes->located);
   CHECK(summary.fixes->used > 2 * summary.fixes->rejected);
   CHECK(error_m(read_trajectory(folder.path() / "live/optimized.tum"), truth) < kLargest_m);
@@ -254,25 +270,31 @@ TEST_CASE("a killed and resumed robot remains located by its live fixes", "[syst
   write_fixes(truth, fixes, true);
   const bool has_more_fixes = GENERATE(false, true);
   CAPTURE(has_more_fixes);
-  const int ros_domain = random_domain();
   const std::string settings = "absolute_fixes.source=gnss absolute_fixes.correlation_s=0";
-  {
-    Process robot(live_command(*dataset, folder, ros_domain, "--output", settings));
-    Process driver(driver_command(*dataset, ros_domain, "--to 13 --fixes " + fixes.string()));
-    REQUIRE(robot.wait_until(is_located));
-    robot.kill(SIGKILL);
-    robot.wait();
-    driver.kill(SIGINT);
+  RunSummary summary;
+  for (const double rate : kRates) {
+    const int ros_domain = random_domain();
+    {
+      Process robot(live_command(*dataset, folder, ros_domain, "--output", settings));
+      Process driver(
+          driver_command(*dataset, ros_domain, rate, "--to 13 --fixes " + fixes.string()));
+      REQUIRE(robot.wait_until(is_located));
+      robot.kill(SIGKILL);
+      robot.wait();
+      driver.kill(SIGINT);
+      CHECK(driver.wait() == 0);
+    }
+    Process robot(live_command(*dataset, folder, ros_domain, "--resume", settings));
+    Process driver(
+        driver_command(*dataset, ros_domain, rate,
+                       "--to 13" + (has_more_fixes ? " --fixes " + fixes.string() : "")));
     CHECK(driver.wait() == 0);
+    REQUIRE(robot.wait_until(is_near_the_end));
+    robot.kill(SIGINT);
+    REQUIRE(robot.wait() == 0);
+    summary = read_summary(folder.path() / "live/summary.json");
+    if (!has_lost_messages(summary)) break;
   }
-  Process robot(live_command(*dataset, folder, ros_domain, "--resume", settings));
-  Process driver(driver_command(*dataset, ros_domain,
-                                "--to 13" + (has_more_fixes ? " --fixes " + fixes.string() : "")));
-  CHECK(driver.wait() == 0);
-  REQUIRE(robot.wait_until(is_near_the_end));
-  robot.kill(SIGINT);
-  REQUIRE(robot.wait() == 0);
-  const RunSummary summary = read_summary(folder.path() / "live/summary.json");
   REQUIRE(summary.fixes);
   CHECK(summary.fixes->located);
   CAPTURE(summary.fixes->used, summary.fixes->rejected, summary.fixes->received);

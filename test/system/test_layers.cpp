@@ -136,6 +136,11 @@ TEST_CASE("Only tests and the laboratory include headers of the laboratory", "[l
   CHECK(files > 20);
 }
 
+TEST_CASE("The record of a run does not depend on the messages of ROS", "[layers]") {
+  for (const std::string& header : includes_of("apps/robot/run_record.hpp"))
+    CHECK_FALSE(header.starts_with("modules/ros_dds/"));
+}
+
 std::vector<std::string> matches(const std::string& text, const std::string& pattern) {
   const std::regex regex(pattern);
   std::vector<std::string> found;

@@ -255,15 +255,6 @@ TEST_CASE("A team that splits in two ends, and both sides report the robots they
   }
 }
 
-TEST_CASE("Robots that never receive each other share closures through one that receives both",
-          "[system][namespaces]") {
-  if (!VirtualNetwork::available()) return;
-  const SplitGraph graph = random_team(23, {0, 1, 2}, 40, {{0, 1}, {1, 2}, {0, 2}});
-  constexpr double kSettle_s = 20.0;  // robots are handed nothing before they have missed others
-  Solution cut(graph, {{0, 1}, {1, 2}}, "newton", kSettle_s), whole(graph, all_links(3));
-  check_alike(cut.get(), whole.get(), "closures between the ends of a chain of three");
-}
-
 TEST_CASE("Five processes over DDS reach the cost that one process reaches", "[system]") {
   const SplitGraph graph =
       random_team(20, {0, 1, 2, 3, 4}, 40, {{0, 1}, {1, 2}, {2, 3}, {3, 4}, {0, 4}, {1, 3}});

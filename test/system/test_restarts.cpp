@@ -73,7 +73,7 @@ class Trial {
     const fs::path graph = write_walk(walk, other, last, folder_.path() / (name + ".g2o"));
     return std::make_unique<Process>(
         words_of(KM_BIN_DIR "/kimera_multi_robot --robot " + std::to_string(walk.robot) +
-                 " --name " + name + " --graph " + graph.string() + " --rate 10 --output " +
+                 " --name " + name + " --graph " + graph.string() + " --rate 20 --output " +
                  (folder_.path() / name).string() + " --domain " + std::to_string(domain_)));
   }
   [[nodiscard]] bool is_joint(const std::string& robot) const {

@@ -193,35 +193,6 @@ TEST_CASE("A robot that is killed keeps its map, and continues it", "[system][re
   CHECK(fs::file_size(output / "mesh_optimized.ply") > 0);
 }
 
-TEST_CASE("A robot that is killed and taken up is in its team as before", "[system][resume]") {
-  const auto dataset = shared_data("euroc/MH_01_easy");
-  if (!dataset) return;
-  const TemporaryFolder folder;
-  const int domain = random_domain();
-  const Part& killed = GENERATE(kFirst, kSecond);
-  const Part& other = killed.robot == kFirst.robot ? kSecond : kFirst;
-  CAPTURE(killed.robot);
-  const fs::path survivor_output = folder.path() / "survivor", output = folder.path() / "killed";
-  Process survivor(with(command_of(other, *dataset, domain), "--output", survivor_output));
-  const auto command = command_of(killed, *dataset, domain);
-  {
-    Process victim(with(command, "--output", output));
-    REQUIRE(grows_by(output, 300'000));
-    victim.kill(SIGKILL);
-    victim.wait();
-  }
-  Process resumed(with(command, "--resume", output));
-  CHECK(resumed.wait() == 0);
-  CHECK(survivor.wait() == 0);
-  for (const fs::path& folder_of_one : {survivor_output, output}) {
-    const RunSummary summary = read_summary(folder_of_one / "summary.json");
-    CHECK(summary.pgo.members == std::vector<RobotId>{0, 1});
-    CHECK(summary.exit_reason == "all present robots have settled");
-  }
-  CHECK(error_m(*dataset, {survivor_output / "optimized.tum", output / "optimized.tum"}, folder) <
-        0.015);
-}
-
 // Its closures with other robots.
 std::set<ClosureId> shared_closures(const G2oGraph& graph) {
   std::set<ClosureId> closures;

@@ -268,26 +268,9 @@ TEST_CASE("A driver that restarts does not end a live robot", "[faults][live]") 
   CHECK(summary.odometry->inertial_gaps >= 1);
 }
 
-TEST_CASE("The next run starts from the camera calibration that a run has estimated", "[faults]") {
-  const auto recording = shared_data("euroc/MH_01_easy");
-  if (!recording) return;
-  constexpr double kLate_s = 0.02;
-  const TemporaryFolder folder;
-  EurocCopy copy = first_seconds(fs::absolute(*recording), 10.0);
-  for (auto& sample : copy.samples) sample.stamp += nanoseconds(kLate_s);
-  copy.write(folder.path() / "late");
-  const CamerasSummary first = estimated_cameras(folder, "first", "");
-  const CamerasSummary second = estimated_cameras(
-      folder, "second", "--rig " + (folder.path() / "first/rig_estimated.yaml").string());
-  std::cout << "offset found: " << 1e3 * first.offset_s << " ms, then " << 1e3 * second.offset_s
-            << " ms\n";
-  CHECK(first.offset_s == Approx(kLate_s).margin(0.003));
-  CHECK(std::abs(second.offset_s) < 0.001);
-  CHECK(std::abs(second.rotation_x_rad) < 0.5 * 0.01);
-}
-
-TEST_CASE("The camera calibration that a run has estimated is known when it is resumed",
-          "[faults]") {
+TEST_CASE(
+    "The camera calibration that a run has estimated is known to the next run and to a resumed one",
+    "[faults]") {
   const auto recording = shared_data("euroc/MH_01_easy");
   if (!recording) return;
   constexpr double kLate_s = 0.02;
@@ -295,7 +278,12 @@ TEST_CASE("The camera calibration that a run has estimated is known when it is r
   EurocCopy copy = first_seconds(fs::absolute(*recording), 11.0);
   for (auto& sample : copy.samples) sample.stamp += nanoseconds(kLate_s);
   copy.write(folder.path() / "late");
+  const std::string corrected_rig = " --rig " + (folder.path() / "run/rig_estimated.yaml").string();
   const CamerasSummary before = estimated_cameras(folder, "run", "--to 10");
+  CHECK(before.offset_s == Approx(kLate_s).margin(0.003));
+  const CamerasSummary next = estimated_cameras(folder, "next", "--to 10" + corrected_rig);
+  CHECK(std::abs(next.offset_s) < 0.001);
+  CHECK(std::abs(next.rotation_x_rad) < 0.5 * 0.01);
   const auto resumed = [&](const std::string& as, const std::string& options) {
     fs::copy(folder.path() / "run", folder.path() / as);
     return estimated_cameras(folder, as, options, "--resume");
@@ -304,8 +292,7 @@ TEST_CASE("The camera calibration that a run has estimated is known when it is r
   CHECK(after.offset_s == Approx(before.offset_s).margin(1e-3));
   CHECK(after.offset_sigma_s < 1.05 * before.offset_sigma_s);
   // A rig that has this correction already needs no further one.
-  const CamerasSummary corrected =
-      resumed("corrected", "--rig " + (folder.path() / "run/rig_estimated.yaml").string());
+  const CamerasSummary corrected = resumed("corrected", corrected_rig);
   CHECK(std::abs(corrected.offset_s) < 1e-3);
   CHECK(corrected.offset_sigma_s < 1.05 * before.offset_sigma_s);
 }

@@ -169,29 +169,5 @@ TEST_CASE("A robot whose id is taken reports it and ends, and the first owner of
   CHECK(incumbent.wait() == 0);
 }
 
-TEST_CASE("Bad input and configuration end a robot with one clear message", "[system]") {
-  const TemporaryFolder folder;
-  const std::string robot = std::string(KM_BIN_DIR) + "/kimera_multi_robot --robot 1 --output " +
-                            (folder.path() / "out").string();
-  const auto fails_with = [&](const std::string& arguments, int code, const std::string& text) {
-    const CommandResult result = run_command(robot + ' ' + arguments);
-    CAPTURE(arguments, result.output);
-    CHECK(result.exit_code == code);
-    CHECK(result.output.find(text) != std::string::npos);
-  };
-  const std::string empty = folder.path().string();
-  fails_with("--dataset " + empty, 1, "cam0");
-  fails_with("--dataset /nonexistent", 2, "/nonexistent");
-  fails_with("--dataset " + empty + " --rate fast", 2, "neither a positive number nor max");
-  fails_with("", 2, "--dataset");
-  fails_with("--dataset " + empty + " --set pcm.confidence=2", 1, "pcm.confidence");
-  fails_with("--dataset " + empty + " --link carrier_pigeon", 1, "carrier_pigeon");
-  const auto typo = folder.write("typo.yaml", "vio:\n  iteratons: 3\n");
-  fails_with("--dataset " + empty + " --config " + typo.string(), 1, "typo.yaml:2");
-  const auto graph = folder.write("bad.g2o", "EDGE_SE3:QUAT 0 1 nan\n");
-  fails_with("--graph " + graph.string(), 1, "bad.g2o:1");
-  CHECK_FALSE(fs::exists(folder.path() / "out" / "odometry.tum"));
-}
-
 }  // namespace
 }  // namespace km

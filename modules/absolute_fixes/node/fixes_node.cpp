@@ -61,7 +61,7 @@ void FixesNode::step(const Input& input) {
     }
     fixes = association_.take(reader_.datum_id());
   }
-  if (received) topics_.received.publish(*received);
+  if (received) topics_.received(*received);
   for (PositionFix& fix : fixes) topics_.fixes.publish(std::move(fix));
 }
 

@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <exception>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -29,8 +30,9 @@ struct FixesTopics {
   In<OdometryState> states;
   In<OdometryState> restored_states;
   In<KeyframeOdometry> keyframes;  ///< Keyframe 0 is the origin of the absolute frame.
-  Out<ReceivedFix> received;       ///< Usable live fixes, for the journal.
   Out<PositionFix> fixes;
+  /// Called for each usable live fix, for the journal.
+  std::function<void(const ReceivedFix&)> received;
 };
 
 /// Measures keyframes by absolute fixes (FixAssociation), in a thread. A second thread waits for

@@ -37,7 +37,6 @@ TeamNode::TeamNode(const PoseGraphConfig& config, TeamPeer self, MemberSolverFac
   topics.inlier_sets.subscribe(post);
   topics.peer_inlier_sets.subscribe(post);
   topics.restored_inlier_sets.subscribe(post);
-  topics.restored_solution.subscribe(post);
   topics.peer_events.subscribe(post);
   topics.restarts.subscribe([this](const auto& event) {
     worker_.post(NewIncarnation{{event->identity.robot, event->identity.boot}});
@@ -61,7 +60,6 @@ void TeamNode::take(const Input& input) {
   const auto take_in = Overloaded{
       [](const Tick&) {},
       [&](const NewIncarnation& incarnation) { agent_.peer_restarted(incarnation.peer); },
-      [&](const Topic<TeamSolution>::Message& m) { agent_.restore(*m); },
       [&](const Topic<PeerEvent>::Message& m) { take_peer_event(*m); },
       [&](const Topic<LinksReport>::Message& m) { agent_.update_links(*m); },
       [&](const Topic<TeamMessage>::Message& m) { (void)agent_.receive(*m); },

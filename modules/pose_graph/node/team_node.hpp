@@ -24,7 +24,6 @@ struct TeamTopics {
   In<InlierSet> inlier_sets;           ///< Decided here.
   In<InlierSet> peer_inlier_sets;      ///< Decided by other robots.
   In<InlierSet> restored_inlier_sets;  ///< Sets of a former process, older than all others.
-  In<TeamSolution> restored_solution;  ///< Before all other inputs.
   In<PeerEvent> peer_events;           ///< Robots that are received directly.
   In<PeerEvent> restarts;         ///< kRestarted, before the first closure of the new incarnation.
   In<LinksReport> links;          ///< Links of the team.
@@ -50,6 +49,7 @@ class TeamNode final : public Node {
 
   /// See TeamAgent. Call before start().
   void begin_in_map(std::uint64_t map_id) { agent_.begin_in_map(map_id); }
+  void restore(const TeamSolution& solution) { agent_.restore(solution); }
 
   std::string_view name() const override { return PoseGraphConfig::kSection; }
   void start() override { worker_.start(); }
@@ -67,11 +67,10 @@ class TeamNode final : public Node {
   struct NewIncarnation {
     TeamPeer peer;
   };
-  using Input =
-      std::variant<Tick, Topic<KeyframeOdometry>::Message, Topic<Closure>::Message,
-                   Topic<PositionFix>::Message, Topic<InlierSet>::Message,
-                   Topic<TeamSolution>::Message, Topic<PeerEvent>::Message, NewIncarnation,
-                   Topic<LinksReport>::Message, Topic<TeamMessage>::Message>;
+  using Input = std::variant<Tick, Topic<KeyframeOdometry>::Message, Topic<Closure>::Message,
+                             Topic<PositionFix>::Message, Topic<InlierSet>::Message,
+                             Topic<PeerEvent>::Message, NewIncarnation, Topic<LinksReport>::Message,
+                             Topic<TeamMessage>::Message>;
 
   /// Handles one input synchronously at time `now_s`. The thread calls only this; so can tests.
   void step(const Input& input, double now_s);

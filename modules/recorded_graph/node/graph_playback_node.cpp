@@ -114,7 +114,7 @@ void GraphPlaybackNode::step(std::size_t index) {
   if (index + 1 < graph_.poses()) return;
   log::info(name()) << "end of graph: " << published_.keyframes << " keyframes, "
                     << published_.closures << " closures";
-  topics_.end.publish(published_);
+  topics_.end(published_);
 }
 
 }  // namespace km

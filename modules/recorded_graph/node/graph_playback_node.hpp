@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstddef>
 #include <exception>
+#include <functional>
 #include <stop_token>
 #include <string_view>
 #include <vector>
@@ -20,8 +21,7 @@
 
 namespace km {
 
-/// End of the recorded graph. The node publishes this message once, after everything else, unless
-/// the node is stopped earlier.
+/// End of the recorded graph.
 struct GraphPlaybackEnd {
   std::size_t keyframes = 0;
   std::size_t closures = 0;  ///< Number of closures that the node published.
@@ -32,7 +32,8 @@ struct GraphPlaybackTopics {
   Out<KeyframeOdometry> odometry;
   Out<Keyframe> keyframes;  ///< Without features; covariance relative to keyframe 0.
   Out<RelativePose> closures;
-  Out<GraphPlaybackEnd> end;
+  /// Called once after everything else, unless the node is stopped earlier.
+  std::function<void(const GraphPlaybackEnd&)> end;
 };
 
 /// Publishes the part of one robot of a recorded pose graph as if the robot were driving. It

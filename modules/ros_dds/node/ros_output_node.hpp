@@ -15,13 +15,13 @@
 #include <variant>
 #include <vector>
 
+#include "modules/core/live_frames.hpp"
 #include "modules/core/occupancy_grid.hpp"
 #include "modules/core/stamped_pose.hpp"
 #include "modules/mesh/labelled_mesh.hpp"
 #include "modules/objects/map_object.hpp"
 #include "modules/recordings/ros_messages.hpp"
 #include "modules/ros_dds/closure_lines.hpp"
-#include "modules/ros_dds/live_frames.hpp"
 #include "modules/ros_dds/ros_sink.hpp"
 #include "modules/ros_dds/surface_pieces.hpp"
 #include "runtime/log.hpp"

@@ -165,7 +165,7 @@ void SensorsNode::step(const EndOfData& data) {
   if (stopped_) return;
   log_lines(to_string(data.faults), name());
   log::info(name()) << "end of data: " << published_ << " frames, " << skipped_ << " skipped";
-  topics_.end.publish(SensorsEnd{published_, skipped_, paused_s(), data.faults});
+  topics_.end({published_, skipped_, paused_s(), data.faults});
 }
 
 }  // namespace km

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cstddef>
 #include <exception>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -24,7 +25,7 @@
 
 namespace km {
 
-/// End of the recording, published once after its last packet. Not published if stop() comes first.
+/// End of the recording.
 struct SensorsEnd {
   std::size_t published = 0;  ///< Number of published packets.
   std::size_t skipped = 0;    ///< Number of frames not used because processors were too slow.
@@ -38,7 +39,8 @@ struct SensorsTopics {
   In<ProcessedFrame> processed;
   Out<SensorPacket> packets;
   Out<ShedLoad> load;  ///< Each change of the shed load, before the packets that it concerns.
-  Out<SensorsEnd> end;
+  /// Called once after the last packet, unless stop() comes first.
+  std::function<void(const SensorsEnd&)> end;
 };
 
 /// Plays a recording, or publishes live measurements. One thread decodes ahead. Another thread

@@ -47,12 +47,12 @@ ViewNode::ViewNode(const ViewConfig& config, const DdsParticipant& participant,
       mesh_settings_(mesh),
       camera_(camera),
       channels_{{{writer_on(participant, ViewChannel::kView), budget_of(config.bytes_per_s)},
-                 {writer_on(participant, ViewChannel::kMesh), budget_of(config.mesh_bytes_per_s)},
+                 {writer_on(participant, ViewChannel::kMesh), budget_of(config.mesh_bytes_per_s())},
                  {writer_on(participant, ViewChannel::kImages), budget_of(kUnlimited)}}},
-      past_budget_(budget_of(config.past_bytes_per_s)),
+      past_budget_(budget_of(config.past_bytes_per_s())),
       selector_(self_),
       schedule_(mesh.min_move_m),
-      layers_(self_, kLayerShare * config.mesh_bytes_per_s),
+      layers_(self_, kLayerShare * config.mesh_bytes_per_s()),
       worker_(
           kQueue, Overflow::kDropOldest, [this](const Input& input) { step(input); },
           ViewConfig::kSection, steady_duration(kTick_s), [] { return Tick(); }) {
@@ -62,9 +62,6 @@ ViewNode::ViewNode(const ViewConfig& config, const DdsParticipant& participant,
   topics.outcomes.subscribe(post);
   topics.restored_outcomes.subscribe(post);
   topics.closures.subscribe(post);
-  topics.judgements.subscribe(post);
-  topics.pose_changes.subscribe(post);
-  topics.samples.subscribe(post);
   topics.restarts.subscribe(post);
   topics.objects.subscribe(post);
   topics.maps_2d.subscribe(post);
@@ -207,7 +204,7 @@ void ViewNode::send_rest() {
     double bytes = 0.0;
     const double late_s = now_s + ViewSelector::kKeyframePeriod_s;  // Time at which all updates are
                                                                     // due.
-    while (bytes < kRest_s * config_.past_bytes_per_s) {
+    while (bytes < kRest_s * config_.past_bytes_per_s()) {
       const auto content = selector_.next(late_s);
       if (!content) break;
       bytes += static_cast<double>(write(view, *content));
@@ -216,7 +213,7 @@ void ViewNode::send_rest() {
   if (sends_mesh_) {
     if (!is_cut_) cut_mesh(now_s);
     double bytes = 0.0;
-    while (bytes < kMeshRest_s * config_.mesh_bytes_per_s) {
+    while (bytes < kMeshRest_s * config_.mesh_bytes_per_s()) {
       const auto content = next_of_map(kUnlimited);
       if (!content) break;
       bytes += static_cast<double>(write(mesh, *content));

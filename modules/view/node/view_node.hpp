@@ -33,9 +33,6 @@ struct ViewTopics {
   In<KeyframeOdometry> keyframes;
   In<ClosureOutcome> outcomes, restored_outcomes;
   In<Closure> closures;  ///< Closures of both ends.
-  In<ClosureJudgements> judgements;
-  In<PoseChanges> pose_changes;
-  In<RobotSample> samples;
   In<PeerEvent> restarts;
   In<ObjectList> objects;
   In<OccupancyGrid> maps_2d;
@@ -69,6 +66,12 @@ class ViewNode final : public Node {
 
   /// True if a viewer reads the map. Thread-safe.
   [[nodiscard]] bool has_map_viewers() const { return sends_mesh_; }
+  /// Sends an event of the recorder: ClosureJudgements, PoseChanges or RobotSample. Thread-safe;
+  /// does not wait.
+  template <typename Event>
+  void offer(const Event& event) {
+    worker_.post(std::make_shared<const Event>(event));
+  }
 
   std::string_view name() const override { return ViewConfig::kSection; }
   void start() override { worker_.start(); }

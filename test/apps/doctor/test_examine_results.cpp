@@ -76,7 +76,7 @@ TEST_CASE("The doctor gives the reason why candidates were rejected, even if it 
       "alice/loop_closures.csv",
       std::string(kHeader) + "0,1,1,2,0.5,received,40,0,,,,,,,,\"no pose, too few inliers\"\n");
   CHECK_THAT(to_text(examine_results(results.folder.path()).findings),
-             Catch::Contains("most of them: \"no pose, too few inliers\" (1 of 1)"));
+             Catch::Contains("most common reason: \"no pose, too few inliers\" (1 of 1)"));
 }
 
 TEST_CASE("The findings on a single robot are those of its end", "[doctor]") {

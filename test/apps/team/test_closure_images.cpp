@@ -52,13 +52,6 @@ TEST_CASE("Closures that were verified are shown, others not", "[closure_images]
     CHECK(grey_of(images.jpegs.at(id), 16) == Approx(10.0 * (id.index + 1)).margin(kJpeg));
 }
 
-TEST_CASE("Small images are not blown up", "[closure_images]") {
-  const EurocFolder recording;
-  std::vector<RobotResult> robots{robot_on(recording.root(), 0)};
-  robots[0].closures = {closure({0, 1}, {0, 2}, ClosureStage::kInlier)};
-  CHECK(grey_of(closure_images(robots).jpegs.at({0, 1}), 32) > 0.0);
-}
-
 TEST_CASE("If there are too many closures, the rejected ones come first, and a note reports it",
           "[closure_images]") {
   const EurocFolder recording;

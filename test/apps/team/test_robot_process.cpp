@@ -62,15 +62,6 @@ TEST_CASE("Its standard input is empty and its process group its own", "[team]")
   CHECK(script.lines == std::vector<std::string>{"empty", "leader"});
 }
 
-TEST_CASE("A signal reaches the process", "[team]") {
-  Script script("trap 'echo interrupted; exit 0' INT; echo ready; while :; do sleep 0.02; done");
-  while (script.lines.empty()) script.read_once();
-  script.process.send(SIGINT);
-  script.wait();
-  CHECK(script.lines == std::vector<std::string>{"ready", "interrupted"});
-  CHECK(script.process.exit()->ok());
-}
-
 TEST_CASE("A process that a signal ended names the signal", "[team]") {
   Script script("kill -9 $$");
   script.wait();

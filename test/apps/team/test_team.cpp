@@ -84,16 +84,6 @@ TEST_CASE("A team runs its robots, shows their lines and prints the table", "[te
   CHECK_THAT(team.folder.read("out/bob/robot.log"), Catch::Contains("status of bob"));
 }
 
-TEST_CASE("Robots of a team can be watched only with --view", "[team]") {
-  const ScriptedTeam team("exit 0");
-  CHECK_THAT(run_command(team.command).output, !Catch::Contains("--view"));
-  const auto watched = run_command(team.command + " --view");
-  CAPTURE(watched.output);
-  for (const char* name : {"alice", "bob"})
-    CHECK_THAT(team.folder.read(std::string("out/") + name + "/robot.log"),
-               Catch::Contains("--view"));
-}
-
 TEST_CASE("A robot that fails fails the team, with its last words", "[team]") {
   const ScriptedTeam team(
       "[ $name = bob ] && { echo 'out of luck'; echo '  or of fuel'; } >&2 && exit 9; exit 0");
@@ -103,16 +93,6 @@ TEST_CASE("A robot that fails fails the team, with its last words", "[team]") {
   CHECK_THAT(result.output, Catch::Contains("bob   | FAILED: exit code 9, out of luck\n") &&
                                 Catch::Contains("bob failed, exit code 9; its last words:") &&
                                 Catch::Contains("  out of luck"));
-}
-
-TEST_CASE("Robots that all fail at once leave no empty tables", "[team]") {
-  const ScriptedTeam team("rm \"$out/summary.json\"; echo 'no such key' >&2; exit 1");
-  const auto result = run_command(team.command);
-  CAPTURE(result.output);
-  CHECK(result.exit_code == 3);
-  CHECK_THAT(result.output, Catch::EndsWith("alice, bob failed, exit code 1; their last words:\n"
-                                            "  no such key\n") &&
-                                !Catch::Contains("team, one frame"));
 }
 
 TEST_CASE("Results of an earlier run are not shown for a robot that fails", "[team]") {
@@ -160,31 +140,6 @@ TEST_CASE("An interrupt is passed on once and the table still printed", "[team]"
   CHECK_THAT(result.output,
              Catch::Contains("alice interrupted") && Catch::Contains("bob   | bob interrupted"));
   CHECK_THAT(result.output, Catch::Contains("team, one frame"));
-}
-
-TEST_CASE("Robots die with a team program that is killed", "[team]") {
-  const ScriptedTeam team(
-      "echo $$ > \"$out/pid.new\"; mv \"$out/pid.new\" \"$out/pid\"\n"
-      "while :; do sleep 0.05; done");
-  sigset_t none;
-  sigemptyset(&none);
-  RobotProcess program({"/bin/sh", "-c", "exec " + team.command}, none, team.folder.path() / "log");
-  const fs::path pid_file = team.folder.path() / "out/bob/pid";
-  while (!fs::exists(pid_file) && !program.exit()) program.read();
-  REQUIRE_FALSE(program.exit());
-  program.send(SIGKILL);
-  while (!program.exit()) program.read();
-
-  std::string pid = team.folder.read("out/bob/pid");
-  pid.pop_back();  // end of line
-  const auto is_alive =
-      [&pid] {  // without a process that collects orphans they remain as zombies: (name) Z
-        std::string stat;
-        std::getline(std::ifstream("/proc/" + pid + "/stat"), stat);
-        return !stat.empty() && stat.find(") Z ") == stat.npos;
-      };
-  while (is_alive()) std::this_thread::yield();  // fails by the time limit of the test
-  SUCCEED("robot ended");
 }
 
 TEST_CASE("With bad links each robot is in a network of its own", "[team][namespaces]") {

@@ -347,13 +347,6 @@ TEST_CASE("Meshes are compared with the true one, before and after their correct
         0.97);
 }
 
-TEST_CASE("Without maps there is no table and no note", "[team]") {
-  Team team;
-  CHECK(team.meshes().merged.empty());
-  CHECK(team.notes.empty());
-  CHECK_THAT(to_table(HalfTeam().collect()), !Contains("\nmesh "));
-}
-
 TEST_CASE("Meshes without a true one are merged, and broken ones named", "[team]") {
   Team team;
   team.leave("a", "mesh_optimized.ply", corner());
@@ -363,13 +356,6 @@ TEST_CASE("Meshes without a true one are merged, and broken ones named", "[team]
   CHECK_FALSE(meshes.errors.has_value());
   REQUIRE(team.notes.size() == 1);
   CHECK_THAT(team.notes[0], Contains("b/mesh_optimized.ply"));
-}
-
-TEST_CASE("Columns are aligned", "[team]") {
-  CHECK(align_columns({{"a", "bb"}, {"ccc", "d"}}) == "a    bb\nccc   d\n");
-  CHECK(bytes_text(999) == "999 B");
-  CHECK(bytes_text(1500) == "1.5 kB");
-  CHECK(fixed(1.0 / 0.0, 2) == "-");
 }
 
 }  // namespace km

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/viewer/page_message.hpp"
+#include "test/modules/view/some_updates.hpp"
 
 namespace km {
 namespace {
@@ -81,14 +82,20 @@ TEST_CASE("A mesh is sent as its arrays, one after the other", "[page_message]")
   std::memcpy(numbers.data(), data.data(), sizeof(numbers));
   CHECK(numbers == std::array<std::uint16_t, 12>{1, 2, 3, 4, 5, 6, 7, 8, 65535, 0, 1, 2});
   CHECK(data.substr(sizeof(numbers)) == "\x09\x08\x07");
+  CHECK_FALSE(object.contains("team"));  // a chunk of another robot is of the mesh of the team
+  CHECK(parts_of(page_message({2, 1, 0, chunk}, 1)).first["team"] == true);
 }
 
-TEST_CASE("The chunks of the fused mesh of the team are marked", "[page_message]") {
-  MeshChunk chunk{.key = {3, {0, 0, 0}, 0}};
-  chunk.offsets = {{1, 2, 3}, {4, 5, 6}, {7, 8, 9}};
-  chunk.faces = {{0, 1, 2}};
-  CHECK_FALSE(parts_of(page_message({3, 1, 0, chunk}, 1)).first.contains("team"));
-  CHECK(parts_of(page_message({2, 1, 0, chunk}, 1)).first["team"] == true);
+// The page shows every member of an update.
+TEST_CASE("Updates of every kind are the same for the page after encoding and decoding",
+          "[page_message]") {
+  for (const ViewContent& content : updates_of_all_kinds()) {
+    const PageMessage sent = page_message({0, 1, 0, content}, 1);
+    CAPTURE(sent.bytes);
+    const auto received = decode_view(encode_view(content));
+    REQUIRE(received);
+    CHECK(page_message({0, 1, 0, *received}, 1).bytes == sent.bytes);
+  }
 }
 
 TEST_CASE("An object is sent with its label, box and robots", "[page_message]") {

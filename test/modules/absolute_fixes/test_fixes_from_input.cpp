@@ -170,15 +170,14 @@ TEST_CASE("the node publishes live fixes", "[absolute_fixes]") {
   constexpr Stamp kSecond_ns = 1'000'000'000;
   Topic<OdometryState> states, restored;
   Topic<KeyframeOdometry> keyframes;
-  Topic<ReceivedFix> received;
   Topic<PositionFix> fixes;
   std::vector<Stamp> journaled;
-  received.subscribe([&](const auto& fix) { journaled.push_back(fix->stamp); });
   std::vector<PositionFix> published;
   fixes.subscribe([&](const auto& fix) { published.push_back(*fix); });
   FixesNode node({.reader = FixReader(motion_capture_config("/pose")),
                   .live = std::make_unique<TwoTopics>(std::vector{pose_stamped(1)})},
-                 {states, restored, keyframes, received, fixes});
+                 {states, restored, keyframes, fixes,
+                  [&](const ReceivedFix& fix) { journaled.push_back(fix.stamp); }});
   for (Stamp t = 0; t <= 4; ++t) {
     OdometryState state;
     state.stamp = t * kSecond_ns;

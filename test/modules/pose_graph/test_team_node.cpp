@@ -35,7 +35,6 @@ struct Robot {
             .inlier_sets = inlier_sets,
             .peer_inlier_sets = peer_inlier_sets,
             .restored_inlier_sets = restored_inlier_sets,
-            .restored_solution = restored_solution,
             .peer_events = peer_events,
             .restarts = restarts,
             .links = links,
@@ -91,7 +90,6 @@ struct Robot {
   Topic<Closure> closures;
   Topic<PositionFix> fixes;
   Topic<InlierSet> inlier_sets, peer_inlier_sets, restored_inlier_sets;
-  Topic<TeamSolution> restored_solution;
   Topic<PeerEvent> peer_events, restarts;
   Topic<LinksReport> links;
   Topic<TeamMessage> peer_messages, messages;

@@ -19,7 +19,6 @@ struct Played {
   Topic<KeyframeOdometry> odometry_topic;
   Topic<Keyframe> keyframe_topic;
   Topic<RelativePose> closure_topic;
-  Topic<GraphPlaybackEnd> end_topic;
   std::vector<KeyframeOdometry> odometry;
   std::vector<Keyframe> keyframes;
   std::vector<RelativePose> closures;
@@ -33,13 +32,12 @@ struct Played {
       closures.push_back(*m);
       keyframes_before_closure.push_back(keyframes.size());
     });
-    end_topic.subscribe([this](const auto& m) { ends.push_back(*m); });
   }
   GraphPlaybackTopics topics() {
     return {.odometry = odometry_topic,
             .keyframes = keyframe_topic,
             .closures = closure_topic,
-            .end = end_topic};
+            .end = [this](const GraphPlaybackEnd& end) { ends.push_back(end); }};
   }
 };
 
@@ -159,8 +157,12 @@ TEST_CASE("The playback thread plays to the end at any rate", "[playback]") {
   const RecordedGraph graph = recording(rng);
   Played played;
   std::promise<void> over;
-  played.end_topic.subscribe([&](const auto&) { over.set_value(); });
-  GraphPlaybackNode node(GraphPlaybackConfig{}, rate, graph, played.topics());
+  GraphPlaybackTopics topics = played.topics();
+  topics.end = [&](const GraphPlaybackEnd& end) {
+    played.ends.push_back(end);
+    over.set_value();
+  };
+  GraphPlaybackNode node(GraphPlaybackConfig{}, rate, graph, topics);
   node.start();
   over.get_future().wait();
   node.stop();

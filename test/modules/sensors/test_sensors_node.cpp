@@ -48,13 +48,15 @@ class FakeReader final : public DatasetReader {
 
 struct Run {
   SensorsTopics topics() {
-    return {.processed = processed, .packets = packets, .load = load, .end = end};
+    return {.processed = processed,
+            .packets = packets,
+            .load = load,
+            .end = [this](const SensorsEnd& end) { ended.set_value(end); }};
   }
 
   Topic<ProcessedFrame> processed;
   Topic<SensorPacket> packets;
   Topic<ShedLoad> load;
-  Topic<SensorsEnd> end;
   std::vector<Stamp> stamps;
   std::promise<SensorsEnd> ended;
 
@@ -63,7 +65,6 @@ struct Run {
       stamps.push_back(packet->frame->stamp);
       processed.publish(ProcessedFrame{packet->frame->stamp, 1.0});
     });
-    end.subscribe([this](const auto& message) { ended.set_value(*message); });
   }
 };
 

@@ -1,7 +1,7 @@
 #include <catch2/catch.hpp>
 
 #include "modules/core/lie.hpp"
-#include "modules/ros_dds/live_frames.hpp"
+#include "modules/core/live_frames.hpp"
 
 namespace km {
 namespace {

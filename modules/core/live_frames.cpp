@@ -1,4 +1,4 @@
-#include "modules/ros_dds/live_frames.hpp"
+#include "modules/core/live_frames.hpp"
 
 #include <algorithm>
 
