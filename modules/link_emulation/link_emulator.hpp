@@ -129,8 +129,8 @@ class LinkEmulator {
   /// has no group for a robot. Also throws it for a path that is empty or goes back in time.
   explicit LinkEmulator(LinkScript script);
 
-  /// The recording of `robot` is at `recorded_s` [s since its start] and goes on at the rate of the
-  /// script. Without this call it starts with the run and never waits.
+  /// The recording of `robot` is at `recorded_s` [s since its start] and continues at the rate of
+  /// the script. Without this call it starts with the run and never waits.
   void set_progress(std::size_t robot, double now_s, double recorded_s);
 
   /// Sends a frame of robot `from` to the robot whose ethernet_address() it bears, or, by broadcast
