@@ -20,7 +20,7 @@ RosImage message_of(Stamp stamp, const GrayImage& image, const char* frame) {
           .height = static_cast<std::uint32_t>(image.height),
           .width = static_cast<std::uint32_t>(image.width),
           .encoding = "mono8",
-          .is_bigendian = false,
+          .is_bigendian = 0,
           .step = static_cast<std::uint32_t>(image.width),
           .data = image.pixels};
 }
@@ -30,7 +30,7 @@ RosImage message_of(Stamp stamp, const DepthImage& image) {
                    .height = static_cast<std::uint32_t>(image.height),
                    .width = static_cast<std::uint32_t>(image.width),
                    .encoding = "16UC1",
-                   .is_bigendian = false,
+                   .is_bigendian = 0,
                    .step = static_cast<std::uint32_t>(2 * image.width),
                    .data = {}};
   ByteWriter data;

@@ -9,7 +9,6 @@
 #include "apps/publish/euroc_messages.hpp"
 #include "apps/publish/fix_messages.hpp"
 #include "apps/publish/message_player.hpp"
-#include "apps/publish/pose_latency.hpp"
 #include "modules/absolute_fixes/fix_reader.hpp"
 #include "modules/core/text_table.hpp"
 #include "modules/recordings/open_bag.hpp"
@@ -50,7 +49,6 @@ struct Options {
   PlayOptions play;
   std::size_t wait = 0;
   double patience_s = 300.0;
-  std::string latency;
   std::filesystem::path fixes;
   std::string fix_topic = "/fix", fix_type = FixMessages::kGnssType;
 };
@@ -77,10 +75,6 @@ Options options_of(int argc, char** argv) {
                  "Longest wait for these readers [s]; then the program ends")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  app.add_option(
-      "--latency", options.latency,
-      "Topic of a robot's nav_msgs/Odometry (/robot0/odometry), to measure the time from an image "
-      "to its pose");
   app.add_option("--fixes", options.fixes,
                  "File of absolute fixes to play on a topic of their own: rows of a stamp and "
                  "latitude, longitude [deg], altitude [m], or x, y, z [m]; stamps in ns in a .csv "
@@ -185,11 +179,6 @@ bool wait_for_readers(const MessagePlayer& player, const Options& options, Signa
 void play(const Options& options, SignalWatch& signals) {
   const auto network = std::make_shared<const RosNetwork>(options.ros);
   MessagePlayer player(open(options), network, options.play);
-  std::optional<PoseLatency> latency;
-  if (!options.latency.empty()) {
-    latency.emplace(network, options.latency);
-    player.on_image([&latency](Stamp stamp) { latency->sent(stamp); });
-  }
   for (const std::string& topic : player.unsupported_topics())
     log::warn("publish") << "left out, its type is not known: " << topic;
   if (player.topics().empty()) throw std::invalid_argument("there is no topic to play");
@@ -205,9 +194,6 @@ void play(const Options& options, SignalWatch& signals) {
     if (progress.is_due()) log::info("publish") << fixed(player.played_s(), 1) << " s played";
   ended = true;
   std::cout << table(player.topics());
-  if (!latency) return;
-  static_cast<void>(signals.wait(1.0));  // time for the last messages to arrive
-  std::cout << latency->text() << '\n';
 }
 
 }  // namespace

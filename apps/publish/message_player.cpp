@@ -33,8 +33,8 @@ std::optional<std::vector<std::uint8_t>> as_published(const BagChannel& channel,
   constexpr std::uint8_t kLittleEndian = 1;
   if (channel.encoding == "cdr" && bytes.size() > 4 && bytes[1] == kLittleEndian) return bytes;
   return as_ros_2<RosImage, RosCompressedImage, RosImu, RosCameraInfo, RosNavSatFix, RosPoseStamped,
-                  RosPoseWithCovarianceStamped, RosTransform, RosOdometry, RosPath, RosTransforms,
-                  RosPointCloud, RosDiagnostics>(channel, bytes);
+                  RosPoseWithCovarianceStamped, RosTransformStamped, RosOdometry, RosPath,
+                  RosTFMessage, RosPointCloud2, RosDiagnosticArray>(channel, bytes);
 }
 
 bool is_known(const BagChannel& channel) {
@@ -71,9 +71,8 @@ MessagePlayer::MessagePlayer(std::unique_ptr<BagReader> recording,
     const RosQos qos = channel.topic == kLatchedTopic ? RosQos::kLatched
                        : options.reliable             ? RosQos::kReliable
                                                       : RosQos::kSensorData;
-    const std::string type = is_of_type(channel, RosTransforms::kType)
-                                 ? std::string(RosTransforms::kType)
-                                 : channel.type;
+    const std::string type =
+        is_of_type(channel, RosTFMessage::kType) ? std::string(RosTFMessage::kType) : channel.type;
     publishers_.push_back(
         std::make_unique<RosPublisher>(network, channel.topic, type, qos, kKeptMessages));
   }
@@ -127,14 +126,6 @@ void MessagePlayer::schedule(BagMessage message) {
   due_.push({message.log_time + nanoseconds(delay_s), number_++, topic, std::move(*bytes)});
 }
 
-void MessagePlayer::notify_image(const Due& due) const {
-  const auto is_image = [](const PlayedTopic& topic) { return topic.type.ends_with("Image"); };
-  const auto first = std::ranges::find_if(topics_, is_image);
-  if (first == topics_.end() || std::cmp_not_equal(first - topics_.begin(), due.topic)) return;
-  const auto header = decode_ros<RosHeader>("cdr", due.bytes);
-  if (header.value) on_image_(header.value->stamp);
-}
-
 bool MessagePlayer::step() {
   while (!ended_ && (due_.empty() || *newest_ <= due_.top().stamp)) {
     auto message = recording_->next();
@@ -142,7 +133,6 @@ bool MessagePlayer::step() {
   }
   if (due_.empty() || !clock_.wait_until(due_.top().stamp)) return false;
   const Due& due = due_.top();
-  if (on_image_) notify_image(due);
   publishers_[due.topic]->publish(due.bytes);
   ++topics_[due.topic].published;
   played_s_ = seconds_between(*first_, due.stamp);

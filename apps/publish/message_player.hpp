@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -54,9 +53,6 @@ class MessagePlayer {
   /// Publishes the next message when it is due; false after the last one, and after stop().
   bool step();
 
-  /// Calls `notify` with the stamp of each image of the first image topic before it is published.
-  void on_image(std::function<void(Stamp)> notify) { on_image_ = std::move(notify); }
-
   /// Ends step(). Thread-safe.
   void stop() { clock_.stop(); }
 
@@ -78,7 +74,6 @@ class MessagePlayer {
 
   [[nodiscard]] bool take(BagMessage message);
   void schedule(BagMessage message);
-  void notify_image(const Due& due) const;
 
   std::unique_ptr<BagReader> recording_;
   PlayOptions options_;
@@ -93,7 +88,6 @@ class MessagePlayer {
   bool ended_ = false;
   std::uint64_t number_ = 0;
   double played_s_ = 0.0;
-  std::function<void(Stamp)> on_image_;
 };
 
 }  // namespace km

@@ -108,7 +108,7 @@ TEST_CASE("Playing waits for readers of images and inertial samples alone", "[pu
   auto bag = samples("/f");
   for (const auto& [topic, type] : {std::pair("/left", RosCompressedImage::kType),
                                     std::pair("/left_info", RosCameraInfo::kType),
-                                    std::pair("/tf_static", RosTransforms::kType)})
+                                    std::pair("/tf_static", RosTFMessage::kType)})
     bag->describe(topic, type);
   const MessagePlayer player(std::move(bag), network(), {});
   CHECK(player.topics().size() == 4);
@@ -148,7 +148,7 @@ TEST_CASE("Fixes are played in the order of time with the messages of the record
     CHECK(decode_ros<RosHeader>("cdr", message->bytes).value->stamp == message->log_time);
     if (gnss) {
       const RosNavSatFix fix = *decode_ros<RosNavSatFix>("cdr", message->bytes).value;
-      CHECK(fix.status >= 0);
+      CHECK(fix.status.status >= 0);
       fixes.emplace_back(fix.latitude, fix.longitude, fix.altitude);
     } else {
       fixes.push_back(decode_ros<RosPoseStamped>("cdr", message->bytes).value->pose.position);
