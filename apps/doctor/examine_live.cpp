@@ -33,16 +33,17 @@ Finding silent(const ListenedTopic& wanted, const std::vector<ListenedTopic>& to
     return plain(other.type) == plain(wanted.type) ? 1 + (end - wanted.topic.begin()) : 0;
   };
   const auto similar = std::ranges::max_element(publishers, {}, alike);
-  finding.what = "nothing on " + wanted.topic + " (" + wanted.type + ')';
-  finding.means = "the robot waits for it";
+  finding.what = "no message on " + wanted.topic + " (" + wanted.type + ')';
+  finding.means = "the robot waits for this topic";
   if (same != publishers.end() && plain(same->type) != plain(wanted.type)) {
     finding.id = "live.other_type";
     finding.what += ": its publisher sends " + same->type;
-    finding.to_do = "a topic of " + wanted.type + ": compressed images have /compressed at the end";
+    finding.to_do =
+        "name a topic of " + wanted.type + ": those of compressed images end with /compressed";
   } else if (same != publishers.end()) {
     finding.what += ", although a program publishes it";
     finding.to_do =
-        "see whether the driver has data; large images need net.core.rmem_max of "
+        "check that the driver has data; large images need a net.core.rmem_max of several "
         "megabytes";
   } else if (similar != publishers.end() && alike(*similar) > 0) {
     finding.id = "live.similar_name";
@@ -50,7 +51,7 @@ Finding silent(const ListenedTopic& wanted, const std::vector<ListenedTopic>& to
     finding.to_do = "name the topic in the rig file as the driver does";
   } else {
     finding.what += ": no program publishes it";
-    finding.to_do = "start the driver; see ROS_DOMAIN_ID (ros.domain) and ros.interface";
+    finding.to_do = "start the driver; check ROS_DOMAIN_ID (ros.domain) and ros.interface";
   }
   return finding;
 }
@@ -70,8 +71,9 @@ Examination examine_topics(const std::vector<ListenedTopic>& topics,
         {.id = "live.no_publishers",
          .severity = Severity::kError,
          .what = "no program publishes a topic on domain " + std::to_string(domain) + " of ROS",
-         .means = "drivers do not run, or on another domain or interface",
-         .to_do = "ROS_DOMAIN_ID of the drivers is ros.domain here; ros.interface, ros.peers"});
+         .means = "no driver runs, or the drivers use another domain or interface",
+         .to_do = "set ros.domain to the ROS_DOMAIN_ID of the drivers; check ros.interface and "
+                  "ros.peers"});
     return result;
   }
   for (const ListenedTopic& topic : topics)

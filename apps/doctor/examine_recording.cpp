@@ -13,7 +13,6 @@
 #include "modules/core/input_file.hpp"
 #include "modules/core/text_table.hpp"
 #include "modules/diagnosis/examine_sensors.hpp"
-#include "modules/diagnosis/examine_words.hpp"
 #include "modules/place_recognition/vocabulary_file.hpp"
 #include "modules/sensors/node/rig_file.hpp"
 #include "runtime/clock.hpp"
@@ -24,12 +23,12 @@ namespace {
 Examination refused(const std::string& why) {
   return {
       .figures = {},
-      .findings = {{.id = "recording.refused",
-                    .severity = Severity::kError,
-                    .what = why,
-                    .means = "no robot can play it",
-                    .to_do = "as the line states; kimera_multi_robot --inspect shows what is in "
-                             "it"}}};
+      .findings = {
+          {.id = "recording.refused",
+           .severity = Severity::kError,
+           .what = why,
+           .means = "no robot can play this input",
+           .to_do = "correct the stated fault; kimera_multi_robot --inspect lists the contents"}}};
 }
 
 // Stops a live reader after some seconds, also while the reader waits for silent sensors.
@@ -72,7 +71,7 @@ Examination examine_packets(DatasetReader& reader, const RobotConfig& config, do
     result.findings.push_back({.id = "recording.remark",
                                .severity = Severity::kNote,
                                .what = remark,
-                               .means = "it is read like this"});
+                               .means = "the reader takes this into account"});
   if (sample.frames.empty()) return result;
   const StereoRig& rig = reader.rig().stereo;
   result.add(examine_images(sample));

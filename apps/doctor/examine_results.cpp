@@ -20,8 +20,8 @@ Finding unfinished_run(const fs::path& folder) {
           .severity = Severity::kWarning,
           .what = unfinished(folder),
           .means =
-              "its trajectory, closures and map are not written yet; up to its last second they "
-              "are in run.journal",
+              "trajectory, closures and map are not written yet; run.journal holds them up to the "
+              "last second",
           .to_do = way_on(folder)};
 }
 
@@ -30,7 +30,7 @@ Finding missing(const char* file, const std::string& why) {
   return {.id = std::string("results.") + file,
           .severity = Severity::kNote,
           .what = why,
-          .means = "its content is not examined"};
+          .means = "this file is not examined"};
 }
 
 std::map<RobotId, ClosureTally> tallies_in(const fs::path& folder, RobotId self) {

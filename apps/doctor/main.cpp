@@ -9,7 +9,7 @@
 #include "apps/doctor/examine_live.hpp"
 #include "apps/doctor/examine_recording.hpp"
 #include "apps/doctor/examine_results.hpp"
-#include "apps/doctor/network_probe.hpp"
+#include "apps/doctor/network_facts.hpp"
 #include "apps/output_file.hpp"
 #include "apps/program_options.hpp"
 #include "apps/stage_progress.hpp"
@@ -25,7 +25,7 @@ constexpr int kUnusable = 2;
 
 constexpr const char* kAbout =
     "Finds faults of a recording, of live sensors, of the network between robots, or of a run. "
-    "Each finding has its figure, its meaning and a remedy.";
+    "Each finding states a number, its consequence and a remedy.";
 
 constexpr const char* kFooter = R"(
 PATH is a recording (folder of EuRoC/ASL, KITTI odometry, TUM RGB-D or 7-Scenes; a bag of ROS 1 or 2 or an MCAP file, with --rig), or the results of
@@ -47,7 +47,7 @@ Examples
 
 A quantity that motion and images do not determine is listed, and is no finding. Turn the camera about two
 axes to determine it.
-Exit codes: 0 sound; 1 warnings; 2 it will not work, or this command line or PATH cannot be used.)";
+Exit codes: 0 sound; 1 warnings; 2 errors, or an unusable command line or PATH.)";
 
 struct Options {
   RobotOptions robot;

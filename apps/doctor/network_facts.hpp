@@ -1,13 +1,13 @@
 #pragma once
 
-#include <array>
 #include <cstddef>
-#include <cstdint>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
+#include "apps/doctor/examine_recording.hpp"
 #include "modules/diagnosis/examination.hpp"
 #include "runtime/dds/dds_config.hpp"
 #include "runtime/dds/participant.hpp"
@@ -15,23 +15,11 @@
 
 namespace km {
 
-/// A DDS participant by its announcement.
-struct AnnouncedParticipant {
-  /// GUID prefix of the participant's process; zero if unknown.
-  std::array<std::uint8_t, 12> guid_prefix = {};
-  int domain = 0;
-  std::string team = {};                       ///< Domain tag of the team.
-  std::string from = {};                       ///< Address of the sender.
-  std::string user_data = {};                  ///< User data as received; often empty for programs
-                                               ///< that are no robots.
-  std::optional<RobotIdentity> identity = {};  ///< Identity of a robot with readable user data.
+/// A robot of the team that DDS discovered, or a program that announces itself as one.
+struct DiscoveredRobot {
+  std::string address = {};                    ///< As DDS states it: "udp/10.0.0.2:7411".
+  std::optional<RobotIdentity> identity = {};  ///< Absent if its announcement is not readable.
 };
-
-/// The participant that a packet of DDS discovery announces; nullopt for other bytes. `from`:
-/// address of the sender. `domain`: domain of the socket that received the packet. RTPS 2.5, 8.5.3
-/// and 9.6.3.2 (SPDPdiscoveredParticipantData).
-[[nodiscard]] std::optional<AnnouncedParticipant> parse_announcement(
-    const std::vector<std::uint8_t>& packet, int domain, const std::string& from);
 
 /// Result of echo requests to a peer.
 struct PeerEcho {
@@ -55,26 +43,28 @@ struct NetworkFacts {
   std::optional<NetworkInterface> chosen = {};
   std::string no_interface = {};  ///< Reason why no interface was chosen.
   std::optional<int> mtu = {};
-  std::optional<std::string> no_multicast =
-      {};  ///< Reason why an own datagram to the group did not come back.
-  std::optional<std::string> no_unicast =
-      {};  ///< Reason why an own datagram to the own address did not come back.
-  std::optional<long> largest_receive_buffer = {};   ///< net.core.rmem_max [B].
-  std::vector<AnnouncedParticipant> announced = {};  ///< Participants on all domains up to
-                                                     ///< kLastQuietDomain.
-  std::vector<AnnouncedParticipant> received = {};   ///< Participants that DDS itself receives as
-                                                     ///< configured, also by address.
+  /// Reason why a test datagram to the group of discovery was not received.
+  std::optional<std::string> no_multicast = {};
+  /// Reason why a test datagram to the own address was not received.
+  std::optional<std::string> no_unicast = {};
+  std::optional<long> largest_receive_buffer = {};  ///< net.core.rmem_max [B].
+  std::vector<DiscoveredRobot> robots = {};  ///< Found on the domain and in the team of `config`.
+  /// Addresses that announce themselves to DDS discovery on other domains up to kLastQuietDomain.
+  std::map<int, std::set<std::string>> other_domains = {};
+  std::size_t ros_topics = 0;  ///< Topics of ROS 2 on the domain of `config`.
   double listened_s = 0.0;
   std::vector<PeerEcho> echoes = {};
   std::vector<ClockDifference> clocks = {};
 };
 
-/// Findings on the facts. Ids: network.interface, network.several_interfaces, network.loopback,
-/// network.no_multicast_flag,
-/// network.multicast, network.firewall, network.mtu, network.buffers, network.domain_ports,
-/// network.other_domain, network.other_team, network.protocol, network.same_id,
-/// network.other_programs, `network.no_peers`, network.unreachable, network.loss, network.slow,
-/// network.clock.
+/// Examines the network of `config` for `listen_s` [s], without taking part in a session. The
+/// function sends datagrams to its own host, by multicast and by address, and echo requests to the
+/// peers. A participant that is no robot discovers the robots on the domain of `config`. Throws
+/// DdsError if DDS refuses the configuration.
+[[nodiscard]] NetworkFacts probe_network(const DdsConfig& config, double listen_s,
+                                         const ReportProgress& report_progress);
+
+/// Findings on the facts; the README lists them.
 [[nodiscard]] Examination examine_network(const NetworkFacts& facts);
 
 }  // namespace km

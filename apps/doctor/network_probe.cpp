@@ -1,5 +1,3 @@
-#include "apps/doctor/network_probe.hpp"
-
 #include <envelope.h>
 #include <net/if.h>
 #include <poll.h>
@@ -12,14 +10,17 @@
 #include <limits>
 #include <memory>
 #include <random>
-#include <span>
+#include <set>
 
+#include "apps/doctor/network_facts.hpp"
 #include "apps/doctor/udp_socket.hpp"
 #include "modules/core/input_file.hpp"
 #include "modules/core/text_rows.hpp"
 #include "runtime/clock.hpp"
+#include "runtime/dds/participant.hpp"
 #include "runtime/dds/qos.hpp"
 #include "runtime/dds/robot_status.hpp"
+#include "runtime/dds/ros_discovery.hpp"
 #include "runtime/dds/user_data.hpp"
 
 namespace km {
@@ -70,7 +71,7 @@ std::optional<std::string> echo_to(DatagramSocket& socket, const std::string& ad
     if (const auto datagram = socket.receive(milliseconds(50));
         datagram && datagram->bytes == bytes)
       return std::nullopt;
-  return "an own datagram did not come back in " + std::to_string(kPatience.count()) + " ms";
+  return "the test datagram was not received in " + std::to_string(kPatience.count()) + " ms";
 }
 
 std::optional<std::string> try_multicast(const DdsConfig& config, const NetworkInterface& chosen) {
@@ -85,53 +86,47 @@ std::optional<std::string> try_unicast(const NetworkInterface& chosen) {
   return echo_to(socket, chosen.address);
 }
 
-// Adds an announcement, unless one with equal domain, team, address and user data is known.
-void keep(std::vector<AnnouncedParticipant>& all, const AnnouncedParticipant& one) {
-  const auto is_same = [&one](const AnnouncedParticipant& other) {
-    return other.domain == one.domain && other.team == one.team && other.from == one.from &&
-           other.user_data == one.user_data;
-  };
-  if (std::ranges::none_of(all, is_same)) all.push_back(one);
-}
-
-// Receives the multicast announcements of participants of all domains and teams.
-class DiscoveryListener {
+// Receives multicast announcements of other domains. Their contents are not read.
+class DomainListener {
  public:
-  DiscoveryListener(const DdsConfig& config, const NetworkInterface& chosen) {
-    for (int domain = 0; domain <= std::max(config.domain, static_cast<int>(kLastQuietDomain));
-         ++domain) {
-      if (domain > static_cast<int>(kLastQuietDomain) && domain != config.domain) continue;
+  DomainListener(int own_domain, const NetworkInterface& chosen) {
+    for (int domain = 0; domain <= static_cast<int>(kLastQuietDomain); ++domain) {
+      if (domain == own_domain) continue;
       try {
         DatagramSocket socket = DatagramSocket::udp(discovery_port(domain));
-        if (socket.join(kGroup, chosen.address)) continue;
-        sockets_.push_back(std::move(socket));
-        domains_.push_back(domain);
+        if (!socket.join(kGroup, chosen.address)) sockets_.emplace_back(domain, std::move(socket));
       } catch (const std::system_error&) {  // the port belongs to another program
       }
     }
   }
 
-  // Collects all announcements except for those of `self`.
-  void listen(milliseconds patience, const Guid& self,
-              std::vector<AnnouncedParticipant>& received) {
+  // Adds the addresses of senders to those of their domains.
+  void listen(milliseconds patience, std::map<int, std::set<std::string>>& senders) {
     std::vector<pollfd> waiting;
-    for (const DatagramSocket& socket : sockets_)
+    for (const auto& [domain, socket] : sockets_)
       waiting.push_back({.fd = socket.handle(), .events = POLLIN, .revents = 0});
     if (poll(waiting.data(), waiting.size(), static_cast<int>(patience.count())) <= 0) return;
+    constexpr std::array<std::uint8_t, 4> kRtps = {'R', 'T', 'P', 'S'};  // begins a packet of DDS
     for (std::size_t k = 0; k < sockets_.size(); ++k) {
       if (waiting[k].revents == 0) continue;
-      const auto datagram = sockets_[k].receive(milliseconds(0));
-      if (!datagram) continue;
-      const auto one = parse_announcement(datagram->bytes, domains_[k], datagram->from);
-      if (one && !std::ranges::equal(one->guid_prefix, std::span(self).first<12>()))
-        keep(received, *one);
+      const auto datagram = sockets_[k].second.receive(milliseconds(0));
+      if (datagram && std::ranges::mismatch(kRtps, datagram->bytes).in1 == kRtps.end())
+        senders[sockets_[k].first].insert(datagram->from);
     }
   }
 
  private:
-  std::vector<DatagramSocket> sockets_;
-  std::vector<int> domains_;
+  std::vector<std::pair<int, DatagramSocket>> sockets_;
 };
+
+// The addresses of a participant, as DDS states them. Untrusted.
+std::string addresses_of(const dds_qos_t* qos) {
+  char* value = nullptr;
+  if (!dds_qget_prop(qos, "__NetworkAddresses", &value) || value == nullptr) return {};
+  const std::string result = readable(value, 100);
+  dds_free(value);
+  return result;
+}
 
 // A DDS participant that takes part in discovery only, and that robots ignore.
 class DiscoveryObserver {
@@ -151,30 +146,20 @@ class DiscoveryObserver {
                                     make_reader_qos(TopicKind::kStatus, config).get(), nullptr),
                   "reader of statuses") {}
 
-  [[nodiscard]] Guid guid() const {
-    dds_guid_t guid{};
-    check_dds(dds_get_guid(participant_.handle(), &guid), "cannot read the own identity");
-    return to_guid(guid);
-  }
-
   // Adds the robots that DDS has discovered since the last call. Participants that do not claim to
-  // be robots are ignored.
-  void take(std::vector<AnnouncedParticipant>& received) {
+  // be robots are ignored: the doctor itself, and other programs.
+  void take(std::vector<DiscoveredRobot>& robots) {
     for_each(participants_, [&](const dds_sample_info_t& info, const void* sample) {
       const auto& found = *static_cast<const dds_builtintopic_participant_t*>(sample);
       if (!info.valid_data) return;
-      AnnouncedParticipant one{.guid_prefix = {},
-                               .domain = domain_.config().domain,
-                               .team = domain_.config().team,  // the only team that DDS discovers
-                               .from = {},
-                               .user_data = user_data_of(found.qos),
-                               .identity = {}};
-      if (!claims_to_be_a_robot(one.user_data)) return;  // the doctor, and other programs
-      if (const auto announcement = parse_user_data(one.user_data).value) {
-        one.identity = announcement->identity;
-        of_participant_[info.instance_handle] = to_string(*one.identity);
+      const std::string user_data = user_data_of(found.qos);
+      if (!claims_to_be_a_robot(user_data)) return;
+      DiscoveredRobot& robot = robots.emplace_back();
+      robot.address = addresses_of(found.qos);
+      if (const auto announcement = parse_user_data(user_data).value) {
+        robot.identity = announcement->identity;
+        of_participant_[info.instance_handle] = to_string(*robot.identity);
       }
-      keep(received, one);
     });
   }
 
@@ -285,16 +270,21 @@ PeerEcho ask(const std::string& host) {
 
 void listen(const DdsConfig& config, double listen_s, const ReportProgress& report_progress,
             NetworkFacts& facts) {
-  DiscoveryListener listener(config, *facts.chosen);
+  DomainListener other_domains(config.domain, *facts.chosen);
   DiscoveryObserver observer(config);
+  const RosNetwork ros({.domain = config.domain, .interface = facts.chosen->name});
+  RosDiscovery ros_topics(ros);
   const double start_s = steady_now_s();
   while (steady_now_s() - start_s < listen_s) {
     report_progress("listening", (steady_now_s() - start_s) / listen_s);
-    listener.listen(milliseconds(20), observer.guid(), facts.announced);
-    observer.take(facts.received);
+    other_domains.listen(milliseconds(20), facts.other_domains);
+    observer.take(facts.robots);
     observer.take_clocks();
   }
   facts.listened_s = listen_s;
+  std::set<std::string> topics;
+  for (const TopicPublisher& publisher : ros_topics.publishers()) topics.insert(publisher.topic);
+  facts.ros_topics = topics.size();
   facts.clocks = observer.clocks();
 }
 

@@ -58,10 +58,6 @@ TEST_CASE("The doctor finds a recording sound, or names its fault", "[doctor]") 
     std::swap(left, right);
     CHECK(ids_of(hall, 2) == "stereo.swapped ");
   }
-  SECTION("every tenth right image missing") {
-    std::erase_if(right, [k = 0](const auto& /*image*/) mutable { return k++ % 10 == 4; });
-    CHECK(ids_of(hall, 1) == "recording.left_images_without_a_right_one ");
-  }
   SECTION("no right image at all") {
     for (EurocCopy::Image& image : right) image.file = "/nowhere.png";
     CHECK_THAT(ids_of(hall, 2), Catch::StartsWith("recording."));
@@ -77,7 +73,7 @@ TEST_CASE("The doctor gives the reason why no robot can play a file", "[doctor]"
   };
   folder.write("world.ply", "ply\nformat ascii 1.0\n");
   CHECK_THAT(output_of("world.ply"),
-             Catch::Contains("begins as none of .bag, .mcap and .db3 files do"));
+             Catch::Contains("does not begin like a .bag, .mcap or .db3 file"));
   McapSink record(folder.path() / "record.mcap", [](const std::string& why) { FAIL(why); });
   record.put(record.open({"/rosout", RosLog::kType}), Stamp{1}, encode_ros(RosLog{}));
   record.finish();
@@ -128,22 +124,6 @@ TEST_CASE("The doctor listens to the topics of a rig file, and examines their me
     CAPTURE(sound, part);
     CHECK(sound.find(part) == sound.npos);
   }
-}
-
-TEST_CASE("Live topics without a publisher are not sound: the doctor's exit code is 2",
-          "[doctor]") {
-  const EurocFolder recording;
-  const TemporaryFolder folder;
-  const fs::path rig =
-      folder.write("rig.yaml",
-                   "left: {topic: /cam0/image_raw}\nright: {topic: /cam1/image_raw}\n"
-                   "imu: {topic: /imu0}\ncalibration: " +
-                       fs::absolute(recording.root()).string() + "\n");
-  const CommandResult run = run_command(
-      kDoctor + " --live " + rig.string() +
-      " --set ros.interface=lo --set ros.domain=" + std::to_string(std::random_device()() % 90));
-  CHECK(run.exit_code == 2);
-  CHECK_THAT(run.output, Catch::Contains("live.no_publishers") && !Catch::Contains("sound"));
 }
 
 namespace {
