@@ -8,9 +8,9 @@
 #include "modules/core/text_table.hpp"
 #include "modules/diagnosis/figure_text.hpp"
 #include "modules/diagnosis/focal_fit.hpp"
+#include "modules/diagnosis/image_rotation.hpp"
 #include "modules/diagnosis/inertial_fit.hpp"
 #include "modules/diagnosis/stereo_fit.hpp"
-#include "modules/diagnosis/visual_rotations.hpp"
 #include "modules/evaluation/statistics.hpp"
 
 namespace km {
@@ -31,10 +31,11 @@ void examine_relation(const InertialFit& fit, Examination& result) {
       {.id = "imu.unrelated",
        .severity = fit.explained < kUnrelated ? Severity::kError : Severity::kWarning,
        .what = "the gyroscope explains " + percent(std::max(fit.explained, 0.0)) +
-               " of the rotation that images show (" + fixed(kDegrees * fit.image_rms, 1) +
-               " degrees/s), at any offset within " + milliseconds(kMaxOffset_s),
-       .means = "it is not this camera's sensor, or stamps differ by more, or samples are broken",
-       .to_do = "see that both have one clock and are of one robot"});
+               " of the rotation in the images (" + fixed(kDegrees * fit.image_rms, 1) +
+               " degrees/s), at any time offset within " + milliseconds(kMaxOffset_s),
+       .means = "the gyroscope is of another device, its stamps are off by more, or its samples "
+                "are wrong",
+       .to_do = "check that camera and gyroscope are on one robot and use one clock"});
 }
 
 void examine_scale(const InertialFit& fit, Examination& result) {
@@ -45,12 +46,13 @@ void examine_scale(const InertialFit& fit, Examination& result) {
   result.findings.push_back(
       {.id = in_degrees ? "imu.gyro_in_degrees" : "imu.gyro_scale",
        .severity = Severity::kError,
-       .what = "images turn " + rounded(fit.scale, 4) + " times as fast as the gyroscope measures" +
+       .what = "the images rotate " + rounded(fit.scale, 4) +
+               " times as fast as the gyroscope states" +
                (in_degrees ? ", and 1 degree is 0.01745 rad" : ""),
-       .means = in_degrees ? "the gyroscope is in degrees/s: odometry takes it for rad/s"
-                           : "the gyroscope or the focal length is off by this factor",
-       .to_do = in_degrees ? "divide by 57.2958 where the samples are written"
-                           : "check the range that the gyroscope is set to"});
+       .means = in_degrees ? "the gyroscope states degrees/s, but odometry expects rad/s"
+                           : "the gyroscope or the focal length is wrong by this factor",
+       .to_do = in_degrees ? "divide the samples by 57.2958"
+                           : "check the configured range of the gyroscope"});
 }
 
 void examine_direction(const InertialFit& fit, const Camera& left, Examination& result) {
@@ -60,36 +62,38 @@ void examine_direction(const InertialFit& fit, const Camera& left, Examination& 
     result.findings.push_back(
         {.id = "imu.mirrored",
          .severity = Severity::kError,
-         .what = "the gyroscope's axes are left-handed: with one of them the other way round, " +
-                 percent(fit.mirror_gain) + " more of the rotation of images are explained",
+         .what = "the gyroscope's axes are left-handed: with one axis inverted it explains " +
+                 percent(fit.mirror_gain) + " more of the rotation in the images",
          .means = "no mounting of the camera explains this",
-         .to_do = "change the sign of the axis that is mirrored; see the sensor's data sheet"});
+         .to_do = "invert the mirrored axis; the data sheet of the sensor shows the axes"});
     return;
   }
   const double angle = angle_between(R_cam_body, fit.Q);
-  result.figures.push_back({"camera to inertial sensor", "turned by " + fixed(kDegrees * angle, 1) +
-                                                             " degrees against T_body_cam"});
+  result.figures.push_back(
+      {"camera to inertial sensor",
+       "rotated by " + fixed(kDegrees * angle, 1) + " degrees against T_body_cam"});
   if (angle < kOff) return;
   const bool is_inverse = angle > kFar && angle_between(R_cam_body.transpose(), fit.Q) < kClose;
   result.findings.push_back(
       {.id = is_inverse ? "extrinsics.inverted" : "extrinsics.rotation",
        .severity = angle > kFar ? Severity::kError : Severity::kWarning,
-       .what = is_inverse ? "the rotation of T_body_cam (T_BS) is inverted: as it is, it is " +
-                                fixed(kDegrees * angle, 0) + " degrees off, its inverse " +
+       .what = is_inverse ? "the rotation of T_body_cam (T_BS) is inverted: it is " +
+                                fixed(kDegrees * angle, 0) + " degrees off, and its inverse " +
                                 fixed(kDegrees * angle_between(R_cam_body.transpose(), fit.Q), 1)
-                          : "the left camera is turned by " + fixed(kDegrees * angle, 1) +
+                          : "the left camera is rotated by " + fixed(kDegrees * angle, 1) +
                                 " degrees against T_body_cam",
-       .means = "odometry turns the wrong way, or drifts",
-       .to_do = is_inverse ? "write its inverse: T_BS maps the camera's points to the body's"
-                           : "calibrate cameras and inertial sensor together (Kalibr); "
-                             "vio.calibrate makes a few degrees good"});
+       .means = "odometry rotates in the wrong direction, or drifts",
+       .to_do = is_inverse
+                    ? "replace it by its inverse: T_BS maps points from the camera to the body"
+                    : "calibrate cameras and inertial sensor together (Kalibr); "
+                      "vio.calibrate corrects a few degrees"});
 }
 
 void examine_offset(const InertialFit& fit, Examination& result) {
   constexpr double kSmall_s = 3e-3, kLarge_s = 5e-3, kSure = 4.0;
   if (fit.offset_at_limit) {
-    result.figures.push_back({"time offset", "not determined: none within " +
-                                                 milliseconds(kMaxOffset_s) + " fits best"});
+    result.figures.push_back(
+        {"time offset", "not determined: no best offset within " + milliseconds(kMaxOffset_s)});
     return;
   }
   result.figures.push_back({"time offset", milliseconds(fit.offset_s) + " +- " +
@@ -102,9 +106,9 @@ void examine_offset(const InertialFit& fit, Examination& result) {
        .what = "stamps of the inertial sensor are " + milliseconds(std::abs(fit.offset_s)) +
                " (+- " + milliseconds(fit.offset_sigma_s) +
                (fit.offset_s > 0.0 ? ") later" : ") earlier") + " than those of the images",
-       .means = "odometry is worse by the motion in that time until vio.calibrate has found it",
-       .to_do = "camera_time_offset_s: " + rounded(fit.offset_s, 3) +
-                " in the rig file, or stamp both at one instant"});
+       .means = "odometry is less accurate until vio.calibrate has estimated the offset",
+       .to_do = "set camera_time_offset_s: " + rounded(fit.offset_s, 3) +
+                " in the rig file, or stamp both sensors by one clock"});
 }
 
 void examine_focal(const SensorSample& sample, const StereoRig& rig, const VisualRotations& seen,
@@ -125,11 +129,12 @@ void examine_focal(const SensorSample& sample, const StereoRig& rig, const Visua
   result.findings.push_back(
       {.id = "camera.focal",
        .severity = Severity::kWarning,
-       .what = "images move as the gyroscope turns if the focal lengths are " + factor +
-               " times the calibration's",
-       .means = "distances and turns are off by as much",
-       .to_do = "calibrate the cameras again, at the resolution of the images; or the gyroscope's "
-                "scale is off"});
+       .what = "the images agree with the gyroscope if the focal lengths are " + factor +
+               " times those of the calibration",
+       .means = "distances and rotations are wrong by this factor",
+       .to_do =
+           "calibrate the cameras again at the resolution of the images, or check the scale of "
+           "the gyroscope"});
 }
 
 void examine_gravity(const SensorSample& sample, Examination& result) {
@@ -144,16 +149,18 @@ void examine_gravity(const SensorSample& sample, Examination& result) {
   Finding finding{.id = "imu.gravity", .severity = Severity::kError};
   finding.what = "the accelerometer measures " + rounded(found, 3) + " in the median, gravity is " +
                  fixed(kGravity, 2) + " m/s^2";
-  finding.means = "odometry finds no gravity, or a wrong one";
-  finding.to_do = "samples are specific force in m/s^2, gravity included";
+  finding.means = "odometry estimates a wrong direction of gravity";
+  finding.to_do = "write specific force in m/s^2, including gravity";
   if (is_about(1.0) || is_about(1e3)) {
     finding.id = "imu.accel_in_g";
-    finding.means = is_about(1.0) ? "it is in g" : "it is in thousandths of g";
-    finding.to_do = "multiply by " + std::string(is_about(1.0) ? "9.80665" : "0.00980665");
+    finding.means =
+        is_about(1.0) ? "the accelerometer states g" : "the accelerometer states thousandths of g";
+    finding.to_do =
+        "multiply the samples by " + std::string(is_about(1.0) ? "9.80665" : "0.00980665");
   } else if (found < 0.3 * kGravity) {
     finding.id = "imu.no_gravity";
-    finding.means = "gravity was taken off, or it is in another unit";
-    finding.to_do = "the driver has an option for raw acceleration";
+    finding.means = "the driver has subtracted gravity, or uses another unit";
+    finding.to_do = "set the driver to raw acceleration";
   }
   result.findings.push_back(std::move(finding));
 }
@@ -170,8 +177,8 @@ Examination examine_inertial(const SensorSample& sample, const StereoRig& rig) {
   const auto fit = fit_inertial(seen.steps, sample.imu);
   if (!fit || fit->image_rms < kMinRate_radps) {
     result.figures.push_back({"images against the gyroscope",
-                              fit ? "not determined: the camera turns by " +
-                                        fixed(kDegrees * fit->image_rms, 2) + " degrees/s only"
+                              fit ? "not determined: the camera turns by only " +
+                                        fixed(kDegrees * fit->image_rms, 2) + " degrees/s"
                                   : "not determined: " + std::to_string(seen.steps.size()) +
                                         " pairs of images close in time"});
     return result;

@@ -1,8 +1,12 @@
 #pragma once
 
+#include <span>
+#include <vector>
+
 #include "modules/core/camera.hpp"
 #include "modules/diagnosis/examination.hpp"
 #include "modules/diagnosis/sensor_sample.hpp"
+#include "modules/place_recognition/vocabulary.hpp"
 #include "modules/sensors/dataset_reader.hpp"
 
 namespace km {
@@ -30,5 +34,11 @@ namespace km {
 /// extrinsics.inverted, extrinsics.rotation, camera.focal, imu.accel_in_g, imu.no_gravity,
 /// imu.gravity.
 [[nodiscard]] Examination examine_inertial(const SensorSample& sample, const StereoRig& rig);
+
+/// Examines how well the words of a vocabulary distinguish the features of `images`. The measure is
+/// exp(entropy), the number of equally frequent words with the same information. It is compared
+/// with the numbers of features and of words. Id: vocabulary.coverage.
+[[nodiscard]] Examination examine_words(std::span<const std::vector<BinaryDescriptor>> images,
+                                        const Vocabulary& vocabulary);
 
 }  // namespace km

@@ -20,29 +20,29 @@ struct FaultWords {
 
 const std::map<StereoFault, FaultWords> kFaultWords = {
     {StereoFault::kNone,
-     {"stereo.epipolar", "points lie far from their epipolar lines",
-      "calibrate the pair again, at the resolution of the images, with its lens model"}},
+     {"stereo.epipolar", "points are far from their epipolar lines",
+      "calibrate the pair again at the resolution of the images, with its lens model"}},
     {StereoFault::kSwappedImages,
-     {"stereo.swapped", "the left images are the right camera's",
-      "exchange the topics or folders of the two cameras' images"}},
+     {"stereo.swapped", "the images of the left and the right camera are exchanged",
+      "exchange the topics or folders of the two cameras"}},
     {StereoFault::kInvertedPair,
-     {"stereo.inverted", "the pose of the right camera to the left one is inverted",
-      "write T_left_right^-1: a pose of b in a maps b to a"}},
+     {"stereo.inverted", "the pose of the right camera relative to the left one is inverted",
+      "replace T_left_right by its inverse: it maps points from the right camera to the left one"}},
     {StereoFault::kInvertedCameras,
      {"stereo.inverted_cameras", "both T_body_cam (T_BS) are inverted",
-      "write their inverses: T_BS maps the camera's points to the body's"}},
+      "replace them by their inverses: T_BS maps points from the camera to the body"}},
     {StereoFault::kInvertedLeft,
      {"stereo.inverted_left", "T_body_cam (T_BS) of the left camera is inverted",
-      "write its inverse"}},
+      "replace it by its inverse"}},
     {StereoFault::kInvertedRight,
      {"stereo.inverted_right", "T_body_cam (T_BS) of the right camera is inverted",
-      "write its inverse"}},
+      "replace it by its inverse"}},
     {StereoFault::kExchangedLenses,
      {"stereo.exchanged_lenses",
       "focal lengths, centre and distortion of the two cameras are exchanged", "exchange them"}},
     {StereoFault::kFocalLength,
-     {"stereo.focal", "the focal lengths of the two cameras do not go together",
-      "calibrate them again, at the resolution of the images"}},
+     {"stereo.focal", "the focal lengths of the two cameras do not fit each other",
+      "calibrate them again at the resolution of the images"}},
 };
 
 std::string fit_text(const StereoFit& fit) {
@@ -56,33 +56,32 @@ void examine_pair(const StereoAlternative& found, const StereoFit& given, Examin
   if (!is_named && is_sound(given)) return;
   const FaultWords& words = kFaultWords.at(found.fault);
   std::string what = std::string(words.what) + ": " + fit_text(given);
-  if (is_named) what += "; with that undone " + percent(found.fit.inlier_ratio);
+  if (is_named) what += "; with this fault undone " + percent(found.fit.inlier_ratio);
   if (found.fault == StereoFault::kFocalLength)
-    what += " with the right one times " + fixed(found.focal_ratio, 3);
-  result.findings.push_back({.id = words.id,
-                             .severity = Severity::kError,
-                             .what = std::move(what),
-                             .means = "depth is wrong or missing: neither odometry nor closures "
-                                      "work",
-                             .to_do = words.to_do});
+    what += ", with the right focal length times " + fixed(found.focal_ratio, 3);
+  result.findings.push_back(
+      {.id = words.id,
+       .severity = Severity::kError,
+       .what = std::move(what),
+       .means = "depth is wrong or missing, so odometry and loop closures fail",
+       .to_do = words.to_do});
 }
 
 void examine_baseline(const StereoRig& rig, const StereoFit& fit, Examination& result) {
   constexpr double kLeast_m = 0.02, kMost_m = 1.5;
   const double baseline_m = rig.baseline_m();
-  const std::string depth = std::isfinite(fit.depth_m)
-                                ? "points at a median of " + fixed(fit.depth_m, 1) + " m by it"
-                                : "no depth by it";
+  const std::string depth =
+      std::isfinite(fit.depth_m) ? "median depth " + fixed(fit.depth_m, 1) + " m" : "no depth";
   result.figures.push_back({"baseline", fixed(baseline_m, 3) + " m, " + depth +
-                                            " (images do not determine its length)"});
-  if (baseline_m < kLeast_m || baseline_m > kMost_m)
-    result.findings.push_back({.id = "stereo.baseline",
-                               .severity = Severity::kWarning,
-                               .what = "a baseline of " + rounded(baseline_m, 4) +
-                                       " m, where robots have " + fixed(kLeast_m, 2) + " to " +
-                                       fixed(kMost_m, 1) + " m; " + depth,
-                               .means = "all lengths are wrong by the same factor if its unit is",
-                               .to_do = "metres, not millimetres or inches"});
+                                            " (images do not determine the length)"});
+  if (!(baseline_m >= kLeast_m && baseline_m <= kMost_m))
+    result.findings.push_back(
+        {.id = "stereo.baseline",
+         .severity = Severity::kWarning,
+         .what = "a baseline of " + rounded(baseline_m, 4) + " m, outside of the usual " +
+                 fixed(kLeast_m, 2) + " to " + fixed(kMost_m, 1) + " m; " + depth,
+         .means = "if its unit is wrong, all lengths are wrong by the same factor",
+         .to_do = "state the translation in metres, not in millimetres or inches"});
 }
 
 }  // namespace

@@ -27,8 +27,8 @@ Finding fault_finding(ReaderFault fault, const ReaderReport::Entry& entry, doubl
                                      : Severity::kNote,
           .what = std::to_string(entry.count) + ' ' + to_string(fault) + ", " + percent(share) +
                   ", first: " + entry.first,
-          .means = "what is concerned is skipped",
-          .to_do = "repair or record it again, where there are many"};
+          .means = "the affected parts are skipped",
+          .to_do = "repair the recording, or record again if there are many"};
 }
 
 // Number of usable items of the kind that a fault counts. Images are counted per camera, lost
@@ -64,16 +64,16 @@ void examine_rate(const char* sensor, const std::string& id, const std::vector<S
                                .severity = Severity::kWarning,
                                .what = std::string(sensor) + " at " + fixed(found.rate_hz, 1) +
                                        " Hz, less than " + fixed(least_hz, 0) + " Hz",
-                               .means = "odometry may lose track between them in quick motion",
+                               .means = "odometry may lose track in fast motion",
                                .to_do = "record at a higher rate"});
   if (found.largest_gap_s > longest_gap_s)
     result.findings.push_back(
         {.id = id + ".gap",
          .severity = Severity::kWarning,
          .what = std::string(sensor) + " with a gap of " + fixed(found.largest_gap_s, 2) + " s",
-         .means = "odometry may lose track there and start again",
-         .to_do = "see why the driver or the disk stopped; --from and --to "
-                  "choose a part without it"});
+         .means = "odometry may lose track in the gap and start again",
+         .to_do = "find out why the driver or the disk stopped; --from and --to choose a part "
+                  "without the gap"});
 }
 
 Finding image_finding(const char* id, std::string what, const char* means, const char* to_do) {
@@ -98,9 +98,9 @@ Examination examine_streams(const SensorSample& sample, const ReaderReport& repo
   if (sample.frames.empty())
     result.findings.push_back({.id = "recording.no_frames",
                                .severity = Severity::kError,
-                               .what = "0 frames could be read",
-                               .means = "there is nothing to estimate a motion from",
-                               .to_do = "see the findings below for what was skipped"});
+                               .what = "no frame could be read",
+                               .means = "there are no images to estimate motion from",
+                               .to_do = "the other findings state the skipped parts"});
   for (const auto& [fault, entry] : report.entries())
     result.findings.push_back(fault_finding(
         fault, entry, usable_count(fault, sample) + static_cast<double>(entry.count)));
@@ -133,26 +133,26 @@ Examination examine_images(const SensorSample& sample) {
   constexpr double kDark = 25.0, kBright = 225.0, kSaturated = 0.35, kBlurred = 0.58;
   constexpr double kFewCorners = 100.0;
   if (level < kDark)
-    result.findings.push_back(image_finding(
-        "images.dark", "a mean grey level of " + fixed(level, 0) + " of 255",
-        "few features, and noise among them", "a longer exposure, more gain, or light"));
+    result.findings.push_back(image_finding("images.dark",
+                                            "a mean grey level of " + fixed(level, 0) + " of 255",
+                                            "few features are found, and some of them are noise",
+                                            "use a longer exposure, more gain or more light"));
   if (level > kBright || saturated > kSaturated)
     result.findings.push_back(image_finding(
         "images.bright",
         percent(saturated) + " of the pixels are saturated, mean level " + fixed(level, 0),
-        "what is saturated has no features", "a shorter exposure, or automatic exposure"));
+        "saturated areas have no features", "use a shorter or automatic exposure"));
   if (sharpness < kBlurred)
     result.findings.push_back(image_finding(
         "images.blurred", "edges are blurred: sharpness " + fixed(sharpness, 2) + ", below 0.58",
-        "features are found less exactly, and fewer again",
-        "focus, a clean lens, or a shorter "
-        "exposure in motion"));
+        "features are less accurate, and fewer are tracked",
+        "focus and clean the lens, or use a shorter exposure"));
   if (corners < kFewCorners)
     result.findings.push_back(
         image_finding("images.few_corners",
                       "less than " + fixed(corners + 1.0, 0) + " corners in one image of five",
-                      "odometry may lose track where there is nothing to see",
-                      "more texture or light, or tracker.fast_threshold"));
+                      "odometry may lose track in areas without texture",
+                      "add texture or light, or lower tracker.fast_threshold"));
   return result;
 }
 

@@ -1,10 +1,9 @@
-#include "modules/diagnosis/examine_words.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <map>
 
 #include "modules/core/text_table.hpp"
+#include "modules/diagnosis/examine_sensors.hpp"
 
 namespace km {
 
@@ -31,13 +30,14 @@ Examination examine_words(std::span<const std::vector<BinaryDescriptor>> images,
                                               std::to_string(vocabulary.size())});
   constexpr double kLeastWords = 200.0, kLeastShare = 0.05;
   if (words < kLeastWords || words < kLeastShare * most)
-    result.findings.push_back({.id = "vocabulary.coverage",
-                               .severity = Severity::kWarning,
-                               .what = "the vocabulary distinguishes " + fixed(features, 0) +
-                                       " features by " + fixed(words, 0) + " words only",
-                               .means = "different places look alike: few or false candidates",
-                               .to_do = "train one on images like these "
-                                        "(kimera_multi_vocabulary train)"});
+    result.findings.push_back(
+        {.id = "vocabulary.coverage",
+         .severity = Severity::kWarning,
+         .what = "the vocabulary distinguishes " + fixed(features, 0) + " features by only " +
+                 fixed(words, 0) + " words",
+         .means = "different places look alike, so candidates are few or wrong",
+         .to_do = "train a vocabulary on images like these: kimera_multi_vocabulary "
+                  "train"});
   return result;
 }
 

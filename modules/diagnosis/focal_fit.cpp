@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "modules/core/lie.hpp"
-#include "modules/diagnosis/gyro_integral.hpp"
 #include "modules/diagnosis/stereo_fit.hpp"
 
 namespace km {

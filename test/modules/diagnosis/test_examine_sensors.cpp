@@ -3,7 +3,6 @@
 #include <random>
 
 #include "modules/diagnosis/examine_sensors.hpp"
-#include "modules/diagnosis/examine_words.hpp"
 
 namespace km {
 namespace {
@@ -24,51 +23,38 @@ SensorSample regular() {
   return sample;
 }
 
-ImageQuality good_look() {
-  return {.mean_level = 110.0, .saturated_share = 0.05, .sharpness = 0.8, .corners = 2000};
-}
-
-std::string looks_of(const ImageQuality& look) {
-  SensorSample sample;
-  sample.qualities.assign(10, look);
-  return ids_of(examine_images(sample));
-}
-
 }  // namespace
 
 TEST_CASE("Rates and gaps of a recording are found", "[diagnosis]") {
+  struct Case {
+    std::string ids;
+    void (*change)(SensorSample&);
+  };
+  const Case c =
+      GENERATE(Case{"", [](auto&) {}},
+               Case{"warning frames.gap ",
+                    [](auto& sample) {
+                      sample.frames.erase(sample.frames.begin() + 50, sample.frames.begin() + 60);
+                    }},
+               Case{"",  // one missing image is no gap
+                    [](auto& sample) { sample.frames.erase(sample.frames.begin() + 50); }},
+               Case{"warning frames.rate ",
+                    [](auto& sample) {
+                      std::erase_if(sample.frames, [k = 0](Stamp) mutable { return k++ % 4 != 0; });
+                    }},
+               Case{"warning frames.rate ",  // images of one instant have no rate
+                    [](auto& sample) {
+                      sample.frames = {5, 5, 5};
+                    }},
+               Case{"warning imu.gap ",
+                    [](auto& sample) {
+                      sample.imu.erase(sample.imu.begin() + 500, sample.imu.begin() + 520);
+                    }},
+               Case{"error recording.no_frames ", [](auto& sample) { sample.frames.clear(); }});
+  CAPTURE(c.ids);
   SensorSample sample = regular();
-  CHECK(ids_of(examine_streams(sample, {})).empty());
-  SECTION("a gap of the images") {
-    sample.frames.erase(sample.frames.begin() + 50, sample.frames.begin() + 60);
-    CHECK(ids_of(examine_streams(sample, {})) == "warning frames.gap ");
-  }
-  SECTION("one missing image is no gap") {
-    sample.frames.erase(sample.frames.begin() + 50);
-    CHECK(ids_of(examine_streams(sample, {})).empty());
-  }
-  SECTION("few images") {
-    std::vector<Stamp> few;
-    for (std::size_t k = 0; k < sample.frames.size(); k += 4) few.push_back(sample.frames[k]);
-    sample.frames = few;
-    CHECK(ids_of(examine_streams(sample, {})) == "warning frames.rate ");
-  }
-  SECTION("a gap of the samples") {
-    sample.imu.erase(sample.imu.begin() + 500, sample.imu.begin() + 520);
-    CHECK(ids_of(examine_streams(sample, {})) == "warning imu.gap ");
-  }
-  SECTION("images missing between others") {
-    sample.right_size = {752, 480};
-    ReaderReport report;
-    report.add(ReaderFault::kMissingBetween, "here", 20);  // 10 of each of two cameras
-    const auto findings = examine_streams(sample, report).findings;
-    REQUIRE(findings.size() == 1);
-    CHECK_THAT(findings[0].what, Catch::Contains("20 images missing between others, 4.8 %"));
-  }
-  SECTION("no images") {
-    sample.frames.clear();
-    CHECK(ids_of(examine_streams(sample, {})) == "error recording.no_frames ");
-  }
+  c.change(sample);
+  CHECK(ids_of(examine_streams(sample, {})) == c.ids);
 }
 
 TEST_CASE("Faults of a reader become findings by their share", "[diagnosis]") {
@@ -84,27 +70,25 @@ TEST_CASE("Faults of a reader become findings by their share", "[diagnosis]") {
   ReaderReport report;
   report.add(ReaderFault::kNotFinite, "imu0/data.csv line 9", 15);
   CHECK_THAT(ids_of(examine_streams(sample, report)), Catch::StartsWith("note recording."));
+  SensorSample stereo = sample;
+  stereo.right_size = {752, 480};
+  ReaderReport missing;
+  missing.add(ReaderFault::kMissingBetween, "here", 20);  // 10 of each of two cameras
+  CHECK_THAT(examine_streams(stereo, missing).findings.at(0).what,
+             Catch::Contains("20 images missing between others, 4.8 %"));
 }
 
 TEST_CASE("Images that are dark, bright, blurred or empty are found", "[diagnosis]") {
-  CHECK(looks_of(good_look()).empty());
-  ImageQuality look = good_look();
-  SECTION("dark") {
-    look.mean_level = 12.0;
-    CHECK(looks_of(look) == "warning images.dark ");
-  }
-  SECTION("bright") {
-    look.saturated_share = 0.5;
-    CHECK(looks_of(look) == "warning images.bright ");
-  }
-  SECTION("blurred") {
-    look.sharpness = 0.52;
-    CHECK(looks_of(look) == "warning images.blurred ");
-  }
-  SECTION("empty") {
-    look.corners = 40;
-    CHECK(looks_of(look) == "warning images.few_corners ");
-  }
+  const auto looks_of = [](double level, double saturated, double sharpness, std::size_t corners) {
+    SensorSample sample;
+    sample.qualities.assign(10, {level, saturated, sharpness, corners});
+    return ids_of(examine_images(sample));
+  };
+  CHECK(looks_of(110.0, 0.05, 0.8, 2000).empty());
+  CHECK(looks_of(12.0, 0.05, 0.8, 2000) == "warning images.dark ");
+  CHECK(looks_of(110.0, 0.5, 0.8, 2000) == "warning images.bright ");
+  CHECK(looks_of(110.0, 0.05, 0.52, 2000) == "warning images.blurred ");
+  CHECK(looks_of(110.0, 0.05, 0.8, 40) == "warning images.few_corners ");
   CHECK(ids_of(examine_images({})).empty());
 }
 

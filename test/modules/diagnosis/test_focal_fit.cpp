@@ -114,12 +114,4 @@ TEST_CASE("Without rotation a gyroscope gives no focal length", "[diagnosis]") {
   CHECK((!fit || fit->sigma > 0.05));
 }
 
-TEST_CASE("Too few steps or points give no focal length", "[diagnosis]") {
-  std::vector<TrackedStep> steps = driven(0.2);
-  CHECK_FALSE(fit_focal(std::span(steps).first(19), driven_rig(), driven_samples(), rough_fit()));
-  for (TrackedStep& step : steps) step.points.resize(20);
-  CHECK_FALSE(fit_focal(steps, driven_rig(), driven_samples(), rough_fit()));
-  CHECK_FALSE(fit_focal({}, driven_rig(), {}, rough_fit()));
-}
-
 }  // namespace km

@@ -1,5 +1,6 @@
 #include <catch2/catch.hpp>
 
+#include <cmath>
 #include <random>
 #include <vector>
 
@@ -65,16 +66,12 @@ TEST_CASE("A fault of the pair's calibration is identified", "[diagnosis]") {
   const StereoFault fault = GENERATE(StereoFault::kInvertedPair, StereoFault::kInvertedCameras,
                                      StereoFault::kInvertedLeft, StereoFault::kInvertedRight);
   CAPTURE(static_cast<int>(fault));
-  const auto images = seen_by(rig());
+  auto images = seen_by(rig());
   const StereoRig wrong = undone(rig(), fault);
   CHECK(fit_of(images, wrong).inlier_ratio < 0.4);
   const StereoAlternative best = best_alternative(images, wrong);
   CHECK(best.fault == fault);
   CHECK(best.fit.inlier_ratio == Approx(fit_of(images, rig()).inlier_ratio));
-}
-
-TEST_CASE("Swapped images of a pair are identified", "[diagnosis]") {
-  auto images = seen_by(rig());
   for (PixelPair& pair : images[0].pairs) std::swap(pair.a, pair.b);
   CHECK(best_alternative(images, rig()).fault == StereoFault::kSwappedImages);
 }
@@ -94,6 +91,14 @@ TEST_CASE("Random matches fit no calibration", "[diagnosis]") {
   CHECK(best.fault == StereoFault::kNone);
   CHECK(best.fit.inlier_ratio < 0.1);
   CHECK(best_alternative({}, rig()).fault == StereoFault::kNone);
+  // Points that are no numbers fit no calibration either, nor any point a calibration without a
+  // number.
+  auto images = seen_by(rig(), 0.0);
+  StereoRig no_number = rig();
+  no_number.cameras[1].T_body_cam.translation().y() = std::nan("");
+  CHECK(fit_of(images, no_number).inlier_ratio == 0.0);
+  for (PixelPair& pair : images[0].pairs) pair.a.x() = std::nan("");
+  CHECK(fit_of(images, rig()).inlier_ratio == 0.0);
 }
 
 }  // namespace km

@@ -259,7 +259,7 @@ TEST_CASE("Speed of the features of a keyframe", "[loop_closure][!benchmark]") {
   const auto files = list_keyframe_pairs(*v1 / "keyframes", report);
   std::vector<StereoFrame> frames;
   for (std::size_t i = 0; i < files.size(); i += 10)
-    frames.push_back(load_stereo_pair(files[i], rig.stereo).frame);
+    frames.push_back(load_stereo_pair(files[i], rig.stereo).image);
   std::size_t next = 0;
   for (const bool by_network : {false, true}) {
     KeyframeFeatureExtractor extractor(rig.stereo, {}, describer(by_network));

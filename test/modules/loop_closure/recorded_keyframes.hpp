@@ -10,8 +10,8 @@
 #include "modules/evaluation/association.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
 #include "modules/loop_closure/keyframe_features.hpp"
-#include "modules/sensors/frame_files.hpp"
 #include "modules/sensors/node/euroc_rig.hpp"
+#include "test/support/keyframe_pairs.hpp"
 
 namespace km {
 
@@ -25,10 +25,10 @@ struct RecordedKeyframe {
 inline RecordedKeyframe record_of(const StereoPairFile& files, const SensorRig& rig,
                                   KeyframeFeatureExtractor& extractor,
                                   const std::vector<StampedPose>& truth) {
-  const StereoPairResult pair = load_stereo_pair(files, rig.stereo);
+  const auto pair = load_stereo_pair(files, rig.stereo);
   if (pair.status != ImageStatus::kOk) throw std::runtime_error(pair.problem);
   return {files.stamp, pose_at(truth, files.stamp, 0.1, 0.0).value(),
-          extractor.extract(pair.frame)};
+          extractor.extract(pair.image)};
 }
 
 /// Every n-th of the 100 stereo keyframes of EuRoC V1_01_easy; n is `every`.
@@ -56,7 +56,7 @@ inline std::vector<RecordedKeyframe> load_mh_01(const std::filesystem::path& seq
   const auto truth = read_trajectory(sequence / "mav0/state_groundtruth_estimate0");
   ReaderReport report;
   std::vector<RecordedKeyframe> keyframes;
-  const auto pairs = list_euroc_pairs(sequence / "mav0", 0.001, report).pairs;
+  const auto pairs = list_euroc_pairs(sequence / "mav0", report).pairs;
   Stamp next = pairs.front().stamp;
   for (const StereoPairFile& files : pairs) {
     if (files.stamp < next || seconds_between(pairs.front().stamp, files.stamp) >= 15.0) continue;
