@@ -32,13 +32,13 @@ void take(const BagChannel& channel, const BagMessage& message, const std::strin
       poses.push_back(pose_of(pose.header.stamp, pose.pose));
   } else if (is_of_type(channel, RosOdometry::kType)) {
     const RosOdometry odometry = decode(RosOdometry());
-    poses.push_back(pose_of(odometry.header.stamp, odometry.pose));
+    poses.push_back(pose_of(odometry.header.stamp, odometry.pose.pose));
   } else if (is_of_type(channel, RosPoseStamped::kType)) {
     const RosPoseStamped pose = decode(RosPoseStamped());
     poses.push_back(pose_of(pose.header.stamp, pose.pose));
   } else if (is_of_type(channel, RosPoseWithCovarianceStamped::kType)) {
     const RosPoseWithCovarianceStamped pose = decode(RosPoseWithCovarianceStamped());
-    poses.push_back(pose_of(pose.header.stamp, pose.pose));
+    poses.push_back(pose_of(pose.header.stamp, pose.pose.pose));
   } else {
     throw InputFileError(place + ": " + channel.type + " has no poses");
   }

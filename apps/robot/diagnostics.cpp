@@ -18,7 +18,7 @@ RosDiagnosticStatus sensors_status(std::size_t published, std::size_t skipped,
     status.values.push_back(
         {to_string(fault), std::to_string(entry.count) + ", first: " + entry.first});
   const bool is_well = skipped == 0 && faults.empty();
-  status.level = is_well ? RosDiagnosticStatus::kOk : RosDiagnosticStatus::kWarn;
+  status.level = is_well ? RosLevel::kOk : RosLevel::kWarn;
   status.message = is_well          ? "ok"
                    : faults.empty() ? "frames are skipped: odometry is too slow"
                                     : "faulty: see below";
@@ -43,7 +43,7 @@ RosDiagnosticStatus team_status(const OptimizerProgress& progress) {
                    {"robots in another frame", list(progress.not_joined)}};
   const bool is_certain =
       progress.located && progress.tentative.empty() && progress.not_joined.empty();
-  status.level = is_certain ? RosDiagnosticStatus::kOk : RosDiagnosticStatus::kWarn;
+  status.level = is_certain ? RosLevel::kOk : RosLevel::kWarn;
   status.message = is_certain                            ? "ok"
                    : progress.fixes && !progress.located ? "not yet located by its fixes"
                    : !progress.located                   ? "not yet localised in the finished map"
@@ -75,7 +75,7 @@ RosDiagnosticStatus ModuleLoads::status() {
     status.values.push_back({name + " busy [%]", fixed(100.0 * share, 0)});
     if (share > kBusy) status.message += (status.message.empty() ? "busy: " : ", ") + name;
   }
-  if (!status.message.empty()) status.level = RosDiagnosticStatus::kWarn;
+  if (!status.message.empty()) status.level = RosLevel::kWarn;
   if (status.message.empty()) status.message = "ok";
   return status;
 }

@@ -6,10 +6,8 @@
 #include <utility>
 
 #include "apps/result_files.hpp"
-#include "modules/recordings/mcap_attachments.hpp"
 #include "modules/recordings/mcap_reader.hpp"
 #include "modules/recordings/merged_reader.hpp"
-#include "modules/recordings/ros_definitions.hpp"
 #include "modules/recordings/ros_messages.hpp"
 #include "modules/ros_dds/mcap_sink.hpp"
 
@@ -18,8 +16,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-RosTransforms root_transform(const std::string& root, Stamp stamp) {
-  return {{{{stamp, "map"}, ros_name(root) + "/map", RosPose{}}}};
+RosTFMessage root_transform(const std::string& root, Stamp stamp) {
+  return {{{{stamp, "map"}, ros_name(root) + "/map", {}}}};
 }
 
 }  // namespace
@@ -41,7 +39,7 @@ void merge_records(std::span<const fs::path> records, const std::string& root,
   MergedReader merged(std::move(readers));
   std::optional<std::string> failure;
   McapSink sink(file, [&failure](const std::string& why) { failure = why; });
-  const std::size_t statics = sink.open({"/tf_static", RosTransforms::kType, true, 1});
+  const std::size_t statics = sink.open({"/tf_static", RosTFMessage::kType, true, 1});
   std::vector<std::size_t> topics;
   bool begun = root.empty();
   while (const auto message = merged.next()) {

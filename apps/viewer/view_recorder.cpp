@@ -9,7 +9,7 @@
 #include "modules/core/stamped_pose.hpp"
 #include "modules/core/text_table.hpp"
 #include "modules/mesh/team_mesh.hpp"
-#include "modules/recordings/ros_definitions.hpp"
+#include "modules/recordings/ros_messages.hpp"
 #include "modules/ros_dds/mcap_sink.hpp"
 #include "modules/ros_dds/node/ros_output_node.hpp"
 #include "runtime/clock.hpp"

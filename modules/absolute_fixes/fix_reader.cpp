@@ -36,10 +36,11 @@ std::optional<double> sigma_of(double x, double y, double z) {
 
 std::optional<double> sigma_of(const RosNavSatFix& fix) {
   const auto& P = fix.position_covariance;
-  return fix.covariance_type == RosNavSatFix::kUnknown ? std::nullopt : sigma_of(P[0], P[4], P[8]);
+  return fix.position_covariance_type == kRosUnknownCovariance ? std::nullopt
+                                                               : sigma_of(P[0], P[4], P[8]);
 }
 std::optional<double> sigma_of(const RosPoseWithCovarianceStamped& pose) {
-  return sigma_of(pose.covariance[0], pose.covariance[7], pose.covariance[14]);
+  return sigma_of(pose.pose.covariance[0], pose.pose.covariance[7], pose.pose.covariance[14]);
 }
 std::optional<double> sigma_of(const auto& /*pose*/) {
   return std::nullopt;
@@ -48,11 +49,14 @@ std::optional<double> sigma_of(const auto& /*pose*/) {
 Eigen::Vector3d coordinates_of(const RosNavSatFix& fix) {
   return {fix.latitude, fix.longitude, fix.altitude};
 }
-Eigen::Vector3d coordinates_of(const RosPoseWithCovarianceStamped& pose) {
+Eigen::Vector3d coordinates_of(const RosPoseStamped& pose) {
   return pose.pose.position;
 }
-Eigen::Vector3d coordinates_of(const auto& pose) {
-  return pose.pose.position;
+Eigen::Vector3d coordinates_of(const RosPoseWithCovarianceStamped& pose) {
+  return pose.pose.pose.position;
+}
+Eigen::Vector3d coordinates_of(const RosTransformStamped& pose) {
+  return pose.transform.translation;
 }
 
 std::optional<Stamp> stamp_of(const TextRow& row, bool is_csv) {
@@ -128,7 +132,7 @@ std::optional<ReceivedFix> FixReader::decode_as(const BagChannel& channel,
   }
   const Message& fix = *decoded.value;
   if constexpr (std::is_same_v<Message, RosNavSatFix>)
-    if (fix.status < 0) {
+    if (fix.status.status < 0) {
       ++counts_.without_position;
       return std::nullopt;
     }
@@ -144,7 +148,8 @@ std::optional<ReceivedFix> FixReader::decode(const BagChannel& channel, const Ba
   if (is_of_type(channel, RosNavSatFix::kType)) return decode_as<RosNavSatFix>(channel, message);
   if (is_of_type(channel, RosPoseStamped::kType))
     return decode_as<RosPoseStamped>(channel, message);
-  if (is_of_type(channel, RosTransform::kType)) return decode_as<RosTransform>(channel, message);
+  if (is_of_type(channel, RosTransformStamped::kType))
+    return decode_as<RosTransformStamped>(channel, message);
   return decode_as<RosPoseWithCovarianceStamped>(channel, message);
 }
 
@@ -186,7 +191,7 @@ bool has_fixes(const BagChannel& channel, FixSource source) {
   return source == FixSource::kMotionCapture &&
          (is_of_type(channel, RosPoseStamped::kType) ||
           is_of_type(channel, RosPoseWithCovarianceStamped::kType) ||
-          is_of_type(channel, RosTransform::kType));
+          is_of_type(channel, RosTransformStamped::kType));
 }
 
 }  // namespace km

@@ -1,27 +1,22 @@
 #include "modules/recordings/bag_reader.hpp"
 
+#include <array>
+
 namespace km {
 
 const char* to_string(BagFault fault) {
-  switch (fault) {
-    case BagFault::kTruncated:
-      return "truncated parts";
-    case BagFault::kIndex:
-      return "unusable indexes";
-    case BagFault::kMalformed:
-      return "malformed records";
-    case BagFault::kChecksum:
-      return "wrong checksums";
-    case BagFault::kCompression:
-      return "parts that cannot be decompressed";
-    case BagFault::kUnknownChannel:
-      return "messages of unknown channels";
-    case BagFault::kUnordered:
-      return "messages earlier than the index states";
-    case BagFault::kLost:
-      return "lost messages";
-  }
-  return "unknown faults";
+  // In the order of BagFault.
+  static constexpr std::array<const char*, 8> kNames = {
+      "truncated parts",
+      "unusable indexes",
+      "malformed records",
+      "wrong checksums",
+      "parts that cannot be decompressed",
+      "messages of unknown channels",
+      "messages earlier than the index states",
+      "lost messages",
+  };
+  return kNames.at(static_cast<std::size_t>(fault));
 }
 
 }  // namespace km

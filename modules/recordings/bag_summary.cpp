@@ -43,8 +43,8 @@ bool has_header(const BagChannel& channel) {
 
 // Stamp of a message; nullopt if the message is not of its type.
 std::optional<Stamp> stamp_in(const BagChannel& channel, const BagMessage& message) {
-  if (is_of_type(channel, RosTransforms::kType)) {
-    const auto tree = decode_ros<RosTransforms>(channel.encoding, message.bytes);
+  if (is_of_type(channel, RosTFMessage::kType)) {
+    const auto tree = decode_ros<RosTFMessage>(channel.encoding, message.bytes);
     if (!tree.value) return std::nullopt;
     const auto& transforms = tree.value->transforms;
     return transforms.empty() ? message.log_time : transforms.front().header.stamp;
@@ -55,7 +55,7 @@ std::optional<Stamp> stamp_in(const BagChannel& channel, const BagMessage& messa
 
 TopicSummary begin_topic(const BagChannel& channel) {
   const bool is_readable = channel.encoding == "ros1" || channel.encoding == "cdr";
-  const bool is_stamped = has_header(channel) || is_of_type(channel, RosTransforms::kType);
+  const bool is_stamped = has_header(channel) || is_of_type(channel, RosTFMessage::kType);
   return {.topic = channel.topic,
           .type = channel.type,
           .encoding = channel.encoding,
@@ -85,13 +85,13 @@ std::optional<TopicImage> topic_image(const BagChannel& channel, const BagMessag
     if (!image.value) return std::nullopt;
     return TopicImage{{image.value->width, image.value->height},
                       image.value->encoding,
-                      image.value->header.frame};
+                      image.value->header.frame_id};
   }
   const auto image = decode_ros<RosCompressedImage>(channel.encoding, message.bytes);
   if (!image.value) return std::nullopt;
   const auto& data = image.value->data;
   const auto size = stated_image_size({reinterpret_cast<const char*>(data.data()), data.size()});
-  return TopicImage{size.value_or(ImageSize{}), image.value->format, image.value->header.frame};
+  return TopicImage{size.value_or(ImageSize{}), image.value->format, image.value->header.frame_id};
 }
 
 std::vector<TopicSummary> summarise_topics(BagReader& reader) {

@@ -141,7 +141,7 @@ Output decompress(std::string_view compression, std::span<const std::uint8_t> by
   if (compression == "lz4") return run(Lz4(), bytes, size);
   if (compression == "zstd") return run(Zstd(), bytes, size);
   if (compression == "bz2") return run(Bzip2(), bytes, size);
-  return Output::refuse("a compression that is not known");
+  return Output::refuse("an unknown compression");
 }
 
 bool UnpackLimit::accept(std::uint64_t begin, std::uint64_t size) {

@@ -35,11 +35,15 @@ bool for_each_record(std::span<const std::uint8_t> bytes, const Use& use) {
   return true;
 }
 
+void check_magic(const RandomAccessFile& file) {
+  if (file.beginning(kMcapMagic.size()) != kMcapMagic)
+    throw InputFileError(file.place(0) + ": does not begin as MCAP files of version 0 do");
+}
+
 }  // namespace
 
 McapReader::McapReader(const std::filesystem::path& path) : file_(path) {
-  if (file_.beginning(kMcapMagic.size()) != kMcapMagic)
-    throw InputFileError(file_.place(0) + ": does not begin as MCAP files of version 0 do");
+  check_magic(file_);
   const std::uint64_t data_end = find_data_end();
   const bool has_end = data_end < file_.size();
   std::uint64_t at = kMcapMagic.size();
@@ -77,7 +81,7 @@ std::uint64_t McapReader::find_data_end() {
   }
   if (footer->summary_start == 0) return begin;
   if (footer->summary_start < kMcapMagic.size() || footer->summary_start > begin) {
-    report_.add(BagFault::kIndex, begin, "a summary that lies elsewhere");
+    report_.add(BagFault::kIndex, begin, "a summary outside of the file");
     return begin;
   }
   read_summary(footer->summary_start, begin, *footer);
@@ -107,7 +111,7 @@ void McapReader::read_summary(std::uint64_t begin, std::uint64_t footer, const M
     }
   });
   const char* const misfit =
-      is_whole ? misfit_of(summary, begin) : "a summary with what is no record";
+      is_whole ? misfit_of(summary, begin) : "a summary with an invalid record";
   if (misfit != nullptr) {
     schemas_.clear();
     channel_of_.clear();
@@ -170,7 +174,7 @@ void McapReader::walk(std::uint64_t begin, std::uint64_t end, bool has_end) {
     const auto header = parse_mcap_record_header(bytes);
     const std::uint64_t content = at + kMcapRecordHeader_bytes;
     if (bytes.size() == kMcapRecordHeader_bytes && !header)
-      return report_.add(BagFault::kMalformed, at, "what is no record");
+      return report_.add(BagFault::kMalformed, at, "an invalid record");
     if (!header || header->size > end - content)
       return report_.add(has_end ? BagFault::kMalformed : BagFault::kTruncated, at,
                          "a record that reaches behind the end of the data");
@@ -187,7 +191,7 @@ void McapReader::walk(std::uint64_t begin, std::uint64_t end, bool has_end) {
       note_chunk(at, next);
     } else if (header->is(McapOpcode::kDataEnd) || header->is(McapOpcode::kFooter)) {
       if (has_end && next != end)
-        report_.add(BagFault::kMalformed, at, "an end of the data that is none");
+        report_.add(BagFault::kMalformed, at, "an invalid end of the data");
       if (has_bare && header->is(McapOpcode::kDataEnd) && header->size == 4) {
         const Bytes crc = file_.read(content, 4);
         check_data_crc(at, ByteReader(crc).u32());
@@ -204,7 +208,7 @@ void McapReader::note_bare_message(std::uint64_t begin, std::uint64_t end) {
   const std::uint64_t size = end - content;
   const Bytes fields = file_.read(content, std::min(size, kMcapMessageFields_bytes));
   const auto message = parse_mcap_message(fields, size);
-  if (!message) return report_.add(BagFault::kMalformed, begin, "what is no message");
+  if (!message) return report_.add(BagFault::kMalformed, begin, "an invalid message");
   if (size > kMaxDecompressed_bytes)
     return report_.add(BagFault::kMalformed, begin, "a message of more than 512 MiB");
   const auto channel = channel_of_.find(message->channel_id);
@@ -249,7 +253,7 @@ Chunk McapReader::load(const ChunkRange& place) {
       return;
     }
     const auto message = parse_mcap_message(read.content, read.content.size());
-    if (!message) return report_.add(BagFault::kMalformed, place.begin, "what is no message");
+    if (!message) return report_.add(BagFault::kMalformed, place.begin, "an invalid message");
     const auto channel = channel_of_.find(message->channel_id);
     if (channel == channel_of_.end())
       return report_.add(BagFault::kUnknownChannel, place.begin,
@@ -259,7 +263,7 @@ Chunk McapReader::load(const ChunkRange& place) {
                              .size = message->data_size,
                              .begin = read.begin + kMcapMessageFields_bytes});
   });
-  if (!is_whole) report_.add(BagFault::kMalformed, place.begin, "a chunk with what is no record");
+  if (!is_whole) report_.add(BagFault::kMalformed, place.begin, "a chunk with an invalid record");
   report_.end_chunk();
   return chunk;
 }
@@ -296,11 +300,11 @@ void McapReader::add_definition(const McapRecordHeader& header, std::span<const 
                                 std::uint64_t place) {
   if (header.is(McapOpcode::kSchema)) {
     const auto schema = parse_mcap<McapSchema>(bytes);
-    if (!schema) return report_.add(BagFault::kMalformed, place, "what is no schema");
+    if (!schema) return report_.add(BagFault::kMalformed, place, "an invalid schema");
     schemas_.try_emplace(schema->id, schema->name);
   } else if (header.is(McapOpcode::kChannel)) {
     const auto channel = parse_mcap<McapChannel>(bytes);
-    if (!channel) return report_.add(BagFault::kMalformed, place, "what is no channel");
+    if (!channel) return report_.add(BagFault::kMalformed, place, "an invalid channel");
     add_channel(*channel, place);
   }
 }
@@ -319,6 +323,29 @@ void McapReader::add_channel(const McapChannel& channel, std::uint64_t place) {
     return report_.add(BagFault::kMalformed, place,
                        channel.topic + ": a channel that was described otherwise before");
   if (before.type.empty()) before.type = type;  // the summary lacked the schema of the channel
+}
+
+std::map<std::string, std::string> read_mcap_attachments(const std::filesystem::path& path) {
+  const RandomAccessFile file(path);
+  check_magic(file);
+  std::map<std::string, std::string> found;
+  std::uint64_t at = kMcapMagic.size();
+  while (file.has(at, kMcapRecordHeader_bytes)) {
+    const auto header = parse_mcap_record_header(file.read(at, kMcapRecordHeader_bytes));
+    if (!header || header->is(McapOpcode::kDataEnd)) break;
+    const std::uint64_t begin = at + kMcapRecordHeader_bytes;
+    if (!file.has(begin, header->size)) break;
+    if (header->is(McapOpcode::kAttachment)) {
+      if (header->size > kMaxDecompressed_bytes)
+        throw InputFileError(file.place(at) + ": an attachment of more than 512 MiB");
+      const auto bytes = file.read(begin, header->size);
+      const auto attachment = parse_mcap<McapAttachment>(bytes);
+      if (!attachment) throw InputFileError(file.place(at) + ": an attachment that is damaged");
+      found[attachment->name].assign(attachment->data.begin(), attachment->data.end());
+    }
+    at = begin + header->size;
+  }
+  return found;
 }
 
 }  // namespace km

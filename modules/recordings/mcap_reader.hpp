@@ -69,4 +69,10 @@ class McapReader final : public BagReader {
   std::unique_ptr<ChunkMerge> merge_;
 };
 
+/// The attachments of an MCAP file by name; of several with one name, the last. A truncated file
+/// yields its complete attachments. Throws InputFileError if the file is no MCAP file, or if an
+/// attachment is damaged.
+[[nodiscard]] std::map<std::string, std::string> read_mcap_attachments(
+    const std::filesystem::path& path);
+
 }  // namespace km

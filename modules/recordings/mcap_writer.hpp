@@ -21,7 +21,7 @@ class McapWriter {
   struct Options {
     std::string profile = "ros2";
     std::string library = "kimera_multi";
-    std::string compression = "zstd";                ///< "zstd", "lz4", or "" for none.
+    std::string compression = "zstd";                ///< "zstd", or "" for none.
     std::size_t chunk_bytes = std::size_t{1} << 20;  ///< Uncompressed size that ends a chunk.
   };
 

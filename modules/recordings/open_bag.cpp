@@ -27,7 +27,7 @@ std::unique_ptr<BagReader> open_file(const fs::path& path) {
   if (magic == "#ROSBAG ") return std::make_unique<Ros1BagReader>(path);
   if (magic == kMcapMagic) return std::make_unique<McapReader>(path);
   if (magic == "SQLite f") return std::make_unique<Db3Reader>(path);
-  throw InputFileError(file.place(0) + ": begins as none of .bag, .mcap and .db3 files do");
+  throw InputFileError(file.place(0) + ": does not begin like a .bag, .mcap or .db3 file");
 }
 
 // Files in the order of their numbers: bag_2 before bag_10.

@@ -69,7 +69,7 @@ const char* Ros1BagReader::read_index(const Place& bag_header) {
   const std::uint64_t data_begin = bag_header.data_begin + bag_header.data_size;
   if (!begin || !connections || !chunks) return "a bag header that lacks fields";
   if (*begin == 0) return "the bag was not closed: no index";
-  if (*begin < data_begin || *begin > file_.size()) return "an index that lies elsewhere";
+  if (*begin < data_begin || *begin > file_.size()) return "an index outside of the file";
   if (file_.size() - *begin > kMaxDecompressed_bytes) return "an index of more than 512 MiB";
   const Bytes bytes = file_.read(*begin, file_.size() - *begin);
   std::vector<Ros1ChunkInfo> infos;
@@ -77,13 +77,13 @@ const char* Ros1BagReader::read_index(const Place& bag_header) {
   for (std::uint64_t at = 0; at < bytes.size();) {
     const std::uint64_t place = *begin + at;
     const auto record = next_ros1_record(bytes, at);
-    if (!record) return "an index with what is no record";
+    if (!record) return "an index with an invalid record";
     if (record->fields.is(Ros1Opcode::kConnection)) {
       add_connection(*record, place);
       ++found;
     } else if (record->fields.is(Ros1Opcode::kChunkInfo)) {
       const auto info = parse_ros1_chunk_info(*record);
-      if (!info) return "an index with what is no chunk info";
+      if (!info) return "an index with an invalid chunk info";
       infos.push_back(*info);
     }
   }
@@ -98,7 +98,7 @@ const char* Ros1BagReader::use_chunk_infos(std::vector<Ros1ChunkInfo> infos, std
             [](const auto& a, const auto& b) { return a.begin < b.begin; });
   for (std::size_t i = 0; i < infos.size(); ++i) {
     const std::uint64_t next = i + 1 < infos.size() ? infos[i + 1].begin : end;
-    if (infos[i].begin < begin || infos[i].begin >= next) return "chunks that lie elsewhere";
+    if (infos[i].begin < begin || infos[i].begin >= next) return "chunks outside of the data";
     places_.push_back({.begin = infos[i].begin, .end = next, .first = infos[i].first});
     for (const auto& [connection, count] : infos[i].counts) {
       const auto channel = channel_of_.find(connection);
@@ -113,7 +113,7 @@ void Ros1BagReader::read_all(std::uint64_t begin) {
   const std::uint64_t end = file_.size();
   for (std::uint64_t at = begin; at < end;) {
     const auto record = record_at(at, end);
-    if (!record) return report_.add(BagFault::kTruncated, at, "a record that is cut or none");
+    if (!record) return report_.add(BagFault::kTruncated, at, "a truncated or invalid record");
     const std::uint64_t next = record->data_begin + record->data_size;
     if (record->fields.is(Ros1Opcode::kChunk)) note_chunk(at, next);
     at = next;
@@ -138,7 +138,7 @@ Chunk Ros1BagReader::load(const ChunkRange& place) {
   for (std::uint64_t at = 0; at < chunk.bytes.size();) {
     const auto record = next_ros1_record(chunk.bytes, at);
     if (!record) {
-      report_.add(BagFault::kMalformed, place.begin, "a chunk with what is no record");
+      report_.add(BagFault::kMalformed, place.begin, "a chunk with an invalid record");
       break;
     }
     if (record->fields.is(Ros1Opcode::kConnection))
@@ -175,7 +175,7 @@ Bytes Ros1BagReader::records_of(const ChunkRange& place) {
 
 void Ros1BagReader::add_connection(const Ros1Record& record, std::uint64_t place) {
   const auto connection = parse_ros1_connection(record);
-  if (!connection) return report_.add(BagFault::kMalformed, place, "what is no connection");
+  if (!connection) return report_.add(BagFault::kMalformed, place, "an invalid connection");
   if (channel_of_.contains(connection->id)) return;
   channel_of_[connection->id] =
       channels_.add({.topic = connection->topic, .type = connection->type, .encoding = "ros1"});
@@ -184,7 +184,7 @@ void Ros1BagReader::add_connection(const Ros1Record& record, std::uint64_t place
 void Ros1BagReader::add_entry(const Ros1Record& record, std::uint64_t place, Chunk& chunk) {
   const auto connection = record.fields.u32("conn");
   const auto time = record.fields.time("time");
-  if (!connection || !time) return report_.add(BagFault::kMalformed, place, "what is no message");
+  if (!connection || !time) return report_.add(BagFault::kMalformed, place, "an invalid message");
   const auto channel = channel_of_.find(*connection);
   if (channel == channel_of_.end())
     return report_.add(BagFault::kUnknownChannel, place,

@@ -12,12 +12,12 @@ namespace km {
 namespace {
 
 [[noreturn]] void refuse(const RosCameraInfo& info, const std::string& problem) {
-  throw std::invalid_argument("CameraInfo of frame '" + info.header.frame + "': " + problem);
+  throw std::invalid_argument("CameraInfo of frame '" + info.header.frame_id + "': " + problem);
 }
 
 // The first `count` coefficients of D, with zeros for missing ones. Throws if others are not 0.
 std::vector<double> coefficients(const RosCameraInfo& info, std::size_t count) {
-  std::vector<double> D = info.D;
+  std::vector<double> D = info.d;
   const bool cut = std::any_of(D.begin() + static_cast<std::ptrdiff_t>(std::min(count, D.size())),
                                D.end(), [](double k) { return k != 0.0; });
   if (cut)
@@ -35,7 +35,7 @@ Lens lens_of(const RosCameraInfo& info) {
   if (model == "plumb_bob") return Lens(LensModel::kRadialTangential, coefficients(info, 5));
   if (model == "rational_polynomial")
     return Lens(LensModel::kRadialTangential, coefficients(info, 8));
-  const bool none = std::all_of(info.D.begin(), info.D.end(), [](double k) { return k == 0.0; });
+  const bool none = std::all_of(info.d.begin(), info.d.end(), [](double k) { return k == 0.0; });
   if (none && (model.empty() || model == "none")) return {};
   refuse(info, "distortion_model '" + model +
                    "' is not supported, only plumb_bob, rational_polynomial, equidistant and "
@@ -43,7 +43,7 @@ Lens lens_of(const RosCameraInfo& info) {
 }
 
 void refuse_parts(const RosCameraInfo& info) {
-  const auto& region = info.region;
+  const auto& region = info.roi;
   const bool is_whole = (region.width == 0 && region.height == 0) ||
                         (region.width == info.width && region.height == info.height);
   if (info.binning_x > 1 || info.binning_y > 1)
@@ -59,7 +59,7 @@ void refuse_parts(const RosCameraInfo& info) {
 }  // namespace
 
 Camera camera_of(const RosCameraInfo& info, RosImages images) {
-  if (std::all_of(info.K.begin(), info.K.end(), [](double k) { return k == 0.0; }))
+  if (std::all_of(info.k.begin(), info.k.end(), [](double k) { return k == 0.0; }))
     refuse(info, "K is 0: the camera is not calibrated");
   refuse_parts(info);
   if (const auto problem = resolution_problem(info.width, info.height))
@@ -68,7 +68,7 @@ Camera camera_of(const RosCameraInfo& info, RosImages images) {
   camera.width = static_cast<int>(info.width);
   camera.height = static_cast<int>(info.height);
   const bool raw = images == RosImages::kRaw;
-  const double* row0 = raw ? info.K.data() : info.P.data();
+  const double* row0 = raw ? info.k.data() : info.p.data();
   const double* row1 = row0 + (raw ? 3 : 4);
   camera.fx = row0[0], camera.cx = row0[2], camera.fy = row1[1], camera.cy = row1[2];
   const std::string matrix = raw ? "K" : "P";
@@ -80,17 +80,17 @@ Camera camera_of(const RosCameraInfo& info, RosImages images) {
 }
 
 SE3 T_frame_camera(const RosCameraInfo& info, RosImages images) {
-  const bool has_rotation = std::ranges::any_of(info.R, [](double r) { return r != 0.0; });
+  const bool has_rotation = std::ranges::any_of(info.r, [](double r) { return r != 0.0; });
   if (images == RosImages::kRectified || !has_rotation) return SE3::Identity();
   Eigen::Matrix4d T = Eigen::Matrix4d::Identity();
   T.topLeftCorner<3, 3>() =
-      Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(info.R.data());
+      Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(info.r.data());
   if (const auto problem = transform_problem(T)) refuse(info, 'R' + *problem);
   return rigid_transform(T);
 }
 
 std::optional<double> baseline_m(const RosCameraInfo& right) {
-  const double baseline_m = -right.P[3] / right.P[0];
+  const double baseline_m = -right.p[3] / right.p[0];
   if (!(baseline_m > 0.0) || !std::isfinite(baseline_m)) return std::nullopt;
   return baseline_m;
 }

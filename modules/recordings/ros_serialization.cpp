@@ -11,7 +11,7 @@ Decoded<RosReader> RosReader::open(std::string_view encoding, std::span<const st
   using Result = Decoded<RosReader>;
   constexpr std::size_t kEncapsulation_bytes = 4;
   if (encoding == "ros1") return Result::accept(RosReader(bytes, false, false));
-  if (encoding != "cdr") return Result::refuse("an encoding that is not known");
+  if (encoding != "cdr") return Result::refuse("an unknown encoding");
   if (bytes.size() < kEncapsulation_bytes) return Result::refuse("no encapsulation header");
   // Values of the second byte of the representation identifier.
   constexpr std::uint8_t kBigEndian = 0, kLittleEndian = 1;
@@ -44,20 +44,6 @@ void RosReader::get(std::vector<std::uint8_t>& values) {
   values.assign(octets.begin(), octets.end());
 }
 
-void RosReader::get(std::vector<double>& values) {
-  resize(values, sizeof(double));
-  for (double& value : values) get(value);
-}
-
-std::size_t RosReader::count(std::size_t bytes_per_element) {
-  const std::uint64_t elements = number(4);
-  return elements <= reader_.left() / bytes_per_element ? elements : reader_.fail();
-}
-
-void RosReader::skip_sequence() {
-  if (!is_cdr_) static_cast<void>(number(4));
-}
-
 void RosReader::get(Stamp& value) {
   const auto seconds = static_cast<std::uint32_t>(number(4));
   const auto rest_ns = static_cast<std::uint32_t>(number(4));
@@ -68,7 +54,7 @@ void RosReader::get(Stamp& value) {
 
 const char* RosReader::problem() const {
   constexpr std::size_t kMostPadding_bytes = 3;
-  if (reader_.failed()) return "a message that is cut or not of its type";
+  if (reader_.failed()) return "a message that is truncated or not of its type";
   if (reader_.left() > (is_cdr_ ? kMostPadding_bytes : 0)) return "a message longer than its type";
   return nullptr;
 }
@@ -89,11 +75,6 @@ void RosWriter::put(const std::string& value) {
 void RosWriter::put(const std::vector<std::uint8_t>& values) {
   number(values.size(), 4);
   bytes_.insert(bytes_.end(), values.begin(), values.end());
-}
-
-void RosWriter::put(const std::vector<double>& values) {
-  number(values.size(), 4);
-  for (const double value : values) put(value);
 }
 
 void RosWriter::put(Stamp value) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <array>
 #include <bit>
 #include <cstddef>
@@ -8,12 +9,14 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
 #include "modules/core/bytes.hpp"
 #include "modules/core/decoded.hpp"
 #include "modules/core/stamp.hpp"
+#include "modules/recordings/ros_types.hpp"
 
 namespace km {
 
@@ -30,24 +33,16 @@ class RosReader {
   static Decoded<RosReader> open(std::string_view encoding, std::span<const std::uint8_t> bytes);
 
   /// Reads fields, each by its type: numbers, bool, string, builtin_interfaces/Time [ns] (Stamp),
-  /// uint8[] and float64[] (std::vector), and arrays of constant length.
+  /// messages of ros_types.hpp, arrays of constant length (std::array, Eigen) and others
+  /// (std::vector).
   template <typename... Fields>
   void operator()(Fields&... fields) {
     (get(fields), ...);
   }
-  /// Reads the number of elements, each of at least `bytes_per_element`, and resizes `elements`.
-  /// Fails if they exceed the remaining bytes.
-  template <typename Element>
-  void resize(std::vector<Element>& elements, std::size_t bytes_per_element) {
-    elements.resize(count(bytes_per_element));
-  }
-  /// Skips the sequence number of std_msgs/Header, which exists only in ROS 1.
-  void skip_sequence();
 
   /// Reason why the bytes do not fit the fields read: too short or too long; null if they fit.
   [[nodiscard]] const char* problem() const;
   [[nodiscard]] bool failed() const { return reader_.failed(); }
-  void fail() { reader_.fail(); }
 
  private:
   RosReader(std::span<const std::uint8_t> bytes, bool is_cdr, bool is_big_endian)
@@ -64,7 +59,11 @@ class RosReader {
   void get(std::string& value);
   void get(Stamp& value);
   void get(std::vector<std::uint8_t>& values);
-  void get(std::vector<double>& values);
+  template <typename T>
+  void get(std::vector<T>& values) {
+    values.clear();  // grows as far as the bytes reach, whatever number they state
+    for (auto left = number(4); left > 0 && !failed(); --left) get(values.emplace_back());
+  }
   template <typename T, std::size_t kSize>
   void get(std::array<T, kSize>& values) {
     for (T& value : values) get(value);
@@ -73,8 +72,18 @@ class RosReader {
   void get(Eigen::Matrix<T, kSize, 1>& vector) {
     for (T& value : vector) get(value);
   }
+  void get(Eigen::Quaterniond& rotation) { get(rotation.coeffs()); }  // x, y, z, w
+  template <typename Message>
+  requires requires { Message::kType; }
+  void get(Message& message) {
+    // The sequence number exists only in ROS 1.
+    if constexpr (std::is_same_v<Message, RosHeader>)
+      if (!is_cdr_) static_cast<void>(number(4));
+    Message::visit(*this, message);
+    if constexpr (std::is_same_v<Message, RosImage>)
+      if (message.data.size() < std::uint64_t{message.step} * message.height) reader_.fail();
+  }
   [[nodiscard]] std::uint64_t number(std::size_t size);
-  [[nodiscard]] std::size_t count(std::size_t bytes_per_element);
 
   ByteReader reader_;
   std::size_t size_;
@@ -89,12 +98,6 @@ class RosWriter {
   void operator()(const Fields&... fields) {
     (put(fields), ...);
   }
-  template <typename Element>
-  void resize(const std::vector<Element>& elements, std::size_t /*bytes_per_element*/) {
-    number(elements.size(), 4);
-  }
-  void skip_sequence() {}
-  void fail() {}
 
   /// The bytes with the encapsulation header.
   [[nodiscard]] std::vector<std::uint8_t> release() { return std::move(bytes_); }
@@ -111,7 +114,11 @@ class RosWriter {
   void put(const std::string& value);
   void put(Stamp value);
   void put(const std::vector<std::uint8_t>& values);
-  void put(const std::vector<double>& values);
+  template <typename T>
+  void put(const std::vector<T>& values) {
+    number(values.size(), 4);
+    for (const T& value : values) put(value);
+  }
   template <typename T, std::size_t kSize>
   void put(const std::array<T, kSize>& values) {
     for (const T value : values) put(value);
@@ -120,6 +127,10 @@ class RosWriter {
   void put(const Eigen::Matrix<T, kSize, 1>& vector) {
     for (const T value : vector) put(value);
   }
+  void put(const Eigen::Quaterniond& rotation) { put(rotation.coeffs()); }
+  template <typename Message>
+  requires requires { Message::kType; }
+  void put(const Message& message) { Message::visit(*this, message); }
   void number(std::uint64_t value, std::size_t size);
 
   std::vector<std::uint8_t> bytes_ = {0, 1, 0, 0};

@@ -25,14 +25,14 @@ std::optional<SE3> pose_of(const KeyframeId& keyframe, const Trajectory& traject
 
 }  // namespace
 
-RosMarkers closure_lines(std::span<const PublishedClosure> closures, const Trajectory& trajectory,
-                         const RosHeader& header) {
-  RosMarkers message;
+RosMarkerArray closure_lines(std::span<const PublishedClosure> closures,
+                             const Trajectory& trajectory, const RosHeader& header) {
+  RosMarkerArray message;
   for (const Kind& kind : kKinds) {
     RosMarker& marker = message.markers.emplace_back();
     marker.header = header;
-    marker.name_space = kind.name;
-    marker.type = RosMarker::kLineList;
+    marker.ns = kind.name;
+    marker.type = RosMarkerType::kLineList;
     marker.scale = {kLine_m, 0.0, 0.0};
     marker.color = {kind.color[0], kind.color[1], kind.color[2], 1.0F};
   }

@@ -20,7 +20,7 @@ struct PublishedClosure {
 /// verified (yellow), rejected (red) and kept (green). It always returns all four markers, so that
 /// viewers remove old lines. A line to a keyframe of another robot ends where the closure places
 /// that keyframe. Lines to keyframes without a known pose are omitted.
-[[nodiscard]] RosMarkers closure_lines(std::span<const PublishedClosure> closures,
-                                       const Trajectory& trajectory, const RosHeader& header);
+[[nodiscard]] RosMarkerArray closure_lines(std::span<const PublishedClosure> closures,
+                                           const Trajectory& trajectory, const RosHeader& header);
 
 }  // namespace km

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "modules/core/write_file.hpp"
-#include "modules/recordings/ros_definitions.hpp"
+#include "modules/recordings/ros_messages.hpp"
 
 namespace km {
 

@@ -7,15 +7,15 @@
 
 namespace km {
 
-RosPointCloud cloud_of(const LabelledMesh& mesh, std::size_t most, RosHeader header) {
+RosPointCloud2 cloud_of(const LabelledMesh& mesh, std::size_t most, RosHeader header) {
   const bool has_colors = mesh.colors.size() == mesh.vertices.size();
   const std::size_t step = (mesh.vertices.size() + most - 1) / most;
-  RosPointCloud cloud;
+  RosPointCloud2 cloud;
   cloud.header = std::move(header);
   cloud.height = 1;
   for (const char* name : {"x", "y", "z", "rgb"}) {
     if (!has_colors && cloud.fields.size() == 3) break;
-    cloud.fields.push_back({name, cloud.point_step, RosPointCloud::kFloat32, 1});
+    cloud.fields.push_back({name, cloud.point_step, kRosFloat32, 1});
     cloud.point_step += sizeof(float);
   }
   ByteWriter data;
@@ -39,8 +39,9 @@ RosMarker surface_of(const LabelledMesh& mesh, std::span<const LabelledMesh::Fac
   const bool has_colors = mesh.colors.size() == mesh.vertices.size();
   RosMarker marker;
   marker.header = std::move(header);
-  marker.name_space = "mesh";
-  marker.type = RosMarker::kTriangleList;
+  marker.ns = "mesh";
+  marker.type = RosMarkerType::kTriangleList;
+  marker.scale.setOnes();
   marker.color = {kGrey, kGrey, kGrey, 1.0F};
   marker.points.reserve(3 * faces.size());
   if (has_colors) marker.colors.reserve(3 * faces.size());

@@ -21,25 +21,27 @@ Eigen::Vector4f color_of(const LabelPalette& palette, LabelId label) {
 
 }  // namespace
 
-RosMarkers object_markers(std::span<const MapObject> objects, const LabelPalette& palette,
-                          const RosHeader& header) {
-  RosMarkers message;
+RosMarkerArray object_markers(std::span<const MapObject> objects, const LabelPalette& palette,
+                              const RosHeader& header) {
+  RosMarkerArray message;
   RosMarker& clear = message.markers.emplace_back();
   clear.header = header;
-  clear.action = RosMarker::kDeleteAll;
+  clear.action = RosMarkerAction::kDeleteAll;
+  clear.scale.setOnes();
+  clear.color.setOnes();
   for (const MapObject& object : objects) {
     const SE3 T_map_box = object.box.pose();
     RosMarker marker;
     marker.header = header;
-    marker.name_space = "boxes";
+    marker.ns = "boxes";
     marker.id = static_cast<std::int32_t>(message.markers.size() / 2);
-    marker.type = RosMarker::kCube;
+    marker.type = RosMarkerType::kCube;
     marker.pose = {T_map_box.translation(), Eigen::Quaterniond(T_map_box.linear())};
     marker.scale = object.box.size_m.cwiseMax(kThinnest_m);
     marker.color = color_of(palette, object.label);
     message.markers.push_back(marker);
-    marker.name_space = "names";
-    marker.type = RosMarker::kText;
+    marker.ns = "names";
+    marker.type = RosMarkerType::kText;
     marker.pose.position.z() += 0.5 * object.box.size_m.z() + kText_m;
     marker.scale = {0.0, 0.0, kText_m};
     marker.color = {1.0F, 1.0F, 1.0F, 1.0F};

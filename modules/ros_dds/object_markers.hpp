@@ -10,7 +10,7 @@ namespace km {
 
 /// Draws objects: a transparent box in the colour of the class, and above it the name of the class.
 /// The first marker deletes all others, so that the message is the full state.
-[[nodiscard]] RosMarkers object_markers(std::span<const MapObject> objects,
-                                        const LabelPalette& palette, const RosHeader& header);
+[[nodiscard]] RosMarkerArray object_markers(std::span<const MapObject> objects,
+                                            const LabelPalette& palette, const RosHeader& header);
 
 }  // namespace km

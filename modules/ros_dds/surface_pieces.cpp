@@ -68,7 +68,7 @@ std::optional<RosMarker> SurfacePieces::next(const RosHeader& header) {
   RosMarker marker =
       surface_of(*published_, std::span(published_->faces).subspan(begin, size), header);
   marker.id = static_cast<std::int32_t>(next_++);
-  if (size == 0) marker.action = RosMarker::kDelete;
+  if (size == 0) marker.action = RosMarkerAction::kDelete;
   return marker;
 }
 

@@ -92,9 +92,9 @@ TEST_CASE("A robot's record has the poses of its results, also for readers that 
   check_equal(record.last<RosPath>("/alice/path"),
               read_trajectory(folder.path() / "optimized.tum"));
   const auto faces = record.last<RosMarker>("/alice/mesh_faces");
-  CHECK(faces.header.frame == "alice/map");
+  CHECK(faces.header.frame_id == "alice/map");
   CHECK(faces.points.size() > 1000);
-  CHECK(record.last<RosMarkers>("/alice/closures").markers.size() == 4);
+  CHECK(record.last<RosMarkerArray>("/alice/closures").markers.size() == 4);
 
   const auto read = read_by_others(file, folder);
   if (!read) {
@@ -176,10 +176,10 @@ TEST_CASE("A team's records become one", "[system]") {
   std::set<std::pair<std::string, std::string>> links;
   for (const TopicMessage& message : team.messages)
     if (message.topic == "/tf" || message.topic == "/tf_static") {
-      const auto transforms = decode_ros<RosTransforms>("cdr", message.bytes);
+      const auto transforms = decode_ros<RosTFMessage>("cdr", message.bytes);
       REQUIRE(transforms.value);
-      for (const RosTransform& link : transforms.value->transforms)
-        links.emplace(link.header.frame, link.child_frame);
+      for (const RosTransformStamped& link : transforms.value->transforms)
+        links.emplace(link.header.frame_id, link.child_frame_id);
     }
   CHECK(links.contains({"map", "a/map"}));
   CHECK(links.contains({"a/map", "b/map"}));

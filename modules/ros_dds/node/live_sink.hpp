@@ -14,7 +14,12 @@ class LiveSink final : public RosSink {
   explicit LiveSink(std::shared_ptr<const RosNetwork> network) : network_(std::move(network)) {}
 
   /// Throws DdsError, and std::invalid_argument for a type that RosNetwork does not know.
-  std::size_t open(const PublishedTopic& topic) override;
+  std::size_t open(const PublishedTopic& topic) override {
+    publishers_.push_back(std::make_unique<RosPublisher>(
+        network_, topic.name, topic.type, topic.is_state ? RosQos::kLatched : RosQos::kReliable,
+        topic.depth));
+    return publishers_.size() - 1;
+  }
   void put(std::size_t topic, std::optional<Stamp> /*time*/,
            std::span<const std::uint8_t> message) override {
     publishers_.at(topic)->publish(message);

@@ -5,8 +5,9 @@
 #include <utility>
 
 #include "modules/core/text_table.hpp"
-#include "modules/recordings/ros_definitions.hpp"
-#include "modules/ros_dds/jpeg_image.hpp"
+#include "modules/images/image_codec.hpp"
+#include "modules/images/image_view.hpp"
+#include "modules/recordings/ros_messages.hpp"
 #include "modules/ros_dds/mesh_cloud.hpp"
 #include "modules/ros_dds/object_markers.hpp"
 #include "runtime/clock.hpp"
@@ -24,30 +25,34 @@ RosPose message_of(const SE3& T) {
   return {T.translation(), Eigen::Quaterniond(T.linear())};
 }
 
+RosTransform transform_of(const SE3& T) {
+  return {T.translation(), Eigen::Quaterniond(T.linear())};
+}
+
 RosOccupancyGrid message_of(const OccupancyGrid& grid, const RosHeader& header) {
   RosOccupancyGrid message{.header = header,
-                           .map_load_time = header.stamp,
-                           .resolution = static_cast<float>(grid.resolution_m),
-                           .width = static_cast<std::uint32_t>(grid.width),
-                           .height = static_cast<std::uint32_t>(grid.height),
-                           .origin = {},
+                           .info = {.map_load_time = header.stamp,
+                                    .resolution = static_cast<float>(grid.resolution_m),
+                                    .width = static_cast<std::uint32_t>(grid.width),
+                                    .height = static_cast<std::uint32_t>(grid.height),
+                                    .origin = {}},
                            .data = {grid.cells.begin(), grid.cells.end()}};
-  message.origin.position << grid.origin, grid.z_m;
+  message.info.origin.position << grid.origin, grid.z_m;
   return message;
 }
 
 std::uint8_t level_of(log::Level level) {
   switch (level) {
     case log::Level::kError:
-      return RosLog::kError;
+      return RosLogLevel::kError;
     case log::Level::kWarn:
-      return RosLog::kWarn;
+      return RosLogLevel::kWarn;
     case log::Level::kInfo:
-      return RosLog::kInfo;
+      return RosLogLevel::kInfo;
     case log::Level::kDebug:
       break;
   }
-  return RosLog::kDebug;
+  return RosLogLevel::kDebug;
 }
 
 }  // namespace
@@ -98,20 +103,20 @@ void RosOutputNode::open_topics(bool has_images) {
   constexpr int kManyTransforms = 100;
   odometry_ = sink_->open({prefix + "odometry", RosOdometry::kType});
   pose_ = sink_->open({prefix + "pose", RosPoseWithCovarianceStamped::kType});
-  tf_ = sink_->open({"/tf", RosTransforms::kType, false, kManyTransforms});
+  tf_ = sink_->open({"/tf", RosTFMessage::kType, false, kManyTransforms});
   path_ = latest("path", RosPath::kType);
-  mesh_ = latest("mesh", RosPointCloud::kType);
+  mesh_ = latest("mesh", RosPointCloud2::kType);
   map_2d_ = latest("map_2d", RosOccupancyGrid::kType);
-  diagnostics_ = sink_->open({"/diagnostics", RosDiagnostics::kType});
+  diagnostics_ = sink_->open({"/diagnostics", RosDiagnosticArray::kType});
   if (options_.draws || options_.mesh_faces > 0) {
     const std::size_t pieces = SurfacePieces::count(static_cast<std::size_t>(options_.mesh_faces));
     faces_ = sink_->open(
         {prefix + "mesh_faces", RosMarker::kType, true, std::max(static_cast<int>(pieces), 1)});
   }
   if (options_.draws) {
-    closures_ = latest("closures", RosMarkers::kType);
+    closures_ = latest("closures", RosMarkerArray::kType);
   }
-  if (options_.objects) objects_ = latest("objects", RosMarkers::kType);
+  if (options_.objects) objects_ = latest("objects", RosMarkerArray::kType);
   if (options_.logs) log_ = sink_->open({"/rosout", RosLog::kType});
   if (options_.slices) open_slices();
   if (has_images)
@@ -119,7 +124,7 @@ void RosOutputNode::open_topics(bool has_images) {
 }
 
 void RosOutputNode::open_slices() {
-  slice_ = sink_->open({'/' + name_ + "/distance_slice", RosPointCloud::kType, true, 1});
+  slice_ = sink_->open({'/' + name_ + "/distance_slice", RosPointCloud2::kType, true, 1});
 }
 
 void RosOutputNode::start() {
@@ -152,13 +157,14 @@ void RosOutputNode::listen(const log::Entry& entry) {
   RosLog line;
   line.level = level_of(entry.level);
   line.name = name_ + '.' + entry.tag;
-  line.text = entry.text;
+  line.msg = entry.text;
   worker_.post(std::make_shared<const RosLog>(std::move(line)));
 }
 
 void RosOutputNode::encode(const Image& image) {
-  worker_.post(std::make_shared<const RosCompressedImage>(
-      jpeg_of(image->left, {image->stamp, name_ + "/left_camera"})));
+  constexpr int kQuality = 80;
+  worker_.post(std::make_shared<const RosCompressedImage>(RosCompressedImage{
+      {image->stamp, name_ + "/left_camera"}, "jpeg", encode_jpeg(view(image->left), kQuality)}));
 }
 
 void RosOutputNode::encode(const std::shared_ptr<const LabelledMesh>& mesh) {
@@ -195,22 +201,22 @@ void RosOutputNode::step(const Topic<OdometryState>::Message& state) {
   stamp_arrived_s_ = steady_now_s();
   RosOdometry odometry;
   odometry.header = {state->stamp, odom_};
-  odometry.child_frame = base_link_;
-  odometry.pose = message_of(state->T_odom_body);
-  odometry.linear_velocity = state->T_odom_body.linear().transpose() * state->v_odom;
-  odometry.angular_velocity = frames_.angular_rate();
+  odometry.child_frame_id = base_link_;
+  odometry.pose.pose = message_of(state->T_odom_body);
+  odometry.twist.twist.linear = state->T_odom_body.linear().transpose() * state->v_odom;
+  odometry.twist.twist.angular = frames_.angular_rate();
   publish(odometry_, odometry);
-  RosTransforms transforms;
+  RosTFMessage transforms;
   if (!trajectory_->T_world_kf.empty() || !options_.awaits_trajectory) {
     const UncertainPose T_map_body = frames_.T_map_body(state->T_odom_body);
-    RosPoseWithCovarianceStamped pose{{state->stamp, map_}, message_of(T_map_body.T), {}};
-    Eigen::Map<Matrix6>(pose.covariance.data()) = along_fixed_axes(T_map_body);
+    RosPoseWithCovarianceStamped pose{{state->stamp, map_}, {message_of(T_map_body.T), {}}};
+    Eigen::Map<Matrix6>(pose.pose.covariance.data()) = along_fixed_axes(T_map_body);
     publish(pose_, pose);
     transforms.transforms.push_back(
-        {{state->stamp, map_}, odom_, message_of(frames_.T_map_odom())});
+        {{state->stamp, map_}, odom_, transform_of(frames_.T_map_odom())});
   }
   transforms.transforms.push_back(
-      {{state->stamp, odom_}, base_link_, message_of(state->T_odom_body)});
+      {{state->stamp, odom_}, base_link_, transform_of(state->T_odom_body)});
   publish(tf_, transforms);
   publish_pieces();
 }
@@ -331,7 +337,7 @@ void RosOutputNode::publish_pieces() {
 void RosOutputNode::publish_team_frame() {
   const std::string team = map_of(trajectory_->anchor);
   if (trajectory_->T_world_kf.empty() || team == map_) return;
-  publish(tf_, RosTransforms{{{{stamp_.value_or(0), team}, map_, RosPose{}}}});
+  publish(tf_, RosTFMessage{{{{stamp_.value_or(0), team}, map_, {}}}});
 }
 
 RosDiagnosticStatus RosOutputNode::odometry_status() const {
@@ -339,7 +345,7 @@ RosDiagnosticStatus RosOutputNode::odometry_status() const {
   status.name = name_ + ": odometry";
   status.hardware_id = name_;
   const double age_s = steady_now_s() - stamp_arrived_s_;
-  if (poses_ == 0 || age_s > kLate_s) status.level = RosDiagnosticStatus::kWarn;
+  if (poses_ == 0 || age_s > kLate_s) status.level = RosLevel::kWarn;
   status.message = poses_ == 0       ? "no image has a pose yet"
                    : age_s > kLate_s ? "no pose for " + fixed(age_s, 1) + " s"
                                      : "ok";
@@ -356,7 +362,7 @@ void RosOutputNode::publish_diagnostics(std::vector<RosDiagnosticStatus> parts) 
     status.hardware_id = name_;
   }
   parts.insert(parts.begin(), odometry_status());
-  publish(diagnostics_, RosDiagnostics{{stamp_.value_or(0), ""}, std::move(parts)});
+  publish(diagnostics_, RosDiagnosticArray{{stamp_.value_or(0), ""}, std::move(parts)});
 }
 
 void RosOutputNode::step(const std::shared_ptr<const Tick>& /*tick*/) {

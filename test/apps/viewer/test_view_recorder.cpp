@@ -109,46 +109,46 @@ TEST_CASE("A viewer's record has the messages of each robot as the robot's own r
   CHECK(to_string(record.reader.report()) == "");
 
   const auto path = record.last<RosPath>("/bob/path");
-  CHECK(path.header.frame == "bob/map");
+  CHECK(path.header.frame_id == "bob/map");
   REQUIRE(path.poses.size() == 3);
   CHECK(path.poses[1].header.stamp == kRecordBegin + 11 * kSecond);
   CHECK(path.poses[1].pose.position == Eigen::Vector3d(1, 2, 0));
   const auto pose = record.last<RosPoseWithCovarianceStamped>("/bob/pose");  // corrected
   CHECK(pose.header.stamp == kRecordBegin + 25 * kSecond / 2);
-  CHECK(pose.pose.position == Eigen::Vector3d(2.5, 2, 0));
+  CHECK(pose.pose.pose.position == Eigen::Vector3d(2.5, 2, 0));
   CHECK(record.count("/bob/odometry") == 4);  // three keyframes, one pose
-  CHECK(record.last<RosOdometry>("/bob/odometry").linear_velocity == Eigen::Vector3d(1, 0, 0));
+  CHECK(record.last<RosOdometry>("/bob/odometry").twist.twist.linear == Eigen::Vector3d(1, 0, 0));
 
   const auto faces = record.last<RosMarker>("/alice/mesh_faces");
   CHECK(faces.points.size() == 3 * wavy_sheet(4, 0.1).faces.size());
   REQUIRE_FALSE(faces.colors.empty());
   CHECK(faces.colors[0] == Eigen::Vector4f(1, 0, 0.2F, 1));
-  const auto lines = record.last<RosMarkers>("/bob/closures").markers.at(3);
-  CHECK(lines.name_space == "kept");
+  const auto lines = record.last<RosMarkerArray>("/bob/closures").markers.at(3);
+  CHECK(lines.ns == "kept");
   CHECK(lines.points == std::vector<Eigen::Vector3d>{{1, 0, 0}, {2, 2, 0}});
   CHECK(record.last<RosCompressedImage>("/bob/left/image_raw/compressed").data ==
         std::vector<std::uint8_t>{0xFF, 0xD8});
 
-  const auto objects = record.last<RosMarkers>("/bob/objects").markers;
+  const auto objects = record.last<RosMarkerArray>("/bob/objects").markers;
   REQUIRE(objects.size() == 3);  // the first deletes those before
-  CHECK(objects[1].header.frame == "bob/map");
+  CHECK(objects[1].header.frame_id == "bob/map");
   CHECK(objects[1].pose.position == Eigen::Vector3d(1, 0.5, 0.25));
   CHECK(objects[2].text == "wall");
   const auto map = record.last<RosOccupancyGrid>("/bob/map_2d");
-  CHECK(map.header.frame == "bob/map");
-  CHECK(map.origin.position == Eigen::Vector3d(-1, 2, 0));
+  CHECK(map.header.frame_id == "bob/map");
+  CHECK(map.info.origin.position == Eigen::Vector3d(-1, 2, 0));
   CHECK(map.data == std::vector<std::uint8_t>{OccupancyGrid::kFree, OccupancyGrid::kOccupied});
-  const auto slice = record.last<RosPointCloud>("/bob/distance_slice");
-  CHECK(slice.header.frame == "bob/odom");
+  const auto slice = record.last<RosPointCloud2>("/bob/distance_slice");
+  CHECK(slice.header.frame_id == "bob/odom");
   CHECK(slice.width == 1);
 
   std::set<std::pair<std::string, std::string>> links;
   for (const TopicMessage& message : record.messages)
     if (message.topic == "/tf") {
-      const auto transforms = decode_ros<RosTransforms>("cdr", message.bytes);
+      const auto transforms = decode_ros<RosTFMessage>("cdr", message.bytes);
       REQUIRE(transforms.value);
-      for (const RosTransform& link : transforms.value->transforms)
-        links.emplace(link.header.frame, link.child_frame);
+      for (const RosTransformStamped& link : transforms.value->transforms)
+        links.emplace(link.header.frame_id, link.child_frame_id);
     }
   CHECK(links == std::set<std::pair<std::string, std::string>>{{"alice/map", "alice/odom"},
                                                                {"alice/odom", "alice/base_link"},
@@ -202,7 +202,7 @@ std::set<std::string> diagnosed(const fs::path& file) {
   for (const TopicMessage& message : record.messages)
     if (message.topic == "/diagnostics")
       names.insert(
-          decode_ros<RosDiagnostics>("cdr", message.bytes).value.value().status[0].hardware_id);
+          decode_ros<RosDiagnosticArray>("cdr", message.bytes).value.value().status[0].hardware_id);
   return names;
 }
 

@@ -26,13 +26,13 @@ AbsoluteFixesConfig gnss_config() {
 }
 
 RosNavSatFix nav_sat_fix(Stamp stamp) {
-  RosNavSatFix fix{.header = {.stamp = stamp, .frame = "gps"},
+  RosNavSatFix fix{.header = {.stamp = stamp, .frame_id = "gps"},
                    .latitude = kDatum.latitude_deg,
                    .longitude = kDatum.longitude_deg,
                    .altitude = kDatum.altitude_m + 2.0};
   fix.position_covariance[0] = fix.position_covariance[4] = 0.25;
   fix.position_covariance[8] = 1.0;
-  fix.covariance_type = 2;
+  fix.position_covariance_type = 2;
   return fix;
 }
 
@@ -74,7 +74,7 @@ TEST_CASE("unusable fixes are counted by reason", "[absolute_fixes]") {
   CHECK_FALSE(read(reader, nav_sat_fix(100)));
   CHECK_FALSE(read(reader, RosPoseStamped{}));
   RosNavSatFix unknown = nav_sat_fix(300);
-  unknown.covariance_type = RosNavSatFix::kUnknown;
+  unknown.position_covariance_type = kRosUnknownCovariance;
   const auto usual = read(reader, unknown);
   REQUIRE(usual);
   CHECK(usual->sigma_m == 3.0);

@@ -7,8 +7,8 @@
 
 #include "modules/core/bytes.hpp"
 #include "modules/core/stamp.hpp"
-#include "modules/recordings/compress.hpp"
 #include "modules/recordings/mcap_records.hpp"
+#include "test/modules/recordings/compressed.hpp"
 
 namespace km {
 
@@ -50,7 +50,7 @@ class McapFile {
       ++counts_[message.channel];
     }
     const Bytes plain = records.release();
-    const Bytes packed = compress(options_.compression, plain);
+    const Bytes packed = compressed(options_.compression, plain);
     const std::uint64_t begin = file_.size();
     put_mcap(file_, McapChunk{.message_start_time = start,
                               .message_end_time = start,

@@ -70,12 +70,5 @@ TEST_CASE("Messages of chunks that overlap come in order of time and of the file
   CHECK((merged.loads == times.size()) == (held_bytes > 25));
 }
 
-TEST_CASE("Messages earlier than the stated begin of their chunk are dropped", "[recordings]") {
-  const Merged merged = merge({{10, 20, 30}, {5, 15, 25}}, {10, 20});
-  CHECK(merged.lost == std::vector<Stamp>{5});  // 10 was given when the second chunk was due
-  REQUIRE(merged.messages.size() == 5);
-  CHECK(merged.messages[1].log_time == 15);
-}
-
 }  // namespace
 }  // namespace km

@@ -10,21 +10,21 @@ namespace {
 
 RosCameraInfo some_info() {
   RosCameraInfo info;
-  info.header.frame = "left_optical";
+  info.header.frame_id = "left_optical";
   info.width = 640;
   info.height = 480;
   info.distortion_model = "plumb_bob";
-  info.D = {-0.28, 0.07, 2e-4, 1e-5, 0.0};
-  info.K = {458.0, 0, 320.5, 0, 457.0, 240.5, 0, 0, 1};
-  info.R = {1, 0, 0, 0, 1, 0, 0, 0, 1};
-  info.P = {430.0, 0, 318.0, 0, 0, 430.0, 239.0, 0, 0, 0, 1, 0};
+  info.d = {-0.28, 0.07, 2e-4, 1e-5, 0.0};
+  info.k = {458.0, 0, 320.5, 0, 457.0, 240.5, 0, 0, 1};
+  info.r = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+  info.p = {430.0, 0, 318.0, 0, 0, 430.0, 239.0, 0, 0, 0, 1, 0};
   return info;
 }
 
 // The other half of a pair with a baseline of 0.1 m.
 RosCameraInfo right_of(RosCameraInfo left) {
-  left.header.frame = "right_optical";
-  left.P[3] = -43.0;
+  left.header.frame_id = "right_optical";
+  left.p[3] = -43.0;
   return left;
 }
 
@@ -47,33 +47,25 @@ TEST_CASE("A rectified image's camera is that of P", "[recordings]") {
   CHECK(camera.lens.is_ideal());
 }
 
-TEST_CASE("A region that is the whole camera is none", "[recordings]") {
-  RosCameraInfo info = some_info();
-  info.binning_x = info.binning_y = 1;
-  info.region.width = info.width;
-  info.region.height = info.height;
-  CHECK(camera_of(info, RosImages::kRaw).fx == 458.0);
-}
-
 TEST_CASE("ROS's models of distortion are lenses", "[recordings]") {
   RosCameraInfo info = some_info();
   const auto lens = [&] { return camera_of(info, RosImages::kRaw).lens; };
-  info.D = {-0.28, 0.07, 2e-4, 1e-5, 0.03};
-  CHECK(lens() == Lens(LensModel::kRadialTangential, info.D));
-  info.D = {0, 0, 0, 0, 0};  // as of rectified images
+  info.d = {-0.28, 0.07, 2e-4, 1e-5, 0.03};
+  CHECK(lens() == Lens(LensModel::kRadialTangential, info.d));
+  info.d = {0, 0, 0, 0, 0};  // as of rectified images
   CHECK(lens().is_ideal());
   info.distortion_model = "rational_polynomial";
-  info.D = {0.4, 0.1, 1e-4, 2e-4, 0.01, 0.8, 0.3, 0.04};
-  CHECK(lens() == Lens(LensModel::kRadialTangential, info.D));
-  info.D.resize(12, 0.0);
+  info.d = {0.4, 0.1, 1e-4, 2e-4, 0.01, 0.8, 0.3, 0.04};
+  CHECK(lens() == Lens(LensModel::kRadialTangential, info.d));
+  info.d.resize(12, 0.0);
   CHECK(lens().coefficients().size() == 8);
   for (const char* name : {"equidistant", "fisheye"}) {
     info.distortion_model = name;
-    info.D = {0.003, 7e-4, -2e-3, 2e-4};
-    CHECK(lens() == Lens(LensModel::kEquidistant, info.D));
+    info.d = {0.003, 7e-4, -2e-3, 2e-4};
+    CHECK(lens() == Lens(LensModel::kEquidistant, info.d));
   }
   info.distortion_model = "";
-  info.D = {};
+  info.d = {};
   CHECK(lens().is_ideal());
 }
 
@@ -81,23 +73,23 @@ TEST_CASE("The baseline is computed from P of the right camera", "[recordings]")
   CHECK(baseline_m(right_of(some_info())).value() == Approx(0.1));
   CHECK(!baseline_m(some_info()));
   RosCameraInfo info = right_of(some_info());
-  info.P[3] = 43.0;  // a camera to the left
+  info.p[3] = 43.0;  // a camera to the left
   CHECK(!baseline_m(info));
-  info.P.fill(0.0);
+  info.p.fill(0.0);
   CHECK(!baseline_m(info));
 }
 
 TEST_CASE("The frame of a CameraInfo is the rectified camera's", "[recordings]") {
   RosCameraInfo info = some_info();
   const Eigen::Matrix3d R = so3_exp({0.01, -0.03, 0.02});
-  Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(info.R.data()) = R;
+  Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(info.r.data()) = R;
   // By the message's documentation R takes what the camera sees to the rectified camera.
   const Eigen::Vector3d p_raw(0.4, -0.3, 2.0);
   CHECK((T_frame_camera(info, RosImages::kRaw) * p_raw).isApprox(R * p_raw, 1e-12));
   CHECK(T_frame_camera(info, RosImages::kRectified).isApprox(SE3::Identity()));
-  info.R.fill(0.0);
+  info.r.fill(0.0);
   CHECK(T_frame_camera(info, RosImages::kRaw).isApprox(SE3::Identity()));
-  info.R[0] = 2.0;
+  info.r[0] = 2.0;
   CHECK_THROWS_WITH(T_frame_camera(info, RosImages::kRaw),
                     Catch::Contains("frame 'left_optical': R is not a rotation"));
 }
@@ -108,27 +100,27 @@ TEST_CASE("A CameraInfo that is no calibration is refused by frame and field", "
     void (*spoil)(RosCameraInfo&);
   };
   const Case c = GENERATE(
-      Case{"K is 0: the camera is not calibrated", [](auto& info) { info.K.fill(0.0); }},
+      Case{"K is 0: the camera is not calibrated", [](auto& info) { info.k.fill(0.0); }},
       Case{"width and height: sides are whole numbers", [](auto& info) { info.width = 0; }},
-      Case{"K: a focal length of -457 px", [](auto& info) { info.K[4] = -457.0; }},
-      Case{"K: a skew of 0.5", [](auto& info) { info.K[1] = 0.5; }},
+      Case{"K: a focal length of -457 px", [](auto& info) { info.k[4] = -457.0; }},
+      Case{"K: a skew of 0.5", [](auto& info) { info.k[1] = 0.5; }},
       Case{"distortion_model 'thin_prism' is not supported, only plumb_bob",
            [](auto& info) { info.distortion_model = "thin_prism"; }},
       Case{"distortion_model '' is not supported", [](auto& info) { info.distortion_model = ""; }},
       Case{"D has 12 coefficients; of rational_polynomial only 8 are supported",
            [](auto& info) {
              info.distortion_model = "rational_polynomial";
-             info.D = {0, 0, 0, 0, 0, 0, 0, 0, 1e-3, 0, 0, 0};
+             info.d = {0, 0, 0, 0, 0, 0, 0, 0, 1e-3, 0, 0, 0};
            }},
       Case{"binning_x 0, binning_y 2: binned images are not supported",
            [](auto& info) { info.binning_y = 2; }},
       Case{"roi: images of a part of the camera are not supported",
            [](auto& info) {
-             info.region.x_offset = 8;
-             info.region.height = 480;
-             info.region.width = 632;
+             info.roi.x_offset = 8;
+             info.roi.height = 480;
+             info.roi.width = 632;
            }},
-      Case{"D: nan is outside", [](auto& info) { info.D[0] = std::nan(""); }});
+      Case{"D: nan is outside", [](auto& info) { info.d[0] = std::nan(""); }});
   CAPTURE(c.why);
   RosCameraInfo info = some_info();
   c.spoil(info);

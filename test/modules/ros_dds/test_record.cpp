@@ -6,9 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "modules/recordings/mcap_attachments.hpp"
 #include "modules/recordings/mcap_reader.hpp"
-#include "modules/recordings/ros_definitions.hpp"
+#include "modules/recordings/ros_messages.hpp"
 #include "modules/ros_dds/mcap_sink.hpp"
 #include "modules/ros_dds/mesh_cloud.hpp"
 #include "modules/ros_dds/node/ros_output_node.hpp"
@@ -55,20 +54,20 @@ std::size_t count(const std::vector<TopicMessage>& messages, const std::string& 
 }  // namespace
 
 TEST_CASE("Closures are drawn as lines by their stage", "[ros_dds]") {
-  const RosMarkers message = closure_lines(closures(), straight(3), {5, "map"});
+  const RosMarkerArray message = closure_lines(closures(), straight(3), {5, "map"});
   REQUIRE(message.markers.size() == 4);
   const auto points = [&](std::size_t kind) { return message.markers[kind].points; };
   using Points = std::vector<Eigen::Vector3d>;
-  CHECK(message.markers[0].name_space == "candidates");
+  CHECK(message.markers[0].ns == "candidates");
   CHECK(points(0).empty());  // the other ends are unknown
   CHECK(points(1).empty());
-  CHECK(message.markers[2].name_space == "rejected");
+  CHECK(message.markers[2].ns == "rejected");
   CHECK(points(2) == Points{{0, 0, 0}, {10, 0, 0}});
-  CHECK(message.markers[3].name_space == "kept");
+  CHECK(message.markers[3].ns == "kept");
   CHECK(points(3) == Points{{0, 0, 0}, {2, 0, 0}});  // as optimised, not as measured
   for (const RosMarker& marker : message.markers) {
-    CHECK(marker.type == RosMarker::kLineList);
-    CHECK(marker.header.frame == "map");
+    CHECK(marker.type == RosMarkerType::kLineList);
+    CHECK(marker.header.frame_id == "map");
   }
 }
 
@@ -78,7 +77,7 @@ TEST_CASE("The faces of a mesh have the colours of their vertices", "[ros_dds]")
   mesh.colors = {{255, 0, 0}, {0, 255, 0}, {0, 0, 51}};
   mesh.faces = {{2, 0, 1}};
   const RosMarker marker = surface_of(mesh, mesh.faces, {5, "map"});
-  CHECK(marker.type == RosMarker::kTriangleList);
+  CHECK(marker.type == RosMarkerType::kTriangleList);
   REQUIRE(marker.points.size() == 3);
   REQUIRE(marker.colors.size() == 3);
   CHECK(marker.points[0] == Eigen::Vector3d(7, 8, 9));
@@ -113,14 +112,18 @@ TEST_CASE("A robot's record holds the published messages and the final states", 
        .id = 3,
        .name_of = [](RobotId robot) { return robot == 3 ? "bob 3" : "alice"; },
        .mesh_points = 100,
+       .objects = LabelPalette({{7, "chair", {255, 0, 0}}}),
        .draws = true,
        .logs = true,
        .state_bytes_per_s = 1e-3},
-      [] { return std::vector<RosDiagnosticStatus>(); }, [] { return closures(); },
-      {odometry, keyframes, trajectories, In<SensorPacket>(packets)});
+      [] {
+        return std::vector<RosDiagnosticStatus>{{1, "sensors", "faulty", "", {{"gaps", "3"}}}};
+      },
+      [] { return closures(); }, {odometry, keyframes, trajectories, In<SensorPacket>(packets)});
   node.start();
   for (Stamp k = 0; k < 30; ++k) {
-    odometry.publish(OdometryState{.stamp = 1000 + k, .T_odom_body = at(0.1 * double(k))});
+    odometry.publish(OdometryState{
+        .stamp = 1000 + k, .T_odom_body = at(0.1 * double(k)), .v_odom = {0.5, 0, 0}});
     if (k % 10 == 0)
       keyframes.publish(
           KeyframeOdometry{.id = {3, static_cast<std::uint32_t>(k / 10)}, .stamp = 1000 + k});
@@ -133,6 +136,8 @@ TEST_CASE("A robot's record holds the published messages and the final states", 
   node.offer(std::make_shared<const LabelledMesh>(mesh));
   node.offer(
       std::make_shared<const OccupancyGrid>(OccupancyGrid{0.5, {-1, 2}, 2, 1, {100, -1}, 3}));
+  const MapObject chair{.label = 7, .box = {{1, 2, 3}, 0.5, {2, 1, 4}}};
+  node.offer(std::make_shared<const ObjectList>(ObjectList{0, {chair}}));
   node.offer_slice(std::make_shared<const LabelledMesh>(mesh), 1002);
   log::info("vio") << "begins";
   StereoFrame frame{.stamp = 1007, .left = {8, 8, std::vector<std::uint8_t>(64, 9)}, .right = {}};
@@ -153,28 +158,47 @@ TEST_CASE("A robot's record holds the published messages and the final states", 
   CHECK(count(messages, "/bob_3/mesh") == 1);
   const auto map = last<RosOccupancyGrid>(messages, "/bob_3/map_2d");
   REQUIRE(map);
-  CHECK(map->header.frame == "bob_3/map");
-  CHECK(map->width == 2);
-  CHECK(map->height == 1);
-  CHECK(map->resolution == 0.5F);
-  CHECK(map->origin.position == Eigen::Vector3d(-1, 2, 3));
+  CHECK(map->header.frame_id == "bob_3/map");
+  CHECK(map->info.width == 2);
+  CHECK(map->info.height == 1);
+  CHECK(map->info.resolution == 0.5F);
+  CHECK(map->info.origin.position == Eigen::Vector3d(-1, 2, 3));
   CHECK(map->data == std::vector<std::uint8_t>{100, 255});
-  const auto slice = last<RosPointCloud>(messages, "/bob_3/distance_slice");
+  const auto received = last<RosOdometry>(messages, "/bob_3/odometry");
+  REQUIRE(received);
+  CHECK(received->header.frame_id == "bob_3/odom");
+  CHECK(received->child_frame_id == "bob_3/base_link");
+  CHECK(received->pose.pose.position.x() == Approx(2.9));
+  CHECK(received->twist.twist.linear.x() == 0.5);
+  const auto objects = last<RosMarkerArray>(messages, "/bob_3/objects");
+  REQUIRE(objects);
+  REQUIRE(objects->markers.size() == 3);
+  CHECK(objects->markers[0].action == RosMarkerAction::kDeleteAll);
+  const RosMarker &box = objects->markers[1], &name = objects->markers[2];
+  CHECK(box.type == RosMarkerType::kCube);
+  CHECK(box.pose.position == chair.box.center);
+  CHECK(box.pose.orientation.angularDistance(Eigen::Quaterniond(chair.box.pose().linear())) < 1e-9);
+  CHECK(box.scale == chair.box.size_m);
+  CHECK(box.color.head<3>() == Eigen::Vector3f(1, 0, 0));
+  CHECK(name.type == RosMarkerType::kText);
+  CHECK(name.text == "chair");
+  CHECK(name.pose.position.z() > 3.0 + 0.5 * 4.0);
+  const auto slice = last<RosPointCloud2>(messages, "/bob_3/distance_slice");
   REQUIRE(slice);
-  CHECK(slice->header.frame == "bob_3/odom");
+  CHECK(slice->header.frame_id == "bob_3/odom");
   CHECK(slice->width == 3);
   const auto path = last<RosPath>(messages, "/bob_3/path");
   REQUIRE(path);
   REQUIRE(path->poses.size() == 2);
   CHECK(path->poses[1].header.stamp == 1001);
   CHECK(path->poses[1].pose.position.x() == 6.0);
-  CHECK(path->header.frame == "bob_3/map");
+  CHECK(path->header.frame_id == "bob_3/map");
   // The robot has joined alice, so /tf contains its own frame in the frame of the team.
-  const auto transforms = last<RosTransforms>(messages, "/tf");
+  const auto transforms = last<RosTFMessage>(messages, "/tf");
   REQUIRE(transforms);
-  CHECK(transforms->transforms[0].header.frame == "alice/map");
-  CHECK(transforms->transforms[0].child_frame == "bob_3/map");
-  const auto lines = last<RosMarkers>(messages, "/bob_3/closures");
+  CHECK(transforms->transforms[0].header.frame_id == "alice/map");
+  CHECK(transforms->transforms[0].child_frame_id == "bob_3/map");
+  const auto lines = last<RosMarkerArray>(messages, "/bob_3/closures");
   REQUIRE(lines);
   CHECK(lines->markers[3].points.size() == 2);
   const auto faces = last<RosMarker>(messages, "/bob_3/mesh_faces");
@@ -182,7 +206,7 @@ TEST_CASE("A robot's record holds the published messages and the final states", 
   CHECK(faces->points.size() == 3);
   const auto line = last<RosLog>(messages, "/rosout");
   REQUIRE(line);
-  CHECK(line->text == "begins");
+  CHECK(line->msg == "begins");
   CHECK(line->name == "bob_3.vio");
   const auto image = last<RosCompressedImage>(messages, "/bob_3/left/image_raw/compressed");
   REQUIRE(image);
@@ -213,10 +237,10 @@ TEST_CASE("The map frame of a robot that has not joined has no parent frame", "[
   std::set<std::pair<std::string, std::string>> links;
   for (const TopicMessage& message : topic_messages_of(reader)) {
     if (message.topic != "/tf") continue;
-    const auto transforms = decode_ros<RosTransforms>("cdr", message.bytes);
+    const auto transforms = decode_ros<RosTFMessage>("cdr", message.bytes);
     REQUIRE(transforms.value);
-    for (const RosTransform& link : transforms.value->transforms)
-      links.emplace(link.header.frame, link.child_frame);
+    for (const RosTransformStamped& link : transforms.value->transforms)
+      links.emplace(link.header.frame_id, link.child_frame_id);
   }
   CHECK(links.contains({"bob/map", "bob/odom"}));
   CHECK(links.contains({"bob/odom", "bob/base_link"}));

@@ -36,10 +36,10 @@ double area_m2(const LabelledMesh& mesh) {
 // Points of each piece, as a viewer shows them that has received all markers.
 void show(SurfacePieces& pieces, std::map<std::int32_t, std::size_t>& shown) {
   while (const auto marker = pieces.next({7, "map"})) {
-    CHECK(marker->header.frame == "map");
+    CHECK(marker->header.frame_id == "map");
     CHECK(encode_ros(*marker).size() < 65536);
     CHECK(marker->colors.size() == marker->points.size());
-    if (marker->action == RosMarker::kDelete)
+    if (marker->action == RosMarkerAction::kDelete)
       CHECK(shown.erase(marker->id) == 1);
     else
       shown[marker->id] = marker->points.size();
