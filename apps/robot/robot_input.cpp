@@ -19,7 +19,7 @@
 #include "modules/sensors/euroc_reader.hpp"
 #include "modules/sensors/node/open_folder.hpp"
 #include "modules/sensors/node/rig_file.hpp"
-#include "modules/sensors/pose_file.hpp"
+#include "modules/sensors/pose_stream.hpp"
 #include "runtime/log.hpp"
 
 namespace km {
@@ -248,7 +248,7 @@ std::optional<Rig> receive_calibration(const PartialRig& rig,
   std::string names;
   for (const auto& source : RigCompletion(rig).sources()) {
     wanted.push_back({source.topic, std::string(source.type),
-                      source.type == RosTransforms::kType ? RosQos::kLatched : RosQos::kSensorData,
+                      source.type == RosTFMessage::kType ? RosQos::kLatched : RosQos::kSensorData,
                       kKept});
     names += (names.empty() ? "" : ", ") + source.topic;
   }
@@ -304,12 +304,11 @@ std::unique_ptr<DatasetReader> open_messages(const RobotOptions& options, const 
   rig->topics = topics;
   rig->sensors.has_imu = !topics.imu.empty() || !topics.gyro.empty();
   input.correction.apply_to(rig->sensors.stereo);
-  const BagWindow window{.from_s = options.from_s.value_or(0.0),
-                         .to_s = options.to_s.value_or(std::numeric_limits<double>::infinity()),
-                         .not_before = not_before};
+  const RecordingPart window{.from_s = options.from_s.value_or(0.0),
+                             .to_s = options.to_s.value_or(std::numeric_limits<double>::infinity()),
+                             .not_before = not_before};
   return std::make_unique<BagDataset>(options.is_live ? "live" : options.dataset.string(),
-                                      std::move(messages), *std::move(rig),
-                                      config.sensors.stereo_tolerance_s, window);
+                                      std::move(messages), *std::move(rig), window);
 }
 
 [[noreturn]] void refuse_without_rig(const std::string& bag) {
@@ -341,7 +340,6 @@ std::unique_ptr<DatasetReader> open_dataset(const RobotOptions& options, const R
   EurocOptions euroc{.from_s = options.from_s.value_or(0.0),
                      .to_s = options.to_s.value_or(std::numeric_limits<double>::infinity()),
                      .not_before = not_before,
-                     .stereo_tolerance_s = config.sensors.stereo_tolerance_s,
                      .correction = rig.correction,
                      .imu = config.sensors.imu && options.odometry.empty(),
                      .depth = config.sensors.depth || (mapping && mapping->reads_depth()),

@@ -33,8 +33,8 @@ namespace km {
 namespace {
 
 constexpr std::string_view kRecordNode = "record";
-constexpr double kLiveMesh_bytes_per_s =
-    2e6;  // average rate of the faces that viewers of ROS receive
+constexpr int kMeshPoints = 200000, kMeshFaces = 50000;  // of a mesh that viewers receive
+constexpr double kMeshBytesPerS = 2e6;  // average rate of the faces that viewers of ROS receive
 
 template <typename T>
 void forward(In<T> from, Out<T> to) {
@@ -109,12 +109,12 @@ Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput 
   add_view(config, camera);
   if (input.ros != nullptr && config.ros.publish.value_or(true))
     add_ros_output("ros_output", std::make_unique<LiveSink>(std::move(input.ros)),
-                   {.mesh_points = config.ros.mesh_points,
-                    .mesh_faces = config.ros.mesh_faces,
-                    .mesh_bytes_per_s = kLiveMesh_bytes_per_s,
+                   {.mesh_points = kMeshPoints,
+                    .mesh_faces = kMeshFaces,
+                    .mesh_bytes_per_s = kMeshBytesPerS,
                     .slices = true},
                    std::nullopt);
-  if (options.record) add_record(options, config.ros, results);
+  if (options.record) add_record(options, results);
   if (seal_ != nullptr)
     add<TeamKeysNode>(false, options.security, *seal_,
                       [this](const MembershipChange& change) { bridge_->apply(change); });
@@ -504,8 +504,7 @@ void Robot::add_ros_output(std::string_view node, std::unique_ptr<RosSink> sink,
 // Files of several robots can be merged: each has a map frame of its own, and the file states when
 // it coincides with the team's. The record has its own node, so that viewers do not wait for the
 // disk.
-void Robot::add_record(const RobotOptions& options, const RosConfig& config,
-                       ResultWriter& results) {
+void Robot::add_record(const RobotOptions& options, ResultWriter& results) {
   constexpr double kState_bytes_per_s = 200e3;  // rate of uncompressed meshes, paths and closures
   constexpr std::size_t kQueue = 10000;         // messages of a minute in which the disk stalls
   const std::filesystem::path& file = *options.record;
@@ -514,7 +513,7 @@ void Robot::add_record(const RobotOptions& options, const RosConfig& config,
       std::make_unique<McapSink>(
           file, [file, &results](const std::string& why) { results.note(file, why); }),
       {.name_of = [this](RobotId robot) { return name_of(robot); },
-       .mesh_points = config.mesh_points,
+       .mesh_points = kMeshPoints,
        .draws = true,
        .logs = true,
        .state_bytes_per_s = kState_bytes_per_s,

@@ -235,7 +235,7 @@ class Robot {
   void add_view(const RobotConfig& config, const std::optional<Camera>& camera);
   void add_ros_output(std::string_view node, std::unique_ptr<RosSink> sink,
                       RosOutputOptions options, std::optional<In<SensorPacket>> images);
-  void add_record(const RobotOptions& options, const RosConfig& config, ResultWriter& results);
+  void add_record(const RobotOptions& options, ResultWriter& results);
   [[nodiscard]] std::string name_of(RobotId robot) const;
   [[nodiscard]] RobotStatus own_status() const;
 

@@ -48,12 +48,12 @@ cv::Size size_of(const StereoRig& rig, std::size_t camera) {
 }  // namespace
 
 BagDataset::BagDataset(std::string name, std::unique_ptr<BagReader> bag, Rig rig,
-                       std::optional<double> stereo_tolerance_s, const BagWindow& window)
+                       const RecordingPart& window)
     : name_(std::move(name)),
       bag_(std::move(bag)),
       rig_(std::move(rig)),
       window_(window),
-      joiner_(!rig_.topics.right.empty(), !rig_.topics.depth.empty(), stereo_tolerance_s) {
+      joiner_(!rig_.topics.right.empty(), !rig_.topics.depth.empty()) {
   find_topics();
   if (is_live()) return;
   first_ = read_packet([](Stamp, Stamp) { return FrameUse::kAll; });

@@ -2,7 +2,6 @@
 
 #include <array>
 #include <cstddef>
-#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -29,24 +28,17 @@ struct Rig {
   std::vector<std::string> notes = {};  ///< Remarks on the calibration, one line each.
 };
 
-/// Part of a recording, in seconds since its first frame.
-struct BagWindow {
-  double from_s = 0.0;                                    ///< First instant of the window.
-  double to_s = std::numeric_limits<double>::infinity();  ///< First instant after the window.
-  std::optional<Stamp> not_before = {};                   ///< No frame before this instant.
-};
-
 /// Reads sensor packets from the messages of a bag as they arrive: sensor_msgs/Image and
 /// CompressedImage, sensor_msgs/Imu and nav_msgs/Odometry. Stamps are those of the headers. Bad
 /// messages are skipped and counted. A bag may be live.
 class BagDataset final : public DatasetReader {
  public:
-  /// `name`: path of the bag, with which messages begin. `stereo_tolerance_s`: see FrameJoiner.
+  /// `name`: path of the bag, with which messages begin.
   /// Reads up to the first packet unless the bag is live. Throws DatasetError if a topic is missing
   /// or of another type, and lists the existing topics. Throws DatasetError also if the window has
   /// no frame.
   BagDataset(std::string name, std::unique_ptr<BagReader> bag, Rig rig,
-             std::optional<double> stereo_tolerance_s, const BagWindow& window = {});
+             const RecordingPart& window = {});
 
   [[nodiscard]] const SensorRig& rig() const override { return rig_.sensors; }
   using DatasetReader::next;
@@ -76,7 +68,7 @@ class BagDataset final : public DatasetReader {
   std::string name_;
   std::unique_ptr<BagReader> bag_;
   Rig rig_;
-  BagWindow window_;
+  RecordingPart window_;
   std::vector<const SensorKind*> kind_of_;  // by channel; null: not read
   std::array<StampOrder, kSensorKinds.size()> order_;
   std::array<MissingImages, kSensorKinds.size()> missing_;

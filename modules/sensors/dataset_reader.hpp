@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -54,6 +55,13 @@ using ReaderReport = FaultReport<ReaderFault>;
 /// for text files, the line number.
 struct DatasetError : std::runtime_error {
   using std::runtime_error::runtime_error;
+};
+
+/// Part of a recording, in seconds since its first frame.
+struct RecordingPart {
+  double from_s = 0.0;                                    ///< First instant of the part.
+  double to_s = std::numeric_limits<double>::infinity();  ///< First instant after the part.
+  std::optional<Stamp> not_before = {};                   ///< No frame before this instant.
 };
 
 /// A source of sensor packets in order of time. Not thread-safe.

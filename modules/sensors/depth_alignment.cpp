@@ -19,8 +19,8 @@ constexpr std::size_t kImagesWithoutInfo = 10;
 
 // Focal lengths and principal point, of raw or rectified images.
 Eigen::Vector4d intrinsics(const RosCameraInfo& info, RosImages images) {
-  const auto& P = info.P;
-  const auto& K = info.K;
+  const auto& P = info.p;
+  const auto& K = info.k;
   return images == RosImages::kRaw ? Eigen::Vector4d(K[0], K[4], K[2], K[5])
                                    : Eigen::Vector4d(P[0], P[5], P[2], P[6]);
 }

@@ -79,14 +79,12 @@ EurocReader::EurocReader(const std::filesystem::path& folder, EurocCalibration c
       rig_(std::move(calibration.rig)),
       side_images_(mav0_, rig_.depth, calibration.depth_scale_m, options.labels),
       files_(is_rgbd(rig_) ? StereoPairFiles{list_euroc_lefts(mav0_, report_), {}}
-                           : list_euroc_pairs(mav0_, options.stereo_tolerance_s, report_)),
+                           : list_euroc_pairs(mav0_, report_)),
       reads_imu_(options.imu && rig_.has_imu),
       imu_(reads_imu_ ? read_imu(mav0_ / "imu0" / "data.csv", report_) : ImuStream()) {
-  side_images_.list(options.stereo_tolerance_s.value_or(Synchrony().tolerance_s), files_.pairs,
-                    report_);
+  side_images_.list(files_.pairs, report_);
   check_depth_images(mav0_, rig_.stereo, files_.pairs);
   for (StereoPairFile& pair : files_.pairs) pair.stamp += nanoseconds(options.correction.offset_s);
-  recording_start_ = files_.pairs.front().stamp;
   keep_part({options.from_s, options.to_s, options.not_before}, mav0_, files_.pairs);
 }
 
@@ -118,14 +116,14 @@ std::optional<SensorPacket> EurocReader::next(const ChooseUse& choose) {
     if (!has_imu(pair)) continue;
     const FrameUse use = choose(pair.stamp, 0);
     if (use == FrameUse::kNone) continue;
-    StereoPairResult loaded = load_stereo_pair(pair, rig_.stereo);
+    LoadedImage<StereoFrame> loaded = load_stereo_pair(pair, rig_.stereo);
     if (loaded.status != ImageStatus::kOk) {
       report_.add(fault_of(loaded.status),
                   at_line(mav0_ / "cam0" / "data.csv", pair.line) + ": " + loaded.problem);
       continue;
     }
-    if (use == FrameUse::kAll || is_rgbd(rig_)) side_images_.load(pair, loaded.frame, report_);
-    return SensorPacket{std::make_shared<const StereoFrame>(std::move(loaded.frame)),
+    if (use == FrameUse::kAll || is_rgbd(rig_)) side_images_.load(pair, loaded.image, report_);
+    return SensorPacket{std::make_shared<const StereoFrame>(std::move(loaded.image)),
                         imu_until(pair.stamp)};
   }
   return std::nullopt;

@@ -25,9 +25,6 @@ struct EurocOptions {
   double from_s = 0.0;                                    ///< First instant of the part.
   double to_s = std::numeric_limits<double>::infinity();  ///< First instant after the part.
   std::optional<Stamp> not_before = {};                   ///< No frame before this instant.
-  /// Largest difference between the stamps of left and right (depth, label) images; nullopt: see
-  /// find_synchrony().
-  std::optional<double> stereo_tolerance_s = {};
   /// EurocReader corrects the stamps, open_euroc() the cameras.
   CameraCalibration correction = {};
   bool imu = true;      ///< False: packets have no samples, even if there is an inertial sensor.
@@ -67,9 +64,6 @@ class EurocReader final : public DatasetReader {
   /// Palette of the labels; empty if none are read, or for ids without a palette.
   [[nodiscard]] const LabelPalette& label_palette() const { return side_images_.palette(); }
 
-  /// First frame of the whole recording: the origin of the window's times.
-  [[nodiscard]] Stamp recording_start() const { return recording_start_; }
-
   /// First and last frame of the window.
   [[nodiscard]] Stamp first_stamp() const { return files_.pairs.front().stamp; }
   [[nodiscard]] Stamp last_stamp() const { return files_.pairs.back().stamp; }
@@ -85,7 +79,6 @@ class EurocReader final : public DatasetReader {
   StereoPairFiles files_;  // files of the window
   const bool reads_imu_;
   ImuStream imu_;  // samples of the whole recording
-  Stamp recording_start_ = 0;
   std::size_t next_pair_ = 0;
 };
 

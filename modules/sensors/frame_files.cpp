@@ -88,12 +88,10 @@ void check_depth_images(const std::filesystem::path& recording, const StereoRig&
                                        : ": the stamps of depth images are too far away"));
 }
 
-StereoPairFiles list_euroc_pairs(const std::filesystem::path& mav0,
-                                 std::optional<double> tolerance_s, ReaderReport& report) {
+StereoPairFiles list_euroc_pairs(const std::filesystem::path& mav0, ReaderReport& report) {
   const auto lefts = list_images(mav0 / "cam0", report);
   const auto rights = list_images(mav0 / "cam1", report);
-  const Synchrony synchrony = tolerance_s ? Synchrony{.tolerance_s = *tolerance_s}
-                                          : find_synchrony(stamps_of(lefts), stamps_of(rights));
+  const Synchrony synchrony = find_synchrony(stamps_of(lefts), stamps_of(rights));
   const auto count_unpaired = [&](ReaderFault fault, const char* camera, const ListedImage& image) {
     report.add(fault, at_line(mav0 / camera / "data.csv", image.line) + ": " +
                           image.file.filename().string());
@@ -130,12 +128,13 @@ std::vector<StereoPairFile> list_euroc_lefts(const std::filesystem::path& mav0,
 }
 
 void list_beside(const std::filesystem::path& folder, std::filesystem::path StereoPairFile::*member,
-                 double tolerance_s, std::vector<StereoPairFile>& frames, ReaderReport& report) {
+                 std::vector<StereoPairFile>& frames, ReaderReport& report) {
+  constexpr double kTolerance_s = 1e-3;
   auto frame = frames.begin();
   for (ListedImage& image : list_images(folder, report)) {
-    while (frame != frames.end() && seconds_between(frame->stamp, image.stamp) > tolerance_s)
+    while (frame != frames.end() && seconds_between(frame->stamp, image.stamp) > kTolerance_s)
       ++frame;
-    if (frame == frames.end() || seconds_between(frame->stamp, image.stamp) < -tolerance_s) {
+    if (frame == frames.end() || seconds_between(frame->stamp, image.stamp) < -kTolerance_s) {
       report.add(ReaderFault::kImageWithoutFrame,
                  at_line(folder / "data.csv", image.line) + ": " + image.file.filename().string());
       continue;
@@ -144,25 +143,11 @@ void list_beside(const std::filesystem::path& folder, std::filesystem::path Ster
   }
 }
 
-std::vector<StereoPairFile> list_keyframe_pairs(const std::filesystem::path& folder,
-                                                ReaderReport& report) {
-  std::vector<StereoPairFile> pairs;
-  const std::filesystem::path list = folder / "pairs.csv";
-  using Files = std::pair<std::filesystem::path, std::filesystem::path>;
-  const auto files_of = [&](const TextRow& row) -> std::variant<Files, RowFault> {
-    return Files(folder / row.fields[1], folder / row.fields[2]);
-  };
-  for (const auto& [stamp, line, files] :
-       read_ordered_rows<Files>(list, 3, "lists no stereo pair", report, files_of))
-    pairs.push_back({stamp, files.first, files.second, line, {}, {}});
-  return pairs;
-}
-
-StereoPairResult load_stereo_pair(const StereoPairFile& files, const StereoRig& rig) {
-  StereoPairResult result;
-  result.frame.stamp = files.stamp;
+LoadedImage<StereoFrame> load_stereo_pair(const StereoPairFile& files, const StereoRig& rig) {
+  LoadedImage<StereoFrame> result;
+  result.image.stamp = files.stamp;
   const std::pair<const std::filesystem::path&, GrayImage&> images[] = {
-      {files.left, result.frame.left}, {files.right, result.frame.right}};
+      {files.left, result.image.left}, {files.right, result.image.right}};
   const std::size_t count = rig.depth_source == DepthSource::kRightImage ? 2 : 1;
   for (std::size_t i = 0; i < count; ++i) {
     const Camera& camera = rig.cameras[i];
@@ -180,10 +165,9 @@ DepthAndLabelImages::DepthAndLabelImages(const std::filesystem::path& mav0,
   if (labels_) palette_ = read_palette(mav0 / "label_palette.csv");
 }
 
-void DepthAndLabelImages::list(double tolerance_s, std::vector<StereoPairFile>& frames,
-                               ReaderReport& report) const {
-  if (depth_) list_beside(mav0_ / "depth0", &StereoPairFile::depth, tolerance_s, frames, report);
-  if (labels_) list_beside(mav0_ / "label0", &StereoPairFile::labels, tolerance_s, frames, report);
+void DepthAndLabelImages::list(std::vector<StereoPairFile>& frames, ReaderReport& report) const {
+  if (depth_) list_beside(mav0_ / "depth0", &StereoPairFile::depth, frames, report);
+  if (labels_) list_beside(mav0_ / "label0", &StereoPairFile::labels, frames, report);
 }
 
 void DepthAndLabelImages::load(const StereoPairFile& files, StereoFrame& frame,

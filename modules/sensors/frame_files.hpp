@@ -1,7 +1,6 @@
 #pragma once
 
 #include <filesystem>
-#include <limits>
 #include <optional>
 #include <vector>
 
@@ -30,13 +29,6 @@ struct StereoPairFiles {
   Synchrony synchrony;
 };
 
-/// Part of a recording, in seconds since its first frame.
-struct RecordingPart {
-  double from_s = 0.0;                                    ///< First instant of the part.
-  double to_s = std::numeric_limits<double>::infinity();  ///< First instant after the part.
-  std::optional<Stamp> not_before = {};                   ///< No frame before this instant.
-};
-
 /// Keeps the frames of `part`. `recording`: path for messages. Precondition: `frames` is not empty.
 /// Throws DatasetError if no frame is left, and std::invalid_argument for a part that is empty or
 /// not a number.
@@ -49,11 +41,9 @@ void check_depth_images(const std::filesystem::path& recording, const StereoRig&
                         const std::vector<StereoPairFile>& frames);
 
 /// The stereo pairs of a EuRoC folder: rows `stamp [ns], file` of cam0/data.csv and cam1/data.csv,
-/// matched by stamps at most `tolerance_s` apart. Without a tolerance find_synchrony() determines
-/// it. Faulty rows and images without a partner are counted in `report`. Throws DatasetError if a
-/// list is missing or contains no image.
+/// matched by stamps (see find_synchrony()). Faulty rows and images without a partner are counted
+/// in `report`. Throws DatasetError if a list is missing or contains no image.
 [[nodiscard]] StereoPairFiles list_euroc_pairs(const std::filesystem::path& mav0,
-                                               std::optional<double> tolerance_s,
                                                ReaderReport& report);
 
 /// The left images of a EuRoC folder alone, for an RGB-D rig. Faults and errors are those of
@@ -62,25 +52,15 @@ void check_depth_images(const std::filesystem::path& recording, const StereoRig&
                                                            ReaderReport& report);
 
 /// Assigns each image that `folder`/data.csv lists (depth0, label0) to the `member` of the frame
-/// whose stamp is at most `tolerance_s` away. There may be fewer images than frames. Images without
+/// whose stamp is at most a millisecond away. There may be fewer images than frames. Images without
 /// a frame are counted. Throws DatasetError if the list is missing or contains no image.
 void list_beside(const std::filesystem::path& folder, std::filesystem::path StereoPairFile::*member,
-                 double tolerance_s, std::vector<StereoPairFile>& frames, ReaderReport& report);
+                 std::vector<StereoPairFile>& frames, ReaderReport& report);
 
-/// The stereo pairs of a folder of keyframes: rows `stamp [ns], left file, right file` of its
-/// pairs.csv; ascending. Faults and errors are those of list_euroc_pairs().
-[[nodiscard]] std::vector<StereoPairFile> list_keyframe_pairs(const std::filesystem::path& folder,
-                                                              ReaderReport& report);
-
-/// A stereo pair from disk, or the left image with an RGB-D rig, without depth and labels. `status`
-/// and `problem` are those of the first image that failed.
-struct StereoPairResult {
-  ImageStatus status = ImageStatus::kOk;
-  std::string problem;
-  StereoFrame frame;
-};
-
-[[nodiscard]] StereoPairResult load_stereo_pair(const StereoPairFile& files, const StereoRig& rig);
+/// A stereo pair from disk, or the left image with an RGB-D rig, without depth and labels. Status
+/// and problem are those of the first image that failed.
+[[nodiscard]] LoadedImage<StereoFrame> load_stereo_pair(const StereoPairFile& files,
+                                                        const StereoRig& rig);
 
 /// Reads the depth and label images of a EuRoC folder: depth0, label0 and label_palette.csv.
 /// Unusable images are counted and omitted. Const members are thread-safe.
@@ -92,7 +72,7 @@ class DepthAndLabelImages {
                       double depth_scale_m, bool labels);
 
   /// Finds the images of `frames`; see list_beside().
-  void list(double tolerance_s, std::vector<StereoPairFile>& frames, ReaderReport& report) const;
+  void list(std::vector<StereoPairFile>& frames, ReaderReport& report) const;
 
   /// Reads the images of one frame.
   void load(const StereoPairFile& files, StereoFrame& frame, ReaderReport& report) const;

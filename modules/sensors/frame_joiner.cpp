@@ -17,13 +17,10 @@ ReaderFault fault_of_unpaired(SensorRole role) {
 
 }  // namespace
 
-FrameJoiner::FrameJoiner(bool has_right, bool has_depth, std::optional<double> tolerance_s) {
+FrameJoiner::FrameJoiner(bool has_right, bool has_depth) {
   stream_of(SensorRole::kLeft).exists = true;
   stream_of(SensorRole::kRight).exists = has_right;
   stream_of(SensorRole::kDepth).exists = has_depth;
-  if (!tolerance_s) return;
-  for (const SensorRole role : {SensorRole::kRight, SensorRole::kDepth})
-    if (stream_of(role).exists) stream_of(role).synchrony = Synchrony{.tolerance_s = *tolerance_s};
 }
 
 void FrameJoiner::drop_oldest(SensorRole role) {

@@ -32,9 +32,7 @@ class FrameJoiner {
   static constexpr double kPatience_s = 1.0;
   static constexpr std::size_t kMaxHeld = 200;  ///< Largest number of images held per stream.
 
-  /// `tolerance_s`: largest difference of stamps, without an offset; nullopt: determined from the
-  /// stamps.
-  FrameJoiner(bool has_right, bool has_depth, std::optional<double> tolerance_s);
+  FrameJoiner(bool has_right, bool has_depth);
 
   /// Adds an image of a camera or a depth sensor. Precondition: the stamps of each role ascend.
   void add(SensorRole role, Stamp stamp, BagMessage message);

@@ -240,7 +240,7 @@ ImageFolder read_kitti_folder(const fs::path& folder) {
                                           folder / ("image_" + numbers[1])};
   if (!is_folder(images[1]))
     throw DatasetError(images[1].string() +
-                       ": no such folder: one camera does not measure how far things are");
+                       ": no such folder: one camera alone does not measure distances");
   ImageFolder result;
   result.list = folder / "times.txt";
   const std::vector<ListedFile> times = read_times(result.list, 1, result.report);
@@ -351,14 +351,14 @@ std::optional<SensorPacket> ImageFolderReader::next(const ChooseUse& choose) {
   while (next_ < folder_.frames.size()) {
     const StereoPairFile& files = folder_.frames[next_++];
     if (choose(files.stamp, 0) == FrameUse::kNone) continue;
-    StereoPairResult loaded = load_stereo_pair(files, folder_.rig.stereo);
+    LoadedImage<StereoFrame> loaded = load_stereo_pair(files, folder_.rig.stereo);
     if (loaded.status != ImageStatus::kOk) {
       folder_.report.add(fault_of(loaded.status),
                          at_line(folder_.list, files.line) + ": " + loaded.problem);
       continue;
     }
-    depth_.load(files, loaded.frame, folder_.report);
-    return SensorPacket{std::make_shared<const StereoFrame>(std::move(loaded.frame)), {}};
+    depth_.load(files, loaded.image, folder_.report);
+    return SensorPacket{std::make_shared<const StereoFrame>(std::move(loaded.image)), {}};
   }
   return std::nullopt;
 }

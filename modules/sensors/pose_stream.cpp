@@ -1,11 +1,54 @@
 #include "modules/sensors/pose_stream.hpp"
 
 #include <cmath>
+#include <utility>
+#include <variant>
 
 #include "modules/core/covariance.hpp"
 #include "modules/core/lie.hpp"
+#include "modules/sensors/text_file.hpp"
 
 namespace km {
+namespace {
+
+constexpr std::size_t kPose = 8, kPoseWithCovariance = 8 + 36;
+constexpr double kMaxRounding = 0.01;  // norm of a quaternion in rounded text
+
+std::variant<Stamp, RowFault> stamp_of_seconds(const TextRow& row, std::size_t fields) {
+  constexpr double kMost_s = 4e9;
+  if (row.fields.size() < fields)
+    return RowFault{ReaderFault::kMalformedRow,
+                    "has " + std::to_string(row.fields.size()) + " fields, not 8 or 44"};
+  const auto seconds = parse_double(row.fields[0]);
+  if (!seconds || !(*seconds >= 0.0 && *seconds < kMost_s))
+    return RowFault{ReaderFault::kMalformedRow,
+                    std::string(row.fields[0]) + " is no time in seconds"};
+  return nanoseconds(*seconds);
+}
+
+std::variant<MeasuredPose, RowFault> parse_pose(const TextRow& row) {
+  const std::size_t count = row.fields.size();
+  if (count != kPose && count != kPoseWithCovariance)
+    return RowFault{ReaderFault::kMalformedRow,
+                    "has " + std::to_string(count) + " fields, not 8 or 44"};
+  std::vector<double> values;
+  for (std::size_t i = 1; i < count; ++i) {
+    const auto value = parse_double(row.fields[i]);
+    if (!value || !std::isfinite(*value))
+      return RowFault{ReaderFault::kMalformedRow, std::string(row.fields[i]) + " is not a number"};
+    values.push_back(*value);
+  }
+  const Eigen::Quaterniond q(values[6], values[3], values[4], values[5]);
+  if (!(std::abs(q.norm() - 1.0) < kMaxRounding))
+    return RowFault{ReaderFault::kMalformedRow, "the quaternion's norm is not 1"};
+  Matrix6 covariance = Matrix6::Zero();
+  if (count == kPoseWithCovariance) covariance = Eigen::Map<const Matrix6>(values.data() + 7);
+  return measured_pose(
+      make_pose(q.normalized().toRotationMatrix(), {values[0], values[1], values[2]}), covariance,
+      SE3::Identity());
+}
+
+}  // namespace
 
 void PoseStream::add(Stamp stamp, const MeasuredPose& pose) {
   if (!first_) first_ = stamp;
@@ -36,13 +79,42 @@ MeasuredPose measured_pose(const SE3& T_odom_child, const Matrix6& covariance,
 
 std::optional<MeasuredPose> measured_pose(const RosOdometry& message, const SE3& T_child_body) {
   constexpr double kMaxNormError = 1e-3;
-  const Eigen::Quaterniond& q = message.pose.orientation;
-  if (!(std::abs(q.norm() - 1.0) < kMaxNormError) || !message.pose.position.allFinite())
+  const Eigen::Quaterniond& q = message.pose.pose.orientation;
+  if (!(std::abs(q.norm() - 1.0) < kMaxNormError) || !message.pose.pose.position.allFinite())
     return std::nullopt;
-  Matrix6 covariance = Eigen::Map<const Matrix6>(message.pose_covariance.data());
+  Matrix6 covariance = Eigen::Map<const Matrix6>(message.pose.covariance.data());
   if (!is_covariance(covariance)) covariance.setZero();
-  return measured_pose(make_pose(q.normalized().toRotationMatrix(), message.pose.position),
+  return measured_pose(make_pose(q.normalized().toRotationMatrix(), message.pose.pose.position),
                        covariance, T_child_body);
+}
+
+PoseStream read_pose_file(const std::filesystem::path& file, ReaderReport& report) {
+  PoseStream poses;
+  for (const auto& row :
+       read_ordered_rows<MeasuredPose>(file, kPose, "no pose in it: t[s] x y z qx qy qz qw", report,
+                                       parse_pose, stamp_of_seconds))
+    poses.add(row.stamp, row.value);
+  return poses;
+}
+
+PoseFileReader::PoseFileReader(std::unique_ptr<DatasetReader> reader,
+                               const std::filesystem::path& file)
+    : reader_(std::move(reader)), name_(file.string()), poses_(read_pose_file(file, report_)) {}
+
+std::optional<SensorPacket> PoseFileReader::next(const ChooseUse& choose) {
+  while (auto packet = reader_->next(choose)) {
+    packet->pose = poses_.at(packet->frame->stamp);
+    if (packet->pose) return packet;
+    report_.add(ReaderFault::kFrameWithoutPose,
+                name_ + ": none for the image at " + std::to_string(packet->frame->stamp));
+  }
+  return std::nullopt;
+}
+
+ReaderReport PoseFileReader::report() const {
+  ReaderReport all = reader_->report();
+  all.add(report_);
+  return all;
 }
 
 }  // namespace km

@@ -44,7 +44,7 @@ std::vector<RigCompletion::Source> RigCompletion::sources() const {
     if (has_right()) sources.push_back({partial_.info_topics[1], RosCameraInfo::kType});
   }
   if (!partial_.is_complete())
-    sources.push_back({kStaticTransforms, RosTransforms::kType,
+    sources.push_back({kStaticTransforms, RosTFMessage::kType,
                        !partial_.has_extrinsics && partial_.body_frame.empty()});
   if (!partial_.has_extrinsics) {
     if (partial_.body_frame.empty() && !body_topic().empty())
@@ -100,15 +100,15 @@ bool RigCompletion::take_part(const BagChannel& channel, const BagMessage& messa
     if (frame) return false;
     if (is_of_type(channel, RosOdometry::kType)) {
       auto odometry = decode_ros<RosOdometry>(channel.encoding, message.bytes);
-      if (odometry.value) frame = std::move(odometry.value->child_frame);
+      if (odometry.value) frame = std::move(odometry.value->child_frame_id);
       return frame.has_value();
     }
     auto header = decode_ros<RosHeader>(channel.encoding, message.bytes);
-    if (header.value) frame = std::move(header.value->frame);
+    if (header.value) frame = std::move(header.value->frame_id);
     return frame.has_value();
   };
-  if (channel.topic == kStaticTransforms && is_of_type(channel, RosTransforms::kType)) {
-    const auto transforms = decode_ros<RosTransforms>(channel.encoding, message.bytes);
+  if (channel.topic == kStaticTransforms && is_of_type(channel, RosTFMessage::kType)) {
+    const auto transforms = decode_ros<RosTFMessage>(channel.encoding, message.bytes);
     if (transforms.value) transforms_.add(*transforms.value);
     return transforms.value.has_value();
   }
@@ -124,7 +124,7 @@ bool RigCompletion::take_part(const BagChannel& channel, const BagMessage& messa
 }
 
 std::optional<std::string> RigCompletion::camera_frame(std::size_t camera) const {
-  if (infos_[camera]) return infos_[camera]->header.frame;
+  if (infos_[camera]) return infos_[camera]->header.frame_id;
   return camera == 0 && partial_.has_cameras ? image_frame_ : std::nullopt;
 }
 
@@ -199,18 +199,18 @@ std::string RigCompletion::missing() const {
                      partial_.info_topics[k]);
   }
   if (!partial_.has_cameras && has_infos && has_right() && !T_left_right())
-    append(list, "where the right camera is: a baseline in P of " + partial_.info_topics[1] +
+    append(list, "pose of the right camera: a baseline in P of " + partial_.info_topics[1] +
                      ", or " + missing_chain(*camera_frame(0), *camera_frame(1)));
   if (partial_.has_extrinsics) return list;
   const auto body = body_frame(), left = camera_frame(0);
   if (!body)
-    append(list, "the body's frame: " +
+    append(list, "frame of the body: " +
                      (body_topic().empty() ? "" : "messages on " + body_topic() + ", or ") +
                      "body_frame");
   if (!left && partial_.has_cameras)
-    append(list, "the left camera's frame: images on " + partial_.rig.topics.left);
+    append(list, "frame of the left camera: images on " + partial_.rig.topics.left);
   if (!T_body_left())
-    append(list, std::string("where the left camera is on the body: ") +
+    append(list, std::string("pose of the left camera on the body: ") +
                      (body && left ? missing_chain(*body, *left) : kStaticTransforms) +
                      " (body_frame names the body's)");
   return list;

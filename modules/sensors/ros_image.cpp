@@ -74,7 +74,7 @@ LoadedImage<cv::Mat> pixels_of(const RosImage& image, const Encoding& encoding,
   for (int y = 0; y < found.height; ++y)
     std::memcpy(pixels.ptr(y), image.data.data() + static_cast<std::size_t>(y) * image.step,
                 row_bytes);
-  const bool is_native = image.is_bigendian == (std::endian::native == std::endian::big);
+  const bool is_native = (image.is_bigendian != 0) == (std::endian::native == std::endian::big);
   if (!is_native && encoding.type == CV_16UC1) reverse_bytes<std::uint16_t>(pixels);
   if (!is_native && encoding.type == CV_32FC1) reverse_bytes<float>(pixels);
   return {ImageStatus::kOk, {}, std::move(pixels)};

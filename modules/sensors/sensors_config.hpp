@@ -1,7 +1,5 @@
 #pragma once
 
-#include <optional>
-
 #include "modules/core/config.hpp"
 
 namespace km {
@@ -10,19 +8,12 @@ namespace km {
 struct SensorsConfig {
   static constexpr const char* kSection = "sensors";
 
-  std::optional<double> stereo_tolerance_s;
-  int read_ahead = 8;
   double max_lag_s = 0.5;
   bool imu = true;
   bool depth = false;
   bool labels = false;
 
   void visit_fields(auto& visitor) {
-    visitor.field("stereo_tolerance_s", stereo_tolerance_s, {0.0, 0.1},
-                  "[s] largest difference between the stamps of left and right; none: it is "
-                  "determined from the first stamps, like a constant offset");
-    visitor.field("read_ahead", read_ahead, {1, 1000},
-                  "maximum number of stereo pairs decoded ahead of the published pair");
     visitor.field(
         "max_lag_s", max_lag_s, {0.0, 1e6},
         "[s] bound on the delay of odometry. At half of it the map gets no new frames. At this "

@@ -22,8 +22,8 @@ enum class StampVerdict {
 
 /// Judges the stamps [ns, positive] of a list, in its order, so that as few as possible are
 /// rejected. A single wrong stamp, however large its error, does not affect the stamps after it.
-/// The good stamps are a longest subsequence that ascends strictly and in steps of at most
-/// kLongestPause_s. O(n log n).
+/// The good stamps are a longest subsequence that ascends strictly, among stamps that steps of at
+/// most kLongestPause_s join. O(n log n).
 [[nodiscard]] std::vector<StampVerdict> judge_stamps(std::span<const Stamp> stamps);
 
 /// Judges the stamps of a stream one by one. Good stamps ascend in steps of at most

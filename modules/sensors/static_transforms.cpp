@@ -18,13 +18,14 @@ std::string plain(const std::string& frame) {
 
 }  // namespace
 
-void StaticTransforms::add(const RosTransforms& message) {
-  for (const RosTransform& transform : message.transforms) {
-    const Eigen::Quaterniond& q = transform.pose.orientation;
-    if (!(std::abs(q.norm() - 1.0) < kMaxNormError) || !transform.pose.position.allFinite())
+void StaticTransforms::add(const RosTFMessage& message) {
+  for (const RosTransformStamped& transform : message.transforms) {
+    const Eigen::Quaterniond& q = transform.transform.rotation;
+    if (!(std::abs(q.norm() - 1.0) < kMaxNormError) || !transform.transform.translation.allFinite())
       continue;
-    const SE3 T = make_pose(q.normalized().toRotationMatrix(), transform.pose.position);
-    const std::string parent = plain(transform.header.frame), child = plain(transform.child_frame);
+    const SE3 T = make_pose(q.normalized().toRotationMatrix(), transform.transform.translation);
+    const std::string parent = plain(transform.header.frame_id),
+                      child = plain(transform.child_frame_id);
     T_a_b_[parent].insert_or_assign(child, T);
     T_a_b_[child].insert_or_assign(parent, T.inverse());
   }

@@ -15,7 +15,7 @@ class StaticTransforms {
  public:
   /// A later transform of a frame replaces the former one. A transform that is not rigid is
   /// skipped.
-  void add(const RosTransforms& message);
+  void add(const RosTFMessage& message);
 
   /// T_a_b through any number of frames, in either direction; nullopt if no chain joins them.
   [[nodiscard]] std::optional<SE3> find(const std::string& a, const std::string& b) const;

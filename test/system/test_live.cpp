@@ -170,8 +170,8 @@ TEST_CASE("A robot reads all topics of its sensors while it waits for its calibr
   Process robot(logged(live_command(folder, kUnplaced, domain)));
   const auto network =
       std::make_shared<const RosNetwork>(RosConfig{.domain = domain, .interface = "lo"});
-  const RosPublisher description(network, "/tf_static", RosTransforms::kType, RosQos::kLatched, 1);
-  description.publish(encode_ros(RosTransforms{{{{0, "imu0"}, "cam0", {}}}}));
+  const RosPublisher description(network, "/tf_static", RosTFMessage::kType, RosQos::kLatched, 1);
+  description.publish(encode_ros(RosTFMessage{{{{0, "imu0"}, "cam0", {}}}}));
   // Playing begins when every topic has a reader, so that the frames of the samples are received.
   Process driver(driver_command(recording.root(), domain, "--reliable"));
   const auto is_complete = [](const std::string& line) {
@@ -208,9 +208,9 @@ TEST_CASE("A live robot refuses depth that its driver has not aligned with colou
   std::optional<int> exit_code;
   while (!exit_code) {
     for (int k = 0; k < 20; ++k) {  // after ten images without CameraInfo there is none
-      image.header.frame = "color_optical";
+      image.header.frame_id = "color_optical";
       color.publish(encode_ros(image));
-      image.header.frame = "depth_optical";
+      image.header.frame_id = "depth_optical";
       depth.publish(encode_ros(image));
     }
     exit_code = robot.wait_within(std::chrono::seconds(1));

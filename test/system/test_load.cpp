@@ -85,7 +85,7 @@ TEST_CASE("On an overloaded computer the map skips frames first, then images are
   REQUIRE(summary.odometry);
   CHECK(summary.odometry->divergences == 0);
 
-  const auto map = run.output.find("processors are short: the map gets no new frames");
+  const auto map = run.output.find("the processor is too slow: the map gets no new frames");
   const auto images = run.output.find("odometry gets one of");
   CHECK(map != std::string::npos);
   CHECK(map < images);

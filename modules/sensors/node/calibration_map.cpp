@@ -70,7 +70,7 @@ std::vector<CalibrationMap> CalibrationMap::maps(const char* key) const {
   if (!node.IsSequence()) fail(node, std::string(key) + " is not a list");
   std::vector<CalibrationMap> result;
   for (const YAML::Node& element : node) {
-    if (!element.IsMap()) fail(element, std::string(key) + " holds something without keys");
+    if (!element.IsMap()) fail(element, std::string(key) + " contains an element without keys");
     result.push_back({file_, element});
   }
   return result;
@@ -103,7 +103,8 @@ void CalibrationMap::append(const YAML::Node& list, const char* name,
   if (!list.IsSequence()) fail(list, std::string(name) + " is not a list of numbers");
   for (const YAML::Node& element : list) {
     const std::optional<double> value = finite_number(element);
-    if (!value) fail(element, std::string(name) + " holds something that is not a finite number");
+    if (!value)
+      fail(element, std::string(name) + " contains an element that is not a finite number");
     values.push_back(*value);
   }
 }

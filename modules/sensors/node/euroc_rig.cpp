@@ -73,7 +73,7 @@ StereoRig read_stereo(const std::filesystem::path& mav0, const Camera& left) {
   const std::filesystem::path file = mav0 / "cam1" / "sensor.yaml";
   if (!is_there(mav0 / "cam1"))
     throw DatasetError(file.string() +
-                       ": no such file, nor depth0, which RGB-D has instead: "
+                       ": no such file, nor depth0 of an RGB-D camera: "
                        "one camera without depth is not supported");
   const CalibrationMap yaml(file);
   const StereoRig stereo{{left, read_euroc_camera(yaml)}};

@@ -1,9 +1,8 @@
-#include "modules/sensors/node/read_basalt.hpp"
-
 #include <algorithm>
 
 #include "modules/core/calibration_limits.hpp"
 #include "modules/sensors/node/read_camera.hpp"
+#include "modules/sensors/node/rig_calibration.hpp"
 
 namespace km {
 namespace {

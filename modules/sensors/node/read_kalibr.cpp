@@ -1,11 +1,10 @@
-#include "modules/sensors/node/read_kalibr.hpp"
-
 #include <cmath>
 #include <utility>
 
 #include "modules/core/calibration_limits.hpp"
 #include "modules/sensors/dataset_reader.hpp"
 #include "modules/sensors/node/read_camera.hpp"
+#include "modules/sensors/node/rig_calibration.hpp"
 
 namespace km {
 namespace {
@@ -104,9 +103,9 @@ std::optional<double> read_pair_shift(const CalibrationMap& left, const Calibrat
   const auto a = read_time_shift(left), b = read_time_shift(right);
   if (!a || !b) return a ? a : b;
   if (std::abs(*a - *b) > kMaxShiftDifference_s)
-    right.fail("timeshift_cam_imu", "timeshift_cam_imu: " + shortest_text(*b) + " s, but " +
-                                        shortest_text(*a) +
-                                        " s of the left camera: not a pair that is taken at once");
+    right.fail("timeshift_cam_imu",
+               "timeshift_cam_imu: " + shortest_text(*b) + " s, but " + shortest_text(*a) +
+                   " s of the left camera: the images of the pair are not taken at one time");
   return 0.5 * (*a + *b);
 }
 
@@ -186,7 +185,7 @@ RigCalibration read_kalibr(const std::vector<CalibrationMap>& maps, const RigCho
   if (choice.depth) calibration.rig.depth = choice.depth->range;
   if (!chains.cameras && !choice.may_be_partial)
     throw DatasetError(maps.front().file().string() +
-                       ": no cam0; give Kalibr's chain of cameras, too");
+                       ": no cam0; also name Kalibr's chain of cameras");
   if (chains.cameras) read_cameras(*chains.cameras, choice, calibration);
   if (chains.imu)
     read_imu(*chains.imu, calibration);

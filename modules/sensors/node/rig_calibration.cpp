@@ -2,8 +2,6 @@
 
 #include "modules/core/input_file.hpp"
 #include "modules/sensors/node/euroc_rig.hpp"
-#include "modules/sensors/node/read_basalt.hpp"
-#include "modules/sensors/node/read_kalibr.hpp"
 
 namespace km {
 namespace {

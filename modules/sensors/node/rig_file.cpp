@@ -48,7 +48,7 @@ RigCalibration read_calibration(const std::filesystem::path& path, bool is_inlin
   if (choice.depth) calibration.rig.depth = choice.depth->range;
   if (file.has_imu() && !file.has_odometry())
     calibration.notes.push_back(path.string() +
-                                ": no calibration: noise of the inertial sensor as of EuRoC's");
+                                ": no calibration: the noise of EuRoC's inertial sensor is used");
   return calibration;
 }
 

@@ -140,8 +140,8 @@ struct RigFile {
     visitor.required({"left"});
     visitor.check(
         !right.topic.empty() || !depth.topic.empty(), "left",
-        "is alone: a right camera or depth is needed (one camera does not measure how far "
-        "things are)");
+        "is alone: a right camera or depth is needed, because one camera does not measure "
+        "distances");
   }
 };
 

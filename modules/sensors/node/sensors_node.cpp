@@ -11,6 +11,8 @@
 namespace km {
 namespace {
 
+constexpr std::size_t kReadAhead = 8;  // packets decoded ahead of the published one
+
 void log_lines(const std::string& text, std::string_view name) {
   std::istringstream lines(text);
   for (std::string line; std::getline(lines, line);) log::warn(name) << line;
@@ -28,7 +30,7 @@ SensorsNode::SensorsNode(const SensorsConfig& config, const PlaybackPace& pace,
       clock_(pace.rate),
       topics_(topics),
       worker_(
-          static_cast<std::size_t>(config.read_ahead), Overflow::kBlock,
+          kReadAhead, Overflow::kBlock,
           [this](const Input& input) {
             std::visit([this](const auto& message) { step(message); }, input);
           },
@@ -116,8 +118,8 @@ double SensorsNode::wait_for_odometry(double due_s, double now_s) {
   shedding_.pause(pause_s);
   paused_s_ += pause_s;
   log::limited(leaves_out_ ? log::Level::kWarn : log::Level::kInfo, name(), "pause")
-      << "processors are short: the recording has waited for " << fixed(paused_s_, 1)
-      << " s in all";
+      << "the processor is too slow: the recording has waited for " << fixed(paused_s_, 1)
+      << " s in total";
   return pause_s;
 }
 
@@ -138,9 +140,9 @@ void SensorsNode::report_load(const ShedLoad& before, const ShedLoad& now) {
   auto line = log::limited(is_more ? log::Level::kWarn : log::Level::kInfo, name(),
                            is_more ? "shed" : "restored");
   const bool is_over = now == ShedLoad{};
-  line << (is_more   ? "processors are short: "
-           : is_over ? "processors are free again: "
-                     : "processors are less short: ");
+  line << (is_more   ? "the processor is too slow: "
+           : is_over ? "the processor keeps up again: "
+                     : "the processor is less busy: ");
   if (now.stride > 1)
     line << (now.map && !before.map ? "the map gets no new frames, " : "")
          << "odometry gets one of " << now.stride << " images";

@@ -10,6 +10,7 @@
 #include "modules/images/image_view.hpp"
 #include "modules/sensors/frame_files.hpp"
 #include "modules/sensors/node/euroc_rig.hpp"
+#include "test/support/keyframe_pairs.hpp"
 #include "test/support/shared_data.hpp"
 
 namespace km {
@@ -89,10 +90,10 @@ void check(const std::vector<StereoPairFile>& pairs, const StereoRig& rig, std::
   StereoDepth stereo(rig, config);
   DepthDifferences differences;
   for (std::size_t i = 0; i < pairs.size(); i += every) {
-    const StereoPairResult pair = load_stereo_pair(pairs[i], rig);
+    const auto pair = load_stereo_pair(pairs[i], rig);
     REQUIRE(pair.status == ImageStatus::kOk);
-    add_differences(stereo.compute(pair.frame.left, pair.frame.right), stereo, rig,
-                    triangulated_corners(pair.frame, rig), differences);
+    add_differences(stereo.compute(pair.image.left, pair.image.right), stereo, rig,
+                    triangulated_corners(pair.image, rig), differences);
   }
   CAPTURE(differences.corners, differences.px.size());
   REQUIRE(differences.corners > 300);
@@ -105,7 +106,7 @@ TEST_CASE("Dense depth agrees with triangulated corners on MH_01", "[stereo_dept
   const auto folder = shared_data("euroc/MH_01_easy");
   if (!folder) return;
   ReaderReport report;
-  auto pairs = list_euroc_pairs(*folder / "mav0", 0.001, report).pairs;
+  auto pairs = list_euroc_pairs(*folder / "mav0", report).pairs;
   pairs.resize(300);  // 15 s
   check(pairs, read_euroc_rig(*folder / "mav0").stereo, 30, {.downscale = GENERATE(1, 2)});
 }

@@ -60,7 +60,7 @@ TEST_CASE("An impossible calibration is refused with file and line", "[sensors]"
       Case{"cam1", "0, -1, 0,", "0, 1, 0,", "line 5: T_BS is a reflection"},
       Case{"cam1", "0, 0, 0, 1]", "0, 0, 0, 2]", "line 5: T_BS: last row"},
       Case{"cam1", "0, 0, 0, 1]", "0, 0, 0]", "line 5: T_BS has 15 numbers, expected 16"},
-      Case{"cam1", "0, 0, 0, 1]", "0, 0, .nan, 1]", "line 7: T_BS holds something"},
+      Case{"cam1", "0, 0, 0, 1]", "0, 0, .nan, 1]", "line 7: T_BS contains an element"},
       Case{"cam0", "0.2, 0", "1e300, 0", "T_BS: a translation of 1e+300 m is outside"},
       Case{"cam1", "T_BS:", "T_XX:", ": key T_BS is missing"},
       Case{"cam1", "pinhole", "eucm",

@@ -2,9 +2,8 @@
 
 #include "modules/core/lie.hpp"
 #include "modules/core/stamp.hpp"
-#include "modules/sensors/pose_file.hpp"
 #include "modules/sensors/pose_stream.hpp"
-#include "test/support/temporary_folder.hpp"
+#include "test/modules/sensors/euroc_folder.hpp"
 
 namespace km {
 namespace {
@@ -58,23 +57,24 @@ TEST_CASE("A covariance of ROS becomes that of the body's perturbation", "[senso
 
 TEST_CASE("A message of an odometry without a valid pose is refused", "[sensors][poses]") {
   RosOdometry message;
-  message.pose.position = {1, 2, 3};
-  message.pose_covariance[0] = 0.25;
+  message.pose.pose.position = {1, 2, 3};
+  message.pose.covariance[0] = 0.25;
   REQUIRE(measured_pose(message, SE3::Identity()));
   CHECK(measured_pose(message, SE3::Identity())->covariance(3, 3) == 0.25);
-  message.pose_covariance[0] = -1.0;  // unknown
+  message.pose.covariance[0] = -1.0;  // unknown
   CHECK(measured_pose(message, SE3::Identity())->covariance.isZero());
-  message.pose.orientation.coeffs().setZero();
+  message.pose.pose.orientation.coeffs().setZero();
   CHECK(!measured_pose(message, SE3::Identity()));
-  message.pose.orientation.setIdentity();
-  message.pose.position.x() = std::nan("");
+  message.pose.pose.orientation.setIdentity();
+  message.pose.pose.position.x() = std::nan("");
   CHECK(!measured_pose(message, SE3::Identity()));
 }
 
 TEST_CASE("A file of poses is read row by row", "[sensors][poses]") {
   const TemporaryFolder folder;
-  std::string covariance;
+  std::string covariance, negative;
   for (int k = 0; k < 36; ++k) covariance += k % 7 == 0 ? " 0.5" : " 0";
+  for (int k = 0; k < 36; ++k) negative += k % 7 == 0 ? " -0.5" : " 0";
   ReaderReport report;
   PoseStream poses = read_pose_file(folder.write("poses.tum",
                                                  "# t x y z qx qy qz qw\n"
@@ -87,13 +87,16 @@ TEST_CASE("A file of poses is read row by row", "[sensors][poses]") {
                                                      "10.2 1 2 4 0 0 0 1\n"
                                                      "x 1 2 4 0 0 0 1\n"
                                                      "11.0 1 2 5 0 0 0 1 0.5\n"
-                                                     "11.0 1 2 5 0 0 1 0\n"),
+                                                     "11.0 1 2 5 0 0 1 0\n"
+                                                     "12.0 1 2 5 0 0 1 0" +
+                                                     negative + '\n'),
                                     report);
   const auto at = poses.at(nanoseconds(10.25));
   REQUIRE(at);
   CHECK(at->T_odom_body.translation().isApprox(Eigen::Vector3d(1, 2, 3.5)));
   CHECK(at->covariance.isApprox(0.25 * Matrix6::Identity()));
   CHECK(poses.at(nanoseconds(11.0))->T_odom_body.translation().z() == 5.0);
+  CHECK(poses.at(nanoseconds(12.0))->covariance.isZero());  // negative variances are unknown
   CHECK(report.count(ReaderFault::kMalformedRow) == 4);
   CHECK(report.count(ReaderFault::kUnorderedStamp) == 1);
   CHECK_THAT(report.entries().at(ReaderFault::kMalformedRow).first,
@@ -103,36 +106,20 @@ TEST_CASE("A file of poses is read row by row", "[sensors][poses]") {
                         Catch::EndsWith("none.tum line 1: has 3 fields, not 8 or 44"));
 }
 
-class Frames final : public DatasetReader {
- public:
-  const SensorRig& rig() const override { return rig_; }
-  using DatasetReader::next;
-  std::optional<SensorPacket> next(const ChooseUse&) override {
-    if (next_ == 5) return std::nullopt;
-    StereoFrame frame;
-    frame.stamp = nanoseconds(10.0 + next_++);
-    return SensorPacket{std::make_shared<const StereoFrame>(std::move(frame)), {}};
-  }
-  ReaderReport report() const override { return {}; }
-  std::size_t pair_count() const override { return 5; }
-
- private:
-  SensorRig rig_;
-  int next_ = 0;
-};
-
 TEST_CASE("Packets get the poses of a file and frames without one are counted",
           "[sensors][poses]") {
-  const TemporaryFolder folder;
-  PoseFileReader reader(
-      std::make_unique<Frames>(),
-      folder.write("poses.tum", "10.5 0 0 0 0 0 0 1\n11.5 1 0 0 0 0 0 1\n12.5 2 0 0 0 0 0 1\n"));
+  const EurocFolder folder;  // eight frames from 10 s on, at 20 Hz
+  folder.write("poses.tum", "10.025 0 0 0 0 0 0 1\n10.075 1 0 0 0 0 0 1\n10.225 4 0 0 0 0 0 1\n");
+  PoseFileReader reader(std::make_unique<EurocReader>(open_euroc(folder.root())),
+                        folder.mav0() / "poses.tum");
   CHECK(reader.gives_poses());
   std::vector<double> x;
   while (const auto packet = reader.next())
     x.push_back(packet->pose->T_odom_body.translation().x());
-  CHECK(x == std::vector{0.5, 1.5});
-  CHECK(reader.report().count(ReaderFault::kFrameWithoutPose) == 3);
+  REQUIRE(x.size() == 4);
+  CHECK(x[0] == Approx(0.5));
+  CHECK(x[3] == Approx(3.5));
+  CHECK(reader.report().count(ReaderFault::kFrameWithoutPose) == 4);
 }
 
 }  // namespace

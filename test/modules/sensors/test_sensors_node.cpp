@@ -116,21 +116,6 @@ TEST_CASE("Images that come too fast are dropped evenly after the map", "[sensor
   }
 }
 
-TEST_CASE("The clock of a recording pauses as the last resort", "[sensors]") {
-  Run run;
-  run.packets.subscribe(
-      [](const auto&) { std::this_thread::sleep_for(std::chrono::milliseconds(5)); });
-  SensorsConfig config;
-  config.max_lag_s = 0.02;
-  // An image every 0.5 ms: even one of four takes 2.5 times the available time.
-  SensorsNode node(config, {100.0, false}, std::make_unique<FakeReader>(1000), run.topics());
-  node.start();
-  const SensorsEnd end = run.ended.get_future().get();
-  CHECK(end.paused_s > 0.1);
-  CHECK(end.paused_s == node.paused_s());
-  CHECK(end.published >= 250);
-}
-
 TEST_CASE("A recording that waits loses no image and no frame of the map", "[sensors]") {
   constexpr double kRate = 10.0;  // an image every 5 ms
   constexpr auto kCost = std::chrono::milliseconds(15);
@@ -175,16 +160,6 @@ TEST_CASE("A reader that throws ends the node with its exception", "[sensors]") 
   node.stop();
   CHECK_THROWS_WITH(std::rethrow_exception(node.error()), "disk gone");
   CHECK(run.stamps.size() == 3);
-}
-
-TEST_CASE("Invalid parameters of the node are refused", "[sensors]") {
-  Run run;
-  SensorsConfig config;
-  config.read_ahead = 0;
-  CHECK_THROWS_AS(SensorsNode(config, {}, std::make_unique<FakeReader>(1), run.topics()),
-                  ConfigError);
-  CHECK_THROWS_AS(SensorsNode({}, {0.0, true}, std::make_unique<FakeReader>(1), run.topics()),
-                  std::invalid_argument);
 }
 
 }  // namespace km
