@@ -74,7 +74,7 @@ void check(const Options& options, const CLI::App& app) {
     throw CLI::ValidationError(
         "--domain is that of the team: with --network; drivers are on --set ros.domain=N");
   const RobotOptions& robot = options.robot;
-  if (robot.from_s && robot.to_s && *robot.from_s >= *robot.to_s)
+  if (robot.from_s && robot.to_s && !(*robot.from_s < *robot.to_s))
     throw CLI::ValidationError("--from is not before --to");
 }
 

@@ -106,7 +106,7 @@ Options options_of(int argc, char** argv) {
   app.add_option("--peers", options.ros.peers, "Addresses of other hosts, where multicast is off")
       ->delimiter(',');
   app.callback([&options] {
-    if (options.play.from_s >= options.play.to_s)
+    if (!(options.play.from_s < options.play.to_s))
       throw CLI::ValidationError("--from is not before --to");
   });
   if (const auto exit_code = parse_options(app, argc, argv, kBadCommandLine)) std::exit(*exit_code);

@@ -175,7 +175,7 @@ Examination examine_inertial(const SensorSample& sample, const StereoRig& rig) {
       rig.depth_source == DepthSource::kRightImage && is_sound(fit_of(sample.stereo, rig));
   const VisualRotations seen = visual_rotations(sample.steps, rig, use_depth);
   const auto fit = fit_inertial(seen.steps, sample.imu);
-  if (!fit || fit->image_rms < kMinRate_radps) {
+  if (!fit || !(fit->image_rms >= kMinRate_radps)) {
     result.figures.push_back({"images against the gyroscope",
                               fit ? "not determined: the camera turns by only " +
                                         fixed(kDegrees * fit->image_rms, 2) + " degrees/s"
@@ -187,7 +187,7 @@ Examination examine_inertial(const SensorSample& sample, const StereoRig& rig) {
                             percent(fit->explained) + " explained, " + std::to_string(fit->steps) +
                                 " steps at " + fixed(kDegrees * fit->image_rms, 1) + " degrees/s"});
   examine_relation(*fit, result);
-  if (fit->explained < kRelated) return result;
+  if (!(fit->explained >= kRelated)) return result;
   examine_scale(*fit, result);
   examine_offset(*fit, result);
   if (fit->gyro_rms[1] * fit->scale > kSecondAxis_radps)

@@ -59,7 +59,7 @@ void examine_rate(const char* sensor, const std::string& id, const std::vector<S
       {std::string(sensor) + ", rate", fixed(found.rate_hz, 1) + " Hz, largest gap " +
                                            fixed(found.largest_gap_s, 3) + " s, jitter " +
                                            milliseconds(found.jitter_s)});
-  if (found.rate_hz < least_hz)
+  if (!(found.rate_hz >= least_hz))
     result.findings.push_back({.id = id + ".rate",
                                .severity = Severity::kWarning,
                                .what = std::string(sensor) + " at " + fixed(found.rate_hz, 1) +

@@ -57,10 +57,10 @@ std::optional<StereoPoint> stereo_point(const StereoRig& rig, const SE3& T_right
   const Eigen::Vector3d& t = T_right_left.translation();
   const Eigen::Vector3d turned = T_right_left.linear() * left->homogeneous();
   const Eigen::Vector3d seen = right->homogeneous();
-  if (turned.z() <= 0.0) return std::nullopt;
+  if (!(turned.z() > 0.0)) return std::nullopt;
   const Eigen::Vector3d line = skew(t) * turned;  // epipolar line of the right image, on z = 1
   const double length = line.head<2>().norm();
-  if (length < 1e-12) return std::nullopt;
+  if (!(length >= 1e-12)) return std::nullopt;
   const double focal_px = rig.cameras[1].fx;
   // Minimises the squared distance of z_right * seen = z_left * turned + t.
   Eigen::Matrix<double, 3, 2> A;
@@ -81,7 +81,7 @@ StereoFit fit_of(std::span<const StereoMatches> images, const StereoRig& rig) {
       ++fit.points;
       const auto point = stereo_point(rig, T_right_left, pair);
       errors_px.push_back(point ? point->error_px : std::numeric_limits<double>::infinity());
-      if (!point || point->error_px > kEpipolarInlier_px) continue;
+      if (!point || !(point->error_px <= kEpipolarInlier_px)) continue;
       if (point->depth_m < 0.0 && point->parallax_px > kMinParallax_px) continue;  // behind it
       ++inliers;
       if (point->depth_m > 0.0) depths_m.push_back(point->depth_m);

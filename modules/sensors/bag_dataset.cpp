@@ -54,6 +54,7 @@ BagDataset::BagDataset(std::string name, std::unique_ptr<BagReader> bag, Rig rig
       rig_(std::move(rig)),
       window_(window),
       joiner_(!rig_.topics.right.empty(), !rig_.topics.depth.empty()) {
+  window_.check(name_);
   find_topics();
   if (is_live()) return;
   first_ = read_packet([](Stamp, Stamp) { return FrameUse::kAll; });

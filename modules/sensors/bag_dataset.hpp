@@ -36,7 +36,7 @@ class BagDataset final : public DatasetReader {
   /// `name`: path of the bag, with which messages begin.
   /// Reads up to the first packet unless the bag is live. Throws DatasetError if a topic is missing
   /// or of another type, and lists the existing topics. Throws DatasetError also if the window has
-  /// no frame.
+  /// no frame, and std::invalid_argument for a window that RecordingPart::check() refuses.
   BagDataset(std::string name, std::unique_ptr<BagReader> bag, Rig rig,
              const RecordingPart& window = {});
 

@@ -2,7 +2,15 @@
 
 #include <array>
 
+#include "modules/core/text_table.hpp"
+
 namespace km {
+
+void RecordingPart::check(const std::string& recording) const {
+  if (!(from_s < to_s))
+    throw std::invalid_argument(recording + ": the window from " + fixed(from_s, 3) + " s to " +
+                                fixed(to_s, 3) + " s is empty");
+}
 
 const char* to_string(ReaderFault fault) {
   // In the order of ReaderFault.

@@ -53,7 +53,7 @@ std::string DepthAlignment::different_info() const {
   const auto& [left, depth] = cameras_;
   if (!left.info || !depth.info) return "";
   const Eigen::Vector4d a = intrinsics(*left.info, images_), b = intrinsics(*depth.info, images_);
-  if ((a - b).cwiseAbs().maxCoeff() <= kMaxOffset_px) return "";
+  if (((a - b).cwiseAbs().array() <= kMaxOffset_px).all()) return "";  // not NaN
   std::ostringstream text;
   text << "its CameraInfo has fx, fy, cx, cy of " << b.transpose() << " in place of "
        << a.transpose();

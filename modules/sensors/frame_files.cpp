@@ -56,9 +56,7 @@ LabelPalette read_palette(const std::filesystem::path& file) {
 
 void keep_part(const RecordingPart& part, const std::filesystem::path& recording,
                std::vector<StereoPairFile>& frames) {
-  if (!(part.from_s < part.to_s))
-    throw std::invalid_argument(recording.string() + ": the window from " + fixed(part.from_s, 3) +
-                                " s to " + fixed(part.to_s, 3) + " s is empty");
+  part.check(recording.string());
   const Stamp start = frames.front().stamp;
   const double end_s = seconds_between(start, frames.back().stamp);
   std::erase_if(frames, [&](const StereoPairFile& frame) {

@@ -91,7 +91,7 @@ void LoadShedding::undo_step(double now_s) {
 
 void LoadShedding::finish(const ProcessedFrame& frame) {
   while (!unfinished_.empty() && unfinished_.front().stamp <= frame.stamp) unfinished_.pop_front();
-  if (frame.tracked_share && last_finished_) {
+  if (frame.tracked_share >= 0.0 && last_finished_) {  // not NaN
     const double interval_s = seconds_between(*last_finished_, frame.stamp);
     if (interval_s > 0.0 && interval_s < kLongestInterval_s) {
       const double share = std::clamp(*frame.tracked_share, kLeastShare, 1.0);

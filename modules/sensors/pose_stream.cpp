@@ -72,7 +72,8 @@ std::optional<MeasuredPose> PoseStream::at(Stamp stamp) {
 
 MeasuredPose measured_pose(const SE3& T_odom_child, const Matrix6& covariance,
                            const SE3& T_child_body) {
-  const UncertainPose odom_child{T_odom_child, from_fixed_axes(T_odom_child, covariance)};
+  const Matrix6 known = is_covariance(covariance) ? covariance : Matrix6(Matrix6::Zero());
+  const UncertainPose odom_child{T_odom_child, from_fixed_axes(T_odom_child, known)};
   const UncertainPose odom_body = compose(odom_child, {T_child_body, Matrix6::Zero()});
   return {odom_body.T, odom_body.Sigma};
 }
@@ -82,10 +83,8 @@ std::optional<MeasuredPose> measured_pose(const RosOdometry& message, const SE3&
   const Eigen::Quaterniond& q = message.pose.pose.orientation;
   if (!(std::abs(q.norm() - 1.0) < kMaxNormError) || !message.pose.pose.position.allFinite())
     return std::nullopt;
-  Matrix6 covariance = Eigen::Map<const Matrix6>(message.pose.covariance.data());
-  if (!is_covariance(covariance)) covariance.setZero();
   return measured_pose(make_pose(q.normalized().toRotationMatrix(), message.pose.pose.position),
-                       covariance, T_child_body);
+                       Eigen::Map<const Matrix6>(message.pose.covariance.data()), T_child_body);
 }
 
 PoseStream read_pose_file(const std::filesystem::path& file, ReaderReport& report) {

@@ -45,12 +45,11 @@ class PoseStream {
 
 /// The pose of the body from the pose of a frame `child` on the body. The covariance is that of
 /// geometry_msgs/PoseWithCovariance: x, y, z and rotations about x, y, z, along the axes of odom;
-/// [m^2], [rad^2].
+/// [m^2], [rad^2]. An invalid or unknown (-1 first) covariance becomes zero.
 [[nodiscard]] MeasuredPose measured_pose(const SE3& T_odom_child, const Matrix6& covariance,
                                          const SE3& T_child_body);
 
-/// The pose of the body from a message of ROS; nullopt if its numbers are no pose. An invalid or
-/// unknown (-1 first) covariance becomes zero.
+/// The pose of the body from a message of ROS; nullopt if its numbers are no pose.
 [[nodiscard]] std::optional<MeasuredPose> measured_pose(const RosOdometry& message,
                                                         const SE3& T_child_body);
 
