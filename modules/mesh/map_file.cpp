@@ -42,19 +42,25 @@ void describe(auto& archive, As<MapMesh> auto& map) {
   numbers(map.certainty);
 }
 
-bool is_usable(const MapMesh& map) {
+}  // namespace
+
+const char* fault_of(const MapMesh& map) {
+  constexpr float kFarthest_m = 1e7F;
   const std::size_t vertices = map.mesh.vertices.size();
   const auto fits = [vertices](std::size_t size) { return size == 0 || size == vertices; };
-  return std::isfinite(map.voxel_m) && map.voxel_m >= 0.0 && map.seen_by.size() == vertices &&
-         fits(map.mesh.labels.size()) && fits(map.mesh.colors.size()) && fits(map.ids.size()) &&
-         fits(map.certainty.size()) &&
-         std::ranges::all_of(map.mesh.vertices, [](const auto& v) { return v.allFinite(); }) &&
-         std::ranges::all_of(map.mesh.faces,
-                             [&](const auto& face) { return std::ranges::max(face) < vertices; }) &&
-         std::ranges::adjacent_find(map.ids, std::greater_equal()) == map.ids.end();
+  if (!std::isfinite(map.voxel_m) || map.voxel_m < 0.0) return "voxels have no size";
+  if (map.seen_by.size() != vertices || !fits(map.mesh.labels.size()) ||
+      !fits(map.mesh.colors.size()) || !fits(map.ids.size()) || !fits(map.certainty.size()))
+    return "lists have other lengths than the vertices";
+  for (const Eigen::Vector3f& v : map.mesh.vertices)
+    if (!v.allFinite() || v.cwiseAbs().maxCoeff() >= kFarthest_m)
+      return "a vertex is not finite or beyond 10,000 km";
+  for (const auto& face : map.mesh.faces)
+    if (std::ranges::max(face) >= vertices) return "a face names a vertex that does not exist";
+  if (std::ranges::adjacent_find(map.ids, std::greater_equal()) != map.ids.end())
+    return "ids do not ascend";
+  return nullptr;
 }
-
-}  // namespace
 
 void write_map_file(const std::filesystem::path& file, const MapMesh& map) {
   ArchiveWriter archive;
@@ -80,7 +86,7 @@ MapMesh read_map_file(const std::filesystem::path& file) {
   ArchiveReader archive(content);
   MapMesh map;
   if (whole) describe(archive, map);
-  if (!whole || !archive.done() || !is_usable(map))
+  if (!whole || !archive.done() || fault_of(map) != nullptr)
     throw InputFileError(file.string() + ": is not whole");
   return map;
 }

@@ -34,6 +34,11 @@ struct MapMesh {
   double voxel_m = 0.0;
 };
 
+/// The reason why `map` cannot be the mesh of a map (a string literal), or null: lists of other
+/// lengths, faces with vertices that do not exist, ids that do not ascend, and vertices that are
+/// not finite or beyond 10,000 km.
+[[nodiscard]] const char* fault_of(const MapMesh& map);
+
 /// A vertex of a robot's map whose surface other visits have mapped better, and the vertex of one
 /// of these visits that replaces it. The vertex itself if its surface is gone. Ids are those of
 /// MapMesh.

@@ -74,7 +74,7 @@ struct SimplifiedMesh {
 /// also bends flat surface. Nodes closer than half a spacing are merged.
 ///
 /// `simplified.node_of_vertex` is first extended with kNoIndex to the length of map.mesh.vertices.
-/// Precondition: check_map_mesh() accepts the map. Linear in the new vertices except for the
+/// Precondition: fault_of() finds no fault in the map. Linear in the new vertices except for the
 /// decimation of the clusters (n log n).
 void extend(SimplifiedMesh& simplified, const MapMesh& map, const DecimationScale& scale);
 

@@ -16,54 +16,31 @@ namespace {
 
 constexpr std::size_t kInterpolationNodes = 4;  // nodes that move a vertex: the paper's k
 constexpr std::size_t kKeyframesPerNode = 4;    // at most, which hold a node
-constexpr float kFarthest_m = 1e7F;
-constexpr double kRigidTolerance = 1e-6;  // entries of R^T R
+constexpr double kRigidTolerance = 1e-6;        // entries of R^T R
 
 [[noreturn]] void refuse(const std::string& problem) {
   throw std::invalid_argument("mesh deformation: " + problem);
 }
 
-void check_vertices(const MapMesh& map, std::size_t keyframes) {
-  const auto& vertices = map.mesh.vertices;
-  if (map.seen_by.size() != vertices.size())
-    refuse("seen_by has " + std::to_string(map.seen_by.size()) + " entries for " +
-           std::to_string(vertices.size()) + " vertices");
-  if (!map.certainty.empty() && map.certainty.size() != vertices.size())
-    refuse("certainty has " + std::to_string(map.certainty.size()) + " entries for " +
-           std::to_string(vertices.size()) + " vertices");
-  for (std::size_t v = 0; v < vertices.size(); ++v) {
-    if (!(vertices[v].cwiseAbs().maxCoeff() < kFarthest_m) || !vertices[v].allFinite())
-      refuse("vertex " + std::to_string(v) + " is not finite or beyond 10,000 km");
-    const auto [first, last] = map.seen_by[v];
+void check(const MapMesh& map, std::size_t keyframes) {
+  if (const char* fault = fault_of(map)) refuse(fault);
+  for (const auto& [first, last] : map.seen_by)
     if (first > last || last >= keyframes)
-      refuse("vertex " + std::to_string(v) + " was seen by keyframes " + std::to_string(first) +
-             " to " + std::to_string(last) + ", of " + std::to_string(keyframes));
-  }
-}
-
-void check_faces(const LabelledMesh& mesh) {
-  for (std::size_t f = 0; f < mesh.faces.size(); ++f)
-    for (const std::uint32_t corner : mesh.faces[f])
-      if (corner >= mesh.vertices.size())
-        refuse("face " + std::to_string(f) + " names vertex " + std::to_string(corner) + " of " +
-               std::to_string(mesh.vertices.size()));
-}
-
-void check_ids(const MapMesh& map) {
-  if (map.ids.empty()) return;
-  if (map.ids.size() != map.mesh.vertices.size())
-    refuse("there are " + std::to_string(map.ids.size()) + " ids for " +
-           std::to_string(map.mesh.vertices.size()) + " vertices");
-  for (std::size_t v = 1; v < map.ids.size(); ++v)
-    if (map.ids[v - 1] >= map.ids[v])
-      refuse("ids do not ascend at vertex " + std::to_string(v) + ": " +
-             std::to_string(map.ids[v - 1]) + ", " + std::to_string(map.ids[v]));
+      refuse("a vertex was seen by keyframes " + std::to_string(first) + " to " +
+             std::to_string(last) + ", of " + std::to_string(keyframes));
 }
 
 bool is_rigid(const SE3& T) {
   const Eigen::Matrix3d R = T.linear();
   if (!T.matrix().allFinite() || R.determinant() < 0.0) return false;
   return (R.transpose() * R - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() < kRigidTolerance;
+}
+
+void check_poses(std::span<const SE3> poses, const char* what) {
+  for (std::size_t i = 0; i < poses.size(); ++i)
+    if (!is_rigid(poses[i]))
+      refuse(std::string(what) + " pose of keyframe " + std::to_string(i) +
+             " is not finite or not rigid");
 }
 
 // Correspondence of the vertices of two versions of a mesh.
@@ -92,20 +69,10 @@ std::vector<std::uint32_t> match_ids(const std::vector<std::uint64_t>& old_ids,
   return before;
 }
 
-// For each new vertex the old vertex of equal index if it has the same position, or kNoIndex.
-std::vector<std::uint32_t> match_positions(const std::vector<Eigen::Vector3f>& old_positions,
-                                           const std::vector<Eigen::Vector3f>& new_positions) {
-  std::vector<std::uint32_t> before(new_positions.size(), kNoIndex);
-  for (std::uint32_t v = 0; v < std::min(old_positions.size(), new_positions.size()); ++v)
-    if (old_positions[v] == new_positions[v]) before[v] = v;
-  return before;
-}
-
 VertexMatch match(const KnownVertices& known, const MapMesh& map) {
   VertexMatch match;
-  const bool by_ids = !known.ids.empty() && !map.ids.empty();
-  match.before =
-      by_ids ? match_ids(known.ids, map.ids) : match_positions(known.positions, map.mesh.vertices);
+  match.before.assign(map.mesh.vertices.size(), kNoIndex);
+  if (!known.ids.empty() && !map.ids.empty()) match.before = match_ids(known.ids, map.ids);
   match.unchanged = match.before;
   match.after.assign(known.positions.size(), kNoIndex);
   for (std::uint32_t v = 0; v < match.before.size(); ++v) {
@@ -119,19 +86,6 @@ VertexMatch match(const KnownVertices& known, const MapMesh& map) {
 }
 
 }  // namespace
-
-void check_map_mesh(const MapMesh& map, std::size_t keyframes) {
-  check_vertices(map, keyframes);
-  check_faces(map.mesh);
-  check_ids(map);
-}
-
-void check_poses(std::span<const SE3> poses, std::string_view what) {
-  for (std::size_t i = 0; i < poses.size(); ++i)
-    if (!is_rigid(poses[i]))
-      refuse(std::string(what) + " pose of keyframe " + std::to_string(i) +
-             " is not finite or not rigid");
-}
 
 void check_trajectories(std::span<const SE3> T_odom_kf, std::span<const SE3> T_world_kf) {
   check_poses(T_odom_kf, "odometry");
@@ -233,7 +187,7 @@ LocalMeshOptimizer& LocalMeshOptimizer::operator=(LocalMeshOptimizer&&) noexcept
 DeformedMesh LocalMeshOptimizer::optimize(const MapMesh& map, std::span<const SE3> T_odom_kf,
                                           std::span<const SE3> T_world_kf) {
   check_trajectories(T_odom_kf, T_world_kf);
-  check_map_mesh(map, T_odom_kf.size());
+  check(map, T_odom_kf.size());
   if (T_odom_kf.size() < state_->T_world_kf_last.size())
     throw std::invalid_argument("mesh deformation: " + std::to_string(T_odom_kf.size()) +
                                 " keyframes, fewer than the " +
@@ -268,12 +222,8 @@ DeformedMesh LocalMeshOptimizer::optimize(const MapMesh& map, std::span<const SE
   report.unbound_vertices = state.interpolation.unbound_count();
   report.nodes = graph.nodes.size();
   report.keyframes = T_odom_kf.size();
-  report.edges = graph.edges.size();
-  report.keyframe_edges = graph.keyframe_edges.size();
   report.status = solution.status;
   report.iterations = solution.iterations;
-  report.initial_cost = solution.initial_cost;
-  report.final_cost = solution.final_cost;
   state.last = std::move(solution.poses);
   state.T_world_kf_last = anchors;
   state.solved = true;

@@ -12,19 +12,8 @@
 
 namespace km {
 
-/// Throws std::invalid_argument with the first problem:
-/// - `seen_by`, ids or certainty not as long as the vertices, or ids not ascending;
-/// - the first keyframe of a vertex after the last one, or an index that is not below `keyframes`;
-/// - a vertex that is not finite or beyond 10,000 km;
-/// - a face with a vertex that does not exist.
-void check_map_mesh(const MapMesh& map, std::size_t keyframes);
-
-/// Throws std::invalid_argument with the first pose that is not finite or not rigid; `what` is the
-/// name of the poses.
-void check_poses(std::span<const SE3> poses, std::string_view what);
-
-/// Throws std::invalid_argument for poses that check_poses() refuses, for more optimised poses than
-/// keyframes, and for keyframes without any optimised pose.
+/// Throws std::invalid_argument for poses that are not finite or not rigid, for more optimised
+/// poses than keyframes, and for keyframes without any optimised pose.
 void check_trajectories(std::span<const SE3> T_odom_kf, std::span<const SE3> T_world_kf);
 
 /// Sizes and outcome of one call of LocalMeshOptimizer::optimize().
@@ -35,13 +24,9 @@ struct MeshDeformationReport {
   std::size_t nodes = 0;
   std::size_t new_nodes = 0;
   std::size_t keyframes = 0;
-  std::size_t edges = 0;
-  std::size_t keyframe_edges = 0;
   bool warm = false;  ///< Started from an earlier solution.
   DeformationStatus status = DeformationStatus::kConverged;
   int iterations = 0;
-  double initial_cost = 0.0;
-  double final_cost = 0.0;
 };
 
 struct [[nodiscard]] DeformedMesh {
@@ -56,7 +41,7 @@ struct [[nodiscard]] DeformedMesh {
 ///
 /// Incremental: the graph is kept from call to call. New surface extends it, known vertices keep
 /// their nodes, and the last solution is the first guess of the next. Vertices are identified by
-/// their ids, or by index and position if there are none. When more than half as many vertices have
+/// their ids; without ids all are new. When more than half as many vertices have
 /// been removed as remain, the graph is built again, and the solution starts from the keyframes.
 /// reset() discards everything.
 ///
@@ -78,7 +63,8 @@ class LocalMeshOptimizer {
   /// built, index i being keyframe i; `T_world_kf` are their optimised poses. Keyframes at the end
   /// without an optimised pose follow, by odometry, the last keyframe that has one.
   ///
-  /// Throws std::invalid_argument if check_map_mesh() or check_trajectories() refuses the input, or
+  /// Throws std::invalid_argument if fault_of() finds a fault in the map, for a vertex seen by
+  /// keyframes that do not exist, if check_trajectories() refuses the poses, or
   /// if there are fewer keyframes than in the call before. The state is then unchanged.
   DeformedMesh optimize(const MapMesh& map, std::span<const SE3> T_odom_kf,
                         std::span<const SE3> T_world_kf);

@@ -52,7 +52,6 @@ class Selector {
       }
       block = &map_.insert(position);
       block->last_seen = keyframe_;
-      ++result_.allocated;
     }
     if (block->selected_in == frame_) return;
     block->selected_in = frame_;

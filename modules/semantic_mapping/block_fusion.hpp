@@ -16,7 +16,6 @@ namespace km {
 /// Blocks in which a depth view shows surface, including those for which the map has no room.
 struct NearBlocks {
   std::vector<VoxelBlock*> blocks;
-  std::size_t allocated = 0;  ///< New blocks among them.
   std::size_t refused = 0;    ///< Requests for a block beyond `max_blocks` or BlockMap::kReach.
 };
 

@@ -103,7 +103,6 @@ std::vector<SemanticMapper::State::Update> SemanticMapper::State::select(
   const NearBlocks near =
       select_near_blocks(view, T_odom_cam, config.voxel_size_m,
                          static_cast<std::size_t>(config.max_blocks), frame, keyframe, map);
-  report.blocks_allocated = near.allocated;
   report.blocks_refused = near.refused;
   report.blocks_updated = near.blocks.size();
   for (VoxelBlock* block : near.blocks) {
@@ -117,7 +116,6 @@ std::vector<SemanticMapper::State::Update> SemanticMapper::State::select(
     const BlockFusion::Relation relation = fusion.relation_to(*block);
     if (relation == BlockFusion::Relation::kNotSeen) continue;
     updates.push_back({block.get(), false, relation == BlockFusion::Relation::kFree});
-    ++report.blocks_seen_free;
   }
   return updates;
 }

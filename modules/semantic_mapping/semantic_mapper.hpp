@@ -34,8 +34,6 @@ struct [[nodiscard]] IntegrationReport {
   std::size_t off_palette_pixels = 0;  ///< Pixels whose label the palette lacks: unknown.
   bool label_size_differs = false;     ///< Integrated without the labels, whose size is wrong.
   std::size_t blocks_updated = 0;      ///< Blocks near an observed surface.
-  std::size_t blocks_seen_free = 0;    ///< Other blocks in view, updated for carving.
-  std::size_t blocks_allocated = 0;    ///< New blocks.
   std::size_t blocks_refused = 0;    ///< Requests for new blocks that were refused, see NearBlocks.
   std::size_t blocks_removed = 0;    ///< Erased blocks: empty after carving.
   std::size_t blocks_finalised = 0;  ///< Blocks that left the window and became final mesh.

@@ -49,19 +49,6 @@ TEST_CASE("A network labels every pixel by the class with the best score", "[seg
     }
 }
 
-TEST_CASE("Labels have the size of the image for any size of the network", "[segmentation]") {
-  const TemporaryFolder folder;
-  PointwiseNetwork coarse = three_levels();
-  coarse.stride = GENERATE(1, 2);
-  SegmentationNetwork network(config_of(folder.write("net.onnx", coarse.onnx())));
-  const Segmentation result = network.segment(stripes(160, 40));
-  REQUIRE(result.labels.width == 160);
-  REQUIRE(result.labels.ids.size() == 160 * 40);
-  for (int stripe = 0; stripe < 4; ++stripe)  // in the middle of each
-    CHECK(int{result.labels.ids[static_cast<std::size_t>(160 * 20 + 40 * stripe + 20)]} ==
-          (stripe == 3 ? 0 : stripe));
-}
-
 TEST_CASE("Mean, scale and channels are applied before the network", "[segmentation]") {
   const TemporaryFolder folder;
   PointwiseNetwork three = three_levels();

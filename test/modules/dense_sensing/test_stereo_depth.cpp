@@ -103,17 +103,6 @@ TEST_CASE("Cameras that are rotated and have different lenses are rectified", "[
   CHECK(error.share > kMatchedShare);
 }
 
-TEST_CASE("Half the resolution is as accurate in its own pixels", "[stereo_depth]") {
-  StereoDepthConfig config;
-  config.downscale = 2;
-  TexturedPlane plane;
-  plane.depth_m = 1.0;
-  plane.cell_m = 0.06;
-  const DepthError error = error_on(test_rig(), config, plane, SE3::Identity());
-  CHECK(error.median_px < kMatchedMedian_px);
-  CHECK(error.share > kMatchedShare);
-}
-
 TEST_CASE("Depth out of range is dropped", "[stereo_depth]") {
   StereoDepthConfig config;
   config.max_depth_m = 1.5;

@@ -73,17 +73,6 @@ TEST_CASE("A table over unseen floor is an obstacle", "[map_2d]") {
   CHECK(values(map_of(surfaces), 2.15, 2.15, 3.85, 3.05) == Values{kOccupied});
 }
 
-TEST_CASE("Surface above the band and low surface are no obstacles", "[map_2d]") {
-  Surfaces surfaces;
-  surfaces.room(0, 0, 6, 4);
-  surfaces.level(1, 1, 2, 2, 2.0F, kWallLabel, true);     // overhang
-  surfaces.level(3, 1, 4, 2, 0.05F, kWallLabel);          // door sill
-  surfaces.level(4.5F, 1, 5, 2, 1.4F, kWallLabel, true);  // low beam
-  const OccupancyGrid grid = map_of(surfaces);
-  CHECK(values(grid, 0.1, 0.1, 4.4, 3.9) == Values{kFree});
-  CHECK(values(grid, 4.55, 1.05, 4.95, 1.95) == Values{kOccupied});
-}
-
 TEST_CASE("Ramps and stairs that are labelled as floor are free", "[map_2d]") {
   const bool labelled = GENERATE(true, false);
   Surfaces surfaces;

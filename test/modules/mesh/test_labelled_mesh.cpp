@@ -33,13 +33,6 @@ TEST_CASE("Appending keeps faces on their vertices and fills the arrays that one
   CHECK(mesh.colors[3] == LabelledMesh::Color{1, 2, 3});
 }
 
-TEST_CASE("Vertices take the colour of their class, black outside the palette") {
-  LabelledMesh mesh = triangle();
-  mesh.colour_by(LabelPalette({{5, "road", {10, 20, 30}}}));
-  CHECK(mesh.colors[0] == LabelledMesh::Color{0, 0, 0});
-  CHECK(mesh.colors[1] == LabelledMesh::Color{10, 20, 30});
-}
-
 using Catch::Contains;
 
 std::filesystem::path write_text(const TemporaryFolder& folder, const std::string& text) {

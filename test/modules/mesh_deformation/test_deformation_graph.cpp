@@ -76,8 +76,7 @@ TEST_CASE("A node is tied to keyframes spread over its time of sight", "[mesh_de
   CHECK(keyframes({10, 100}, 4) == List{10, 100});
 }
 
-TEST_CASE("A cube held at one corner moves and a cube held at two stretches",
-          "[mesh_deformation]") {
+TEST_CASE("A cube held at two corners stretches", "[mesh_deformation]") {
   DeformationGraph graph;
   for (int i = 0; i < 8; ++i) graph.nodes.emplace_back(i % 2, i / 2 % 2, i / 4);
   for (std::uint32_t i = 0; i < 8; ++i)
@@ -91,29 +90,18 @@ TEST_CASE("A cube held at one corner moves and a cube held at two stretches",
                                .anchor_translation_m = 1e-5,
                                .mesh_edge_m = 0.1,
                                .keyframe_edge_m = 1e-5};
-  SECTION("one corner") {
-    const auto solution =
-        solve(graph, anchors, noise, kStop, initial_poses(graph, graph.T_odom_kf));
-    for (std::size_t n = 0; n < 8; ++n)
-      CHECK((solution.poses.T_world_node[n].translation() - graph.nodes[n] -
-             Eigen::Vector3d(-0.5, 0, 0))
-                .norm() < kSolved);
-  }
-  SECTION("two corners") {
-    graph.T_odom_kf.push_back(make_pose(Eigen::Matrix3d::Identity(), {1, 0, 0}));
-    graph.keyframe_edges.push_back({1, 1});
-    anchors.push_back(make_pose(Eigen::Matrix3d::Identity(), {1.5, 0, 0}));
-    const auto solution =
-        solve(graph, anchors, noise, kStop, initial_poses(graph, graph.T_odom_kf));
-    const auto& nodes = solution.poses.T_world_node;
-    CHECK(nodes[0].translation().x() == Approx(-0.5).margin(1e-3));
-    CHECK(nodes[1].translation().x() == Approx(1.5).margin(1e-3));
-    // The far edge is longer than before, but shorter than the held one; all is symmetric.
-    const double far = nodes[7].translation().x() - nodes[6].translation().x();
-    CHECK(far > 1.0);
-    CHECK(far < 2.0);
-    CHECK(nodes[7].translation().x() + nodes[6].translation().x() == Approx(1.0).margin(1e-3));
-  }
+  graph.T_odom_kf.push_back(make_pose(Eigen::Matrix3d::Identity(), {1, 0, 0}));
+  graph.keyframe_edges.push_back({1, 1});
+  anchors.push_back(make_pose(Eigen::Matrix3d::Identity(), {1.5, 0, 0}));
+  const auto solution = solve(graph, anchors, noise, kStop, initial_poses(graph, graph.T_odom_kf));
+  const auto& nodes = solution.poses.T_world_node;
+  CHECK(nodes[0].translation().x() == Approx(-0.5).margin(1e-3));
+  CHECK(nodes[1].translation().x() == Approx(1.5).margin(1e-3));
+  // The far edge is longer than before, but shorter than the held one; all is symmetric.
+  const double far = nodes[7].translation().x() - nodes[6].translation().x();
+  CHECK(far > 1.0);
+  CHECK(far < 2.0);
+  CHECK(nodes[7].translation().x() + nodes[6].translation().x() == Approx(1.0).margin(1e-3));
 }
 
 TEST_CASE("The solution does not depend on the first guess", "[mesh_deformation]") {

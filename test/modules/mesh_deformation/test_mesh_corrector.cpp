@@ -200,20 +200,10 @@ TEST_CASE("The newer of two visits that coincide after correction stays", "[mesh
     CHECK(result->mesh.faces.size() == 2 * visits.one());
     CHECK(result->superseded.vertices.empty());
   }
-  SECTION("switched off, both stay") {
-    limits.voxels = 0.0;
-    CHECK(MeshCorrector(config, limits).correct(visits.input())->superseded_faces == 0);
-  }
   SECTION("below the bound on faces both stay") {
     config.duplicate_faces = static_cast<int>(visits.map.mesh.faces.size());
     CHECK(MeshCorrector(config, limits).correct(visits.input())->superseded_faces == 0);
     --config.duplicate_faces;
-    CHECK(MeshCorrector(config, limits).correct(visits.input())->superseded_faces == visits.one());
-  }
-  SECTION("below the bound on the share of copies both stay") {
-    limits.share = 1.0;
-    CHECK(MeshCorrector(config, limits).correct(visits.input())->superseded_faces == 0);
-    limits.share = 0.99;
     CHECK(MeshCorrector(config, limits).correct(visits.input())->superseded_faces == visits.one());
   }
   SECTION("with voxels of unknown size both stay") {

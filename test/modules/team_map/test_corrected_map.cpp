@@ -149,16 +149,4 @@ TEST_CASE("The map does not depend on the order of chunks and poses, nor on the 
   CHECK(late.mesh.labels == present.mesh.labels);
 }
 
-TEST_CASE("When the frame of the team changes, only poses are sent", "[team_map]") {
-  CorrectedRobot robot;
-  const std::size_t chunk_bytes = robot.chunk_bytes();
-  const SE3 T = make_pose(Eigen::AngleAxisd(1.0, Eigen::Vector3d::UnitZ()).toRotationMatrix(),
-                          {30.0, -20.0, 1.0});
-  robot.T_world_kf = moved(T, robot.T_world_kf);
-  robot.correct();
-  CHECK(robot.chunk_bytes() == chunk_bytes);
-  CHECK(robot.poses.messages().size() == 2);
-  CHECK(error_m(*robot.mesh, received(newest_of(robot))) < 0.005);
-}
-
 }  // namespace km
