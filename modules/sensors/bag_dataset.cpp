@@ -17,6 +17,9 @@ namespace {
 // A complete frame waits up to this time, by the log, for inertial samples up to its stamp.
 constexpr double kImuPatience_s = 2.0;
 
+// Longest time for which inertial samples and poses wait for a frame.
+constexpr double kLongestHeld_s = ImuStream::kLongest_s;
+
 std::size_t index_of(SensorRole role) {
   return static_cast<std::size_t>(role);
 }
@@ -169,11 +172,13 @@ void BagDataset::take_pose(Stamp stamp, const BagMessage& message) {
       decode_ros<RosOdometry>(bag_->channels()[message.channel].encoding, message.bytes);
   const auto pose =
       odometry.value ? measured_pose(*odometry.value, rig_.T_child_body) : std::nullopt;
-  if (pose)
-    poses_.add(stamp, *pose);
-  else
+  if (!pose) {
     report_.add(ReaderFault::kMalformedMessage,
                 place_of(message) + ": " + (odometry.value ? "no pose" : odometry.refusal));
+    return;
+  }
+  poses_.add(stamp, *pose);
+  poses_.drop_before(stamp - nanoseconds(kLongestHeld_s));
 }
 
 void BagDataset::take_imu(SensorRole role, Stamp stamp, const BagMessage& message) {
@@ -194,6 +199,7 @@ void BagDataset::take_imu(SensorRole role, Stamp stamp, const BagMessage& messag
   if (role == SensorRole::kGyro) imu_joiner_.add_gyro({stamp, sample.gyro});
   if (role == SensorRole::kAccel) imu_joiner_.add_accel({stamp, sample.accel});
   while (const auto joined = imu_joiner_.next()) imu_.add(*joined);
+  imu_.drop_before(stamp - nanoseconds(kLongestHeld_s));
 }
 
 std::optional<JoinedFrame> BagDataset::next_frame() {

@@ -13,6 +13,7 @@ void ImuStream::add(const ImuSample& sample) {
 std::vector<ImuSample> ImuStream::until(Stamp stamp) {
   if (!has_begun_) begin_at(stamp);
   has_begun_ = true;
+  drop_before(stamp - nanoseconds(kLongest_s));
   const auto last = std::ranges::lower_bound(samples_, stamp, {}, &ImuSample::stamp);
   std::vector<ImuSample> packet(samples_.begin(), std::next(last));
   samples_.erase(samples_.begin(), last);
@@ -20,10 +21,12 @@ std::vector<ImuSample> ImuStream::until(Stamp stamp) {
 }
 
 void ImuStream::begin_at(Stamp stamp) {
-  if (has_begun_) return;
-  const Stamp first = stamp - nanoseconds(kLeadIn_s);
+  if (!has_begun_) drop_before(stamp - nanoseconds(kLeadIn_s));
+}
+
+void ImuStream::drop_before(Stamp stamp) {
   samples_.erase(samples_.begin(),
-                 std::ranges::lower_bound(samples_, first, {}, &ImuSample::stamp));
+                 std::ranges::lower_bound(samples_, stamp, {}, &ImuSample::stamp));
 }
 
 void report_gaps(std::span<const ImuSample> samples, double rate_hz, const std::string& place,
@@ -36,6 +39,18 @@ void report_gaps(std::span<const ImuSample> samples, double rate_hz, const std::
       report.add(ReaderFault::kImuGap,
                  place + ": " + std::to_string(length_s) + " s after " + std::to_string(before));
   }
+}
+
+void ImuJoiner::add_gyro(const Reading& reading) {
+  const Stamp oldest = reading.stamp - nanoseconds(ImuStream::kLongest_s);
+  for (; !gyro_.empty() && gyro_.front().stamp < oldest; gyro_.pop_front()) ++lost_;
+  gyro_.push_back(reading);
+}
+
+void ImuJoiner::add_accel(const Reading& reading) {
+  const Stamp oldest = reading.stamp - nanoseconds(ImuStream::kLongest_s);
+  while (!accel_.empty() && accel_.front().stamp < oldest) accel_.pop_front();
+  accel_.push_back(reading);
 }
 
 std::optional<ImuSample> ImuJoiner::next() {

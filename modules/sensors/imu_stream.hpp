@@ -18,6 +18,9 @@ class ImuStream {
   /// Time by which the samples of the first packet precede its frame, so that odometry can start
   /// with samples from before the first image.
   static constexpr double kLeadIn_s = 1.0;
+  /// Longest time by which samples of a packet precede its frame. After a longer pause of the
+  /// cameras odometry starts anew, so that older samples are of no use.
+  static constexpr double kLongest_s = 60.0;
 
   /// Stamps must ascend.
   void add(const ImuSample& sample);
@@ -36,6 +39,9 @@ class ImuStream {
 
   /// The next packet begins at this stamp. Precondition: no packet has been made.
   void begin_at(Stamp stamp);
+
+  /// Bounds the memory of a stream whose cameras pause.
+  void drop_before(Stamp stamp);
 
  private:
   std::deque<ImuSample> samples_;
@@ -58,9 +64,10 @@ class ImuJoiner {
     Eigen::Vector3d value = Eigen::Vector3d::Zero();
   };
 
-  /// Precondition: the stamps of each sensor ascend.
-  void add_gyro(const Reading& reading) { gyro_.push_back(reading); }
-  void add_accel(const Reading& reading) { accel_.push_back(reading); }
+  /// Precondition: the stamps of each sensor ascend. Readings that wait for the other sensor longer
+  /// than ImuStream::kLongest_s are dropped.
+  void add_gyro(const Reading& reading);
+  void add_accel(const Reading& reading);
 
   /// The next complete sample; nullopt if further readings are needed.
   [[nodiscard]] std::optional<ImuSample> next();

@@ -22,6 +22,11 @@ class PoseStream {
   /// Stamps must ascend.
   void add(Stamp stamp, const MeasuredPose& pose);
 
+  /// Bounds the memory of a stream whose cameras pause.
+  void drop_before(Stamp stamp) {
+    while (!poses_.empty() && poses_.front().stamp < stamp) poses_.pop_front();
+  }
+
   /// starts_by(): a pose at or before the stamp has been added. reaches(): a pose at or after the
   /// stamp has been added.
   [[nodiscard]] bool starts_by(Stamp stamp) const { return first_ && *first_ <= stamp; }

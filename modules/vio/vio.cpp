@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <utility>
 
@@ -37,6 +38,10 @@ constexpr double kRecovered_s = 0.8;
 // features and longest gap.
 constexpr int kLeastTracked = 30;
 constexpr double kLongestBridge_s = 3.0;
+
+// Longest pause of the images over which inertial samples alone give the pose. Samples that are
+// older than this are dropped. After a longer pause odometry starts again from the last pose.
+constexpr double kLongestPause_s = 10.0;
 
 // Longest time between two samples; infinite without samples.
 double longest_step_s(const std::vector<ImuSample>& samples) {
@@ -79,6 +84,7 @@ void Vio::continue_from(const VioCheckpoint& checkpoint) {
 VioResult Vio::process(const SensorPacket& packet) {
   VioResult result;
   const int refused = rig_.has_imu ? take_samples(packet) : 0;
+  drop_old_samples();
   if (refused > 0) result.problem = VioProblem::kBadSamples;
   statistics_.refused_samples += refused;
   const Frame& frame = packet.frame;
@@ -101,13 +107,15 @@ VioResult Vio::process(const SensorPacket& packet) {
     result.tracked.push_back(feature.left);
   const int features = static_cast<int>(held.data.tracked.features.size());
   const bool first = !last_image_.has_value();
+  const bool paused = rig_.has_imu && seconds_between(before, frame->stamp) > kLongestPause_s;
   last_image_ = frame->stamp;
 
-  held.data.is_bridged = rig_.has_imu && !first && gap_s > config_.max_imu_gap_s;
+  held.data.is_bridged = rig_.has_imu && !first && !paused && gap_s > config_.max_imu_gap_s;
   statistics_.gaps += held.data.is_bridged && !in_gap_;
   in_gap_ = held.data.is_bridged;
   if (in_gap_) result.problem = VioProblem::kInertialGap;
-  if (in_gap_ && !takes_over(result.tracking, gap_s)) {
+  if (paused) result.problem = VioProblem::kPause;
+  if (paused || (in_gap_ && !takes_over(result.tracking, gap_s))) {
     held.data.samples.clear();
     restart(std::move(held));
   } else if (first && can_continue_at(held)) {
@@ -118,7 +126,6 @@ VioResult Vio::process(const SensorPacket& packet) {
     held_.push_back(std::move(held));
     try_start(result);
   }
-  while (samples_.size() > 1 && samples_[1].stamp <= frame->stamp) samples_.erase(samples_.begin());
   if (!result.states.empty()) last_ = result.states.back();
   watch_vision(frame->stamp, features, result);
   return result;
@@ -138,6 +145,16 @@ int Vio::take_samples(const SensorPacket& packet) {
       samples_.push_back(sample);
   }
   return refused;
+}
+
+// Keeps the samples from the last one at or before the last image on, but at most those of
+// kLongestPause_s.
+void Vio::drop_old_samples() {
+  if (samples_.empty()) return;
+  Stamp needed = samples_.back().stamp - nanoseconds(kLongestPause_s);
+  if (last_image_) needed = std::max(needed, *last_image_);
+  const auto later = std::ranges::upper_bound(samples_, needed, {}, &ImuSample::stamp);
+  if (later != samples_.begin()) samples_.erase(samples_.begin(), std::prev(later));
 }
 
 // Samples from the last one at or before `last` to the first one at or after `now`. Empty if no

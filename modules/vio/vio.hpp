@@ -27,6 +27,7 @@ enum class VioProblem {
   /// Gap between inertial samples above VioConfig::max_imu_gap_s. Images alone determine the
   /// motion. If images cannot, odometry starts again from the last pose.
   kInertialGap,
+  kPause,  ///< Long pause of the images. Odometry starts again from the last pose.
   /// The estimate was implausible. Odometry starts again from the last pose.
   kDiverged,
   /// Images contradicted the estimate, see EstimateWatch. Odometry starts again from the last pose.
@@ -97,6 +98,7 @@ class Vio {
   };
 
   int take_samples(const SensorPacket& packet);
+  void drop_old_samples();
   [[nodiscard]] std::vector<ImuSample> samples_since(Stamp last, Stamp now) const;
   [[nodiscard]] bool takes_over(const TrackerStatistics& tracking, double gap_s) const;
   [[nodiscard]] Eigen::Matrix3d turn(const std::vector<ImuSample>& samples, Stamp from,

@@ -24,6 +24,8 @@ const char* text(VioProblem problem) {
     case VioProblem::kInertialGap:
       return "gap in the inertial samples: the motion is estimated from images alone, or odometry "
              "starts again";
+    case VioProblem::kPause:
+      return "long pause of the images: odometry starts again from the last pose";
     case VioProblem::kDiverged:
       return "estimate diverged, starting again from the last pose";
     case VioProblem::kContradicted:

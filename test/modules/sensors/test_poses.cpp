@@ -2,6 +2,7 @@
 
 #include "modules/core/lie.hpp"
 #include "modules/core/stamp.hpp"
+#include "modules/sensors/imu_stream.hpp"
 #include "modules/sensors/pose_stream.hpp"
 #include "test/modules/sensors/euroc_folder.hpp"
 
@@ -35,6 +36,28 @@ TEST_CASE("Between poses the body moves at constant velocity", "[sensors][poses]
   poses.add(nanoseconds(12.5), {pose_at(12.5)});  // further away than the longest step
   CHECK(!poses.at(nanoseconds(12.0)));
   CHECK(poses.at(nanoseconds(12.5)));
+}
+
+TEST_CASE("A pause of the cameras bounds the samples and poses that wait", "[sensors][poses]") {
+  constexpr double kPause_s = 780.0, kRate_hz = 100.0;
+  ImuStream imu;
+  for (int k = 0; k <= kPause_s * kRate_hz; ++k) imu.add({.stamp = nanoseconds(k / kRate_hz)});
+  (void)imu.until(nanoseconds(1.0));
+  const auto packet = imu.until(nanoseconds(kPause_s));
+  CHECK(packet.back().stamp == nanoseconds(kPause_s));
+  CHECK(packet.back().stamp - packet.front().stamp == nanoseconds(ImuStream::kLongest_s));
+
+  PoseStream poses;
+  poses.add(0, {pose_at(0.0), Matrix6::Zero()});
+  poses.add(nanoseconds(1.0), {pose_at(1.0), Matrix6::Zero()});
+  poses.drop_before(nanoseconds(1.0));
+  CHECK(!poses.at(nanoseconds(0.5)));
+  CHECK(poses.at(nanoseconds(1.0)));
+
+  // The gyroscope goes on without an accelerometer.
+  ImuJoiner joiner;
+  for (int k = 0; k <= kPause_s; ++k) joiner.add_gyro({.stamp = nanoseconds(k)});
+  CHECK(joiner.lost() == static_cast<std::size_t>(kPause_s - ImuStream::kLongest_s));
 }
 
 TEST_CASE("A covariance of ROS becomes that of the body's perturbation", "[sensors][poses]") {

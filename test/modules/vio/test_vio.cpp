@@ -27,9 +27,16 @@ class Bench {
     auto frame = std::make_shared<StereoFrame>(frame_);
     frame->stamp = image * kFrameStep;
     packet.frame = std::move(frame);
-    for (Stamp s = std::max(image - 1, 0) * kFrameStep; s <= image * kFrameStep; s += kImuStep)
-      packet.imu.push_back({s, {0.01, 0.02, -0.01}, {kGravity_mps2, 0.0, 0.0}});
+    packet.imu = samples(std::max(image - 1, 0), image);
     return packet;
+  }
+
+  // From image `first` to image `last`, both included.
+  static std::vector<ImuSample> samples(int first, int last) {
+    std::vector<ImuSample> all;
+    for (Stamp s = first * kFrameStep; s <= last * kFrameStep; s += kImuStep)
+      all.push_back({s, {0.01, 0.02, -0.01}, {kGravity_mps2, 0.0, 0.0}});
+    return all;
   }
 
   Vio vio(double rest_s = VioConfig{}.rest_s) const {
@@ -213,6 +220,30 @@ TEST_CASE("A long gap in the inertial samples leads to a new start from the last
   REQUIRE_FALSE(after.keyframes.empty());
   CHECK(after.keyframes.front().id.index == before.keyframes.back().id.index + 1);
   CHECK(after.keyframes.front().covariance(5, 5) > 0.1);
+}
+
+TEST_CASE("After a long pause of the images odometry starts again from the last pose", "[vio]") {
+  constexpr int kPause = 13 * 60 * 20;  // 13 minutes in images at 20 Hz
+  const bool are_in_one_packet = GENERATE(true, false);
+  CAPTURE(are_in_one_packet);
+  const Bench bench;
+  Vio vio = bench.vio();
+  const VioResult before = feed(vio, bench, 0, 30);
+  SensorPacket first_after = bench.packet(30 + kPause);
+  if (are_in_one_packet)
+    first_after.imu = Bench::samples(29, 30 + kPause);
+  else
+    for (int k = 29; k < 29 + kPause; ++k)
+      CHECK(vio.process({nullptr, Bench::samples(k, k + 1)}).problem == VioProblem::kNoImage);
+  CHECK(vio.process(first_after).problem == VioProblem::kPause);
+  const VioResult after = feed(vio, bench, 31 + kPause, 31 + kPause + Bench::kStartImages);
+  CHECK(after.problem == VioProblem::kNone);
+  CHECK(vio.statistics().starts == 2);
+  CHECK(vio.statistics().gaps == 0);
+  CHECK(vio.statistics().refused_samples == 0);
+  REQUIRE(after.states.size() == 1 + Bench::kStartImages);  // includes the images held back
+  const SE3 jump = before.states.back().T_odom_body.inverse() * after.states.front().T_odom_body;
+  CHECK(jump.translation().norm() < 5e-3);
 }
 
 TEST_CASE("Odometry starts at once from a keyframe of an earlier process", "[vio]") {
