@@ -22,6 +22,16 @@ constexpr double kMinDepthRatio = 0.1;         // Below it a point is nearly beh
 constexpr int kSearchEvery = 4;  // A feature without a depth is searched in every fourth image.
 constexpr double kMaxInverseDepth = 20.0;  // [1/m]; a propagated depth beyond it is discarded.
 constexpr float kMinSpacing = 0.4F;        // Share of min_distance_px to which tracks may approach.
+constexpr unsigned kSeed = 1;              // Of the random samples.
+// Largest distance to which a feature tracked forward and back must return.
+constexpr double kMaxForwardBackwardPx = 1.0;
+
+// Pyramid levels above the full image, and largest distance of a feature from the position that the
+// common motion predicts. Without a gyroscope features may move by half a window on the coarsest
+// level. Outliers are rejected earlier, because no inertial sensor contradicts them later.
+constexpr int kLevels = 2, kLevelsWithoutGyro = 4;
+constexpr double kMaxReprojectionPx = 1.5, kMaxReprojectionWithoutGyroPx = 1.0;
+constexpr double kEpipolarShareWithoutGyro = 0.5;
 
 std::vector<cv::Point2f> to_cv(std::span<const Eigen::Vector2f> points) {
   std::vector<cv::Point2f> result;
@@ -41,7 +51,7 @@ struct KltResult {
 // `levels`: coarsest pyramid level used. `from` needs derivatives.
 KltResult track_klt(const ImagePyramid& from, const ImagePyramid& to,
                     std::span<const Eigen::Vector2f> points,
-                    std::span<const Eigen::Vector2f> starts, int window_px, int levels) {
+                    std::span<const Eigen::Vector2f> starts, int levels) {
   KltResult result;
   if (points.empty()) return result;
   std::vector<cv::Point2f> there = to_cv(starts);
@@ -51,8 +61,8 @@ KltResult track_klt(const ImagePyramid& from, const ImagePyramid& to,
   constexpr double kMinEigenvalue = 1e-4;  // As OpenCV scales it: rejects flat windows.
   const cv::TermCriteria stop(cv::TermCriteria::COUNT + cv::TermCriteria::EPS, kMaxSteps, kStopPx);
   cv::calcOpticalFlowPyrLK(from.maps(), to.maps(), to_cv(points), there, status, cv::noArray(),
-                           cv::Size(window_px, window_px), levels, stop,
-                           cv::OPTFLOW_USE_INITIAL_FLOW, kMinEigenvalue);
+                           cv::Size(ImagePyramid::kWindow_px, ImagePyramid::kWindow_px), levels,
+                           stop, cv::OPTFLOW_USE_INITIAL_FLOW, kMinEigenvalue);
   const cv::Size size = to.level(0).size();
   for (std::size_t i = 0; i < there.size(); ++i) {
     const bool inside = there[i].x >= 0.0F && there[i].y >= 0.0F &&
@@ -64,14 +74,8 @@ KltResult track_klt(const ImagePyramid& from, const ImagePyramid& to,
   return result;
 }
 
-// Without a gyroscope features may move by half a window on the coarsest level. Outliers are
-// rejected earlier, because no inertial sensor contradicts them later.
 TrackerConfig without_gyro(TrackerConfig config) {
-  constexpr int kLevels = 4;
-  constexpr double kEpipolarShare = 0.5, kReprojectionShare = 2.0 / 3.0;
-  config.pyramid_levels = std::max(config.pyramid_levels, kLevels);
-  config.max_epipolar_px *= kEpipolarShare;
-  config.max_reprojection_px *= kReprojectionShare;
+  config.max_epipolar_px *= kEpipolarShareWithoutGyro;
   return config;
 }
 
@@ -113,10 +117,12 @@ FeatureTracker::FeatureTracker(const StereoRig& rig, const TrackerConfig& config
     : rig_(rig),
       config_(has_gyro ? checked(config) : without_gyro(checked(config))),
       has_gyro_(has_gyro),
+      levels_(has_gyro ? kLevels : kLevelsWithoutGyro),
+      max_reprojection_px_(has_gyro ? kMaxReprojectionPx : kMaxReprojectionWithoutGyroPx),
       focal_px_(rig.cameras[0].fx),
       detector_(config_),
       stereo_matcher_(rig, config_),
-      rng_(static_cast<std::mt19937::result_type>(config_.seed)) {
+      rng_(kSeed) {
   check_rig(rig);
   if (rig.depth_source == DepthSource::kDepthImage) depth_matcher_.emplace(rig, config_);
 }
@@ -127,7 +133,7 @@ TrackedFrame FeatureTracker::track(const StereoFrame& frame,
   if (!R_previous_current_body.allFinite()) {
     throw std::invalid_argument("FeatureTracker::track: the rotation is not finite");
   }
-  ImagePyramid left(frame.left, config_, true);
+  ImagePyramid left(frame.left, levels_, true);
 
   statistics_ = {};
   const SE3 guess = predicted_motion(frame.stamp, R_previous_current_body);
@@ -146,7 +152,6 @@ TrackedFrame FeatureTracker::track(const StereoFrame& frame,
   tracks_.clear();
   for (Step& step : steps) tracks_.push_back(std::move(step.now));
   statistics_.tracked = static_cast<int>(tracks_.size());
-  statistics_.motion_known = motion.has_value();
   add_corners(left);
   match_right(left, frame);
   previous_left_ = std::move(left);
@@ -197,25 +202,13 @@ std::vector<FeatureTracker::Step> FeatureTracker::follow(const ImagePyramid& lef
     from.push_back(track.px);
     starts.push_back(predicted_px(track, depths.back(), guess));
   }
-  const KltResult there =
-      track_klt(previous_left_, left, from, starts, config_.window_px, config_.pyramid_levels);
-  const double tolerance = config_.max_forward_backward_px;
-  KltResult back;
-  if (tolerance > 0.0) {
-    back = track_klt(left, previous_left_, there.px, from, config_.window_px, 0);
-  }
+  const KltResult there = track_klt(previous_left_, left, from, starts, levels_);
+  const KltResult back = track_klt(left, previous_left_, there.px, from, 0);
   std::vector<Track> failed;
-  statistics_.lost = statistics_.backward = 0;
   for (std::size_t i = 0; i < tracks_.size(); ++i) {
     const auto bearing =
         there.found[i] ? rig_.cameras[0].unproject(there.px[i].cast<double>()) : std::nullopt;
-    if (!bearing) {
-      ++statistics_.lost;
-      failed.push_back(std::move(tracks_[i]));
-      continue;
-    }
-    if (tolerance > 0.0 && !(back.found[i] && (back.px[i] - from[i]).norm() < tolerance)) {
-      ++statistics_.backward;
+    if (!bearing || !back.found[i] || !((back.px[i] - from[i]).norm() < kMaxForwardBackwardPx)) {
       failed.push_back(std::move(tracks_[i]));
       continue;
     }
@@ -229,6 +222,7 @@ std::vector<FeatureTracker::Step> FeatureTracker::follow(const ImagePyramid& lef
     step.now.inverse_depth.reset();
     steps.push_back(std::move(step));
   }
+  statistics_.lost = static_cast<int>(failed.size());
   tracks_ = std::move(failed);
   return steps;
 }
@@ -260,10 +254,9 @@ void FeatureTracker::align(std::vector<Step>& steps, const ImagePyramid& left,
 
 bool FeatureTracker::place_on_patch(Track& track, const ImagePyramid& left) const {
   const auto found = track.patch->align(left.level(0), track.px, track.A);
-  if (!found || found->correlation < kMinPatchCorrelation ||
-      (found->px - track.px).norm() > kMaxCorrectionPx) {
+  if (!found || !(found->correlation >= kMinPatchCorrelation) ||
+      !((found->px - track.px).norm() <= kMaxCorrectionPx))
     return false;
-  }
   const auto bearing = rig_.cameras[0].unproject(found->px.cast<double>());
   if (!bearing) return false;
   track.px = found->px;
@@ -284,7 +277,6 @@ void FeatureTracker::add_corners(const ImagePyramid& left) {
     track.left = *bearing;
     track.patch = cut_patch(left, px);
     tracks_.push_back(std::move(track));
-    ++statistics_.detected;
   }
 }
 
@@ -300,22 +292,20 @@ void FeatureTracker::match_right(const ImagePyramid& left, const StereoFrame& fr
   const auto matches =
       depth_matcher_
           ? depth_matcher_->match(frame.depth.get(), queries)
-          : stereo_matcher_.match(left, ImagePyramid(frame.right, config_, false), queries);
-  statistics_.stereo = depth_matcher_ ? depth_matcher_->statistics() : stereo_matcher_.statistics();
-  const double threshold = config_.max_reprojection_px / focal_px_;
+          : stereo_matcher_.match(left, ImagePyramid(frame.right, levels_, false), queries);
+  const double threshold = max_reprojection_px_ / focal_px_;
   for (std::size_t i = 0; i < asked.size(); ++i) {
     Track& track = *asked[i];
     if (!matches[i]) {
-      if (track.inverse_depth > kMaxInverseDepth) track.inverse_depth.reset();
+      if (!(track.inverse_depth <= kMaxInverseDepth)) track.inverse_depth.reset();
       continue;
     }
     if (track.inverse_depth) {
       const Eigen::Vector2d expected =
           stereo_matcher_.right_bearing(track.left, *track.inverse_depth);
-      if ((expected - matches[i]->right).norm() > threshold) {
+      if (!((expected - matches[i]->right).norm() <= threshold)) {
         // One of the two depths is wrong: both are discarded, and a later image searches again.
         track.inverse_depth.reset();
-        ++statistics_.stereo_motion;
         continue;
       }
     }
@@ -358,11 +348,11 @@ void FeatureTracker::unroll(const SE3& T_previous_current, double dt_s, TrackedF
 void FeatureTracker::drop_crowded(std::vector<Step>& steps) {
   const float spacing = kMinSpacing * static_cast<float>(config_.min_distance_px);
   DistanceGrid grid(cv::Size(rig_.cameras[0].width, rig_.cameras[0].height), spacing);
-  statistics_.crowded += static_cast<int>(std::erase_if(steps, [&grid](const Step& step) {
+  std::erase_if(steps, [&grid](const Step& step) {
     if (!grid.is_free(step.now.px)) return true;  // The older track came first.
     grid.add(step.now.px);
     return false;
-  }));
+  });
 }
 
 std::optional<SE3> FeatureTracker::drop_outliers(std::vector<Step>& steps, const SE3& guess) {
@@ -384,7 +374,7 @@ std::optional<SE3> FeatureTracker::drop_outliers(std::vector<Step>& steps, const
 }
 
 void FeatureTracker::drop_by_motion(std::vector<Step>& steps, const SE3& T_previous_current) {
-  const double threshold = config_.max_reprojection_px / focal_px_;
+  const double threshold = max_reprojection_px_ / focal_px_;
   const auto disagrees = [&](Step& step) {
     if (step.depth_before) {
       const DepthPair pair = step.depth_pair();
@@ -410,7 +400,7 @@ void FeatureTracker::drop_by_two_points(std::vector<Step>& steps, const SE3& gue
   for (const Step& step : steps) pairs.push_back({step.left_before, step.now.left});
   // The threshold is doubled because the rotation is the gyroscope's, whose bias alone may shift
   // points by two pixels.
-  const double threshold = 2.0 * config_.max_reprojection_px / focal_px_;
+  const double threshold = 2.0 * max_reprojection_px_ / focal_px_;
   const TwoPointResult result = two_point_ransac(pairs, guess.linear(), threshold, rng_);
   std::vector<Step> kept;
   for (std::size_t i = 0; i < steps.size(); ++i) {

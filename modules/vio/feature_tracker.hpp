@@ -19,18 +19,11 @@
 
 namespace km {
 
-/// Counts of the last image: every feature of the image before is either tracked or counted under
-/// the first test that it failed.
+/// Counts of the features of the image before. Those too near to another feature are not counted.
 struct TrackerStatistics {
-  int tracked = 0;   ///< Features continued from the image before.
-  int detected = 0;  ///< New features.
-  int lost = 0;      ///< Features that KLT failed to track or that left the image.
-  int backward = 0;  ///< Features that failed the forward-backward check.
-  int crowded = 0;   ///< Features too near to another feature.
-  int motion = 0;    ///< Features that contradict the motion of the others.
-  StereoStatistics stereo;
-  int stereo_motion = 0;  ///< Right image points that contradict the motion; the left points stay.
-  bool motion_known = false;  ///< The stereo features agreed on a motion.
+  int tracked = 0;  ///< Features continued in this image.
+  int lost = 0;     ///< Features that KLT failed to track forward and back, or that left the image.
+  int motion = 0;   ///< Features that contradict the motion of the others.
 };
 
 /// Tracks corners through a stereo or RGB-D recording. Not thread-safe; starts no threads.
@@ -113,6 +106,8 @@ class FeatureTracker {
   StereoRig rig_;
   TrackerConfig config_;
   bool has_gyro_;
+  int levels_;  // Pyramid levels above the full image.
+  double max_reprojection_px_;
   double focal_px_;
   FeatureDetector detector_;
   StereoMatcher stereo_matcher_;

@@ -15,6 +15,13 @@ namespace km {
 namespace {
 
 constexpr int kStartIterations = 30;
+constexpr int kIterations = 3;            // largest number of optimisation steps per image
+constexpr std::size_t kRecentImages = 3;  // most recent images in the window
+// A keyframe is made when the image has moved this far, rotation removed, when at most this share
+// of the features of the last keyframe is still tracked, or when this time has passed.
+constexpr double kKeyframeParallax_px = 12.0;
+constexpr double kKeyframeTrackedShare = 0.6;
+constexpr double kKeyframeInterval_s = 1.0;
 constexpr int kMinKeyframeFeatures = 20;   // least number of features in a keyframe
 constexpr double kStartKeyframe_s = 0.15;  // spacing of keyframes in the images of the start
 // Keyframes locate new landmarks. If no feature of an image has a depth, the criteria for a
@@ -48,6 +55,10 @@ Eigen::Vector3d gyro_at(std::span<const ImuSample> samples, Stamp instant) {
   const auto after = std::ranges::upper_bound(samples, instant, {}, &ImuSample::stamp);
   return after == samples.begin() ? samples.front().gyro : std::prev(after)->gyro;
 }
+
+// Standard deviations of the correction to the mounting at the start, each axis.
+constexpr double kMountingRotation_rad = 0.01;
+constexpr double kMountingTranslation_m = 0.003;
 
 // Largest plausible distance of the calibration from the rig's values [standard deviations].
 constexpr double kMostCalibration = 10.0;
@@ -184,7 +195,7 @@ SmootherUpdate FixedLagSmoother::add(const InertialFrame& frame, bool rests) {
   observe(window_, frame.tracked);
   decide_keyframe();
   locate_landmarks();
-  update.solution = optimize(window_, config_.iterations);
+  update.solution = optimize(window_, kIterations);
   update.fit = fit_of_newest();
   update.outliers = reject_outliers();
   if (has_imu_ && !newest.imu->rests() && !newest.is_bridged) compare_gyro();
@@ -281,8 +292,7 @@ void FixedLagSmoother::decide_keyframe() {
   while (last > 0 && !window_.frames[last].keyframe) --last;
   const WindowFrame& keyframe = window_.frames[last];
   const double patience = locates_new(window_) ? 1.0 : kPatience;
-  if (seconds_between(keyframe.state.stamp, newest.state.stamp) >=
-      patience * config_.keyframe_interval_s) {
+  if (seconds_between(keyframe.state.stamp, newest.state.stamp) >= patience * kKeyframeInterval_s) {
     newest.keyframe = true;
     return;
   }
@@ -303,15 +313,14 @@ void FixedLagSmoother::decide_keyframe() {
     parallax.push_back((p.head<2>() / p.z() - *in_keyframe->bearings[0]).norm());
   }
   if (seen_now < kMinKeyframeFeatures) return;
-  if (patience * static_cast<double>(parallax.size()) <=
-          config_.keyframe_tracked_share * seen_in_keyframe ||
+  if (patience * static_cast<double>(parallax.size()) <= kKeyframeTrackedShare * seen_in_keyframe ||
       parallax.empty()) {
     newest.keyframe = true;
     return;
   }
   const auto median = parallax.begin() + static_cast<std::ptrdiff_t>(parallax.size() / 2);
   std::nth_element(parallax.begin(), median, parallax.end());
-  newest.keyframe = *median * focal_px_ > patience * config_.keyframe_parallax_px;
+  newest.keyframe = *median * focal_px_ > patience * kKeyframeParallax_px;
 }
 
 void FixedLagSmoother::locate_landmarks() {
@@ -493,9 +502,8 @@ UncertainCalibration FixedLagSmoother::calibration() const {
 
 CalibrationMatrix FixedLagSmoother::calibration_prior() const {
   CalibrationVector sigma;
-  sigma << config_.calibration_offset_s,
-      Eigen::Vector3d::Constant(config_.calibration_rotation_rad),
-      Eigen::Vector3d::Constant(config_.calibration_translation_m), config_.calibration_readout_s;
+  sigma << config_.calibration_offset_s, Eigen::Vector3d::Constant(kMountingRotation_rad),
+      Eigen::Vector3d::Constant(kMountingTranslation_m), config_.calibration_readout_s;
   return sigma.cwiseAbs2().asDiagonal();
 }
 
@@ -507,8 +515,7 @@ Eigen::Index FixedLagSmoother::variables() const {
 bool FixedLagSmoother::slide(bool rests) {
   for (std::size_t k = window_.frames.size(); k-- > 1;) {
     WindowFrame& frame = window_.frames[k];
-    const bool recent =
-        k + static_cast<std::size_t>(config_.window_recent) >= window_.frames.size();
+    const bool recent = k + kRecentImages >= window_.frames.size();
     if (recent || frame.keyframe) continue;
     if (rests && frame.rests && window_.frames[k - 1].rests)
       drop_at_rest(k);

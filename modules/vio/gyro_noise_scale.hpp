@@ -17,10 +17,11 @@ class GyroNoiseScale {
 
   /// Adds an interval of `dt_s` between two images, over which the rotations of estimate and
   /// samples differ by `difference_rad`. `variance_rad2` is the variance of the samples' rotation
-  /// under the assumed noise, summed over three axes.
+  /// under the assumed noise, summed over three axes. A diverged estimate (NaN) adds nothing.
   void add(double difference_rad, double variance_rad2, double dt_s) {
     const double misfit =
         std::min(difference_rad * difference_rad / variance_rad2, kMaxScale * kMaxScale);
+    if (std::isnan(misfit)) return;
     misfit_ += std::min(dt_s / kTimeConstant_s, 1.0) * (misfit - misfit_);
   }
 

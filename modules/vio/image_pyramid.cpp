@@ -6,12 +6,11 @@
 
 namespace km {
 
-ImagePyramid::ImagePyramid(const GrayImage& image, const TrackerConfig& config,
-                           bool with_derivatives)
+ImagePyramid::ImagePyramid(const GrayImage& image, int levels, bool with_derivatives)
     : with_derivatives_(with_derivatives) {
-  const cv::Size window(config.window_px, config.window_px);
+  const cv::Size window(kWindow_px, kWindow_px);
   constexpr bool kReuseInput = false;  // copied: the pyramid owns its pixels
-  cv::buildOpticalFlowPyramid(view(image), maps_, window, config.pyramid_levels, with_derivatives,
+  cv::buildOpticalFlowPyramid(view(image), maps_, window, levels, with_derivatives,
                               cv::BORDER_REFLECT_101, cv::BORDER_CONSTANT, kReuseInput);
 }
 

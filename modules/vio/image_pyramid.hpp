@@ -4,7 +4,6 @@
 #include <vector>
 
 #include "modules/core/frame.hpp"
-#include "modules/vio/tracker_config.hpp"
 
 namespace km {
 
@@ -14,9 +13,11 @@ class ImagePyramid {
  public:
   ImagePyramid() = default;
 
-  /// Copies `image` into a bordered pyramid of config.pyramid_levels + 1 levels. Only an image from
-  /// which windows are taken needs derivatives.
-  ImagePyramid(const GrayImage& image, const TrackerConfig& config, bool with_derivatives);
+  static constexpr int kWindow_px = 15;  ///< Side of the square window around a feature.
+
+  /// Copies `image` into a bordered pyramid of `levels` above the full image; each doubles the
+  /// reach of a search. Only an image from which windows are taken needs derivatives.
+  ImagePyramid(const GrayImage& image, int levels, bool with_derivatives);
 
   [[nodiscard]] bool empty() const { return maps_.empty(); }
 

@@ -249,10 +249,9 @@ StartGuess guess_start(std::span<const InertialFrame> frames, const SensorRig& r
   const InertialMean mean = inertial_mean(frames);
   const double focal_px = rig.stereo.cameras[0].fx;
   const auto motion_px = image_motion_px(frames.front().tracked, frames.back().tracked, focal_px);
-  guess.image_motion_px = motion_px.value_or(0.0);
   const bool weighs = is_gravity(mean.accel.norm(), config.gravity_mps2);
-  if (motion_px && weighs && *motion_px < config.rest_parallax_px &&
-      mean.accel_change < config.rest_accel_mps2 && mean.gyro_change < config.rest_gyro_radps) {
+  if (motion_px && weighs && *motion_px < kRestParallax_px && mean.accel_change < kRestAccel_mps2 &&
+      mean.gyro_change < kRestGyro_radps) {
     guess.status = StartStatus::kAtRest;
     guess.states = states_at_rest(frames, mean);
     return guess;
@@ -272,8 +271,7 @@ StartGuess guess_start(std::span<const InertialFrame> frames, const SensorRig& r
   const LinearAlignment free =
       solve_alignment(*poses, *imus, config.accel_bias_sigma, Eigen::Vector3d::Zero(),
                       Eigen::MatrixXd::Identity(3, 3));
-  guess.gravity_mps2 = free.gravity.norm();
-  if (!is_gravity(guess.gravity_mps2, config.gravity_mps2)) return guess;
+  if (!is_gravity(free.gravity.norm(), config.gravity_mps2)) return guess;
   const LinearAlignment aligned =
       align_gravity(*poses, *imus, config.accel_bias_sigma, config.gravity_mps2, free.gravity);
   if (!is_gravity(aligned.gravity.norm(), config.gravity_mps2)) return guess;

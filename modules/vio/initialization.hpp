@@ -29,9 +29,6 @@ enum class StartStatus {
 struct StartGuess {
   StartStatus status = StartStatus::kTooFewImages;
   std::vector<OdometryState> states;  ///< One for each image if started().
-  double image_motion_px = 0.0;       ///< Median motion of features, first to last image.
-  /// Measured gravity, before it is set to VioConfig::gravity_mps2; 0 if not measured.
-  double gravity_mps2 = 0.0;
 };
 
 inline constexpr std::size_t kMinStartImages = 5;

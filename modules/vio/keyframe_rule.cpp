@@ -11,6 +11,8 @@
 namespace km {
 namespace {
 
+constexpr double kKeyframeRotation_rad = 0.1;  // rotation after which a keyframe is published
+
 // Standard deviations [rad], [m] of the relative pose across a new start, if only the estimate
 // before the start is known.
 constexpr double kRestartRotation = 0.3;
@@ -53,7 +55,7 @@ bool is_keyframe_due(const VioConfig& config, double dt_s, const SE3& T_previous
   if (dt_s < config.output_interval_s - 1e-3) return false;
   return dt_s >= config.output_rest_interval_s ||
          T_previous_kf.translation().norm() >= config.output_distance_m ||
-         angle_of(T_previous_kf.linear()) >= config.output_rotation_rad;
+         angle_of(T_previous_kf.linear()) >= kKeyframeRotation_rad;
 }
 
 Matrix6 keyframe_covariance(const VioConfig& config, double dt_s, const Matrix6& Sigma) {

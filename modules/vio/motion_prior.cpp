@@ -1,7 +1,6 @@
 #include "modules/vio/motion_prior.hpp"
 
 #include <cmath>
-#include <limits>
 #include <numbers>
 
 #include "modules/core/camera_axes.hpp"
@@ -32,7 +31,6 @@ VioConfig config_for(const SensorRig& rig, const VioConfig& config) {
   result.tilt_sigma = 0.0;
   result.accel_bias_sigma = kHeldAccel;
   result.gyro_noise_factor = result.accel_noise_factor = 1.0;
-  result.max_gyro_bias_radps = std::numeric_limits<double>::infinity();
   return result;
 }
 

@@ -8,7 +8,7 @@ namespace km {
 namespace {
 
 constexpr double kSmoothing_s = 0.2;     // averages the vibration of idling rotors
-constexpr double kHold = 2.0;            // factor on rest_parallax_px while the body rests
+constexpr double kHold = 2.0;            // factor on kRestParallax_px while the body rests
 constexpr double kMostSpeed_mps = 0.05;  // bound on the estimated speed at rest
 
 }  // namespace
@@ -33,10 +33,9 @@ std::optional<double> image_motion_px(const TrackedFrame& a, const TrackedFrame&
 bool RestDetector::add(const InertialFrame& frame, const OdometryState& state) {
   filter(frame, state);
   const auto moved_px = image_motion_px(first_, frame.tracked, focal_px_);
-  const double allowed_px = (rests_ ? kHold : 1.0) * config_.rest_parallax_px;
-  const bool still = moved_px && *moved_px < allowed_px && gyro_.norm() < config_.rest_gyro_radps &&
-                     accel_.norm() < config_.rest_accel_mps2 &&
-                     state.v_odom.norm() < kMostSpeed_mps;
+  const double allowed_px = (rests_ ? kHold : 1.0) * kRestParallax_px;
+  const bool still = moved_px && *moved_px < allowed_px && gyro_.norm() < kRestGyro_radps &&
+                     accel_.norm() < kRestAccel_mps2 && state.v_odom.norm() < kMostSpeed_mps;
   if (!still) first_ = frame.tracked;
   rests_ = still && seconds_between(first_.stamp, frame.tracked.stamp) >= config_.rest_s;
   return rests_;

@@ -7,6 +7,13 @@
 
 namespace km {
 
+/// Largest image motion, and largest change of the mean accelerometer and gyroscope, of a body at
+/// rest: at the start over the images held back and between their halves, later over
+/// VioConfig::rest_s and against the estimate.
+inline constexpr double kRestParallax_px = 1.0;
+inline constexpr double kRestAccel_mps2 = 0.5;
+inline constexpr double kRestGyro_radps = 0.05;
+
 /// Median distance that the features common to both images have moved [px]; nullopt if there are
 /// fewer than 15.
 [[nodiscard]] std::optional<double> image_motion_px(const TrackedFrame& a, const TrackedFrame& b,

@@ -92,8 +92,8 @@ std::optional<StereoMatch> StereoMatcher::triangulate(const StereoQuery& query,
       (right_bearing(query.left, 1.0 / config_.min_depth_m) - infinity).normalized();
   const Eigen::Vector2d offset = f * (*right - infinity);
   const double across_px = along.x() * offset.y() - along.y() * offset.x();
-  if (std::abs(across_px) > config_.max_epipolar_px) return std::nullopt;
-  if (along.dot(offset) < kMinDisparityPx) return std::nullopt;
+  if (!(std::abs(across_px) <= config_.max_epipolar_px)) return std::nullopt;
+  if (!(along.dot(offset) >= kMinDisparityPx)) return std::nullopt;
 
   // The inverse depth rho for which c + rho t has the right bearing, measured along the line.
   const Eigen::Vector3d c = T_right_left_.linear() * query.left.homogeneous();
@@ -105,30 +105,21 @@ std::optional<StereoMatch> StereoMatcher::triangulate(const StereoQuery& query,
 
 std::optional<StereoMatch> StereoMatcher::match_one(const ImagePyramid& left,
                                                     const ImagePyramid& right,
-                                                    const StereoQuery& query) {
+                                                    const StereoQuery& query) const {
   const std::optional<Start> start = start_of(left, right, query);
-  if (!start) {
-    ++statistics_.no_start;
-    return std::nullopt;
-  }
+  if (!start) return std::nullopt;
   const std::optional<AlignmentPatch> patch = AlignmentPatch::cut(left.level(0), query.left_px);
   const Eigen::Matrix2f A =
       local_warp(rig_.cameras[0], rig_.cameras[1], query.left, start->inverse_depth, T_right_left_);
   const std::optional<PatchAlignment> found =
       patch ? patch->align(right.level(0), start->right_px, A) : std::nullopt;
-  if (!found || found->correlation < kMinStereoCorrelation) {
-    ++statistics_.dissimilar;
-    return std::nullopt;
-  }
-  const std::optional<StereoMatch> match = triangulate(query, found->px);
-  ++(match ? statistics_.matched : statistics_.epipolar);
-  return match;
+  if (!found || !(found->correlation >= kMinStereoCorrelation)) return std::nullopt;
+  return triangulate(query, found->px);
 }
 
-std::vector<std::optional<StereoMatch>> StereoMatcher::match(const ImagePyramid& left,
-                                                             const ImagePyramid& right,
-                                                             std::span<const StereoQuery> queries) {
-  statistics_ = {};
+std::vector<std::optional<StereoMatch>> StereoMatcher::match(
+    const ImagePyramid& left, const ImagePyramid& right,
+    std::span<const StereoQuery> queries) const {
   std::vector<std::optional<StereoMatch>> result;
   result.reserve(queries.size());
   for (const StereoQuery& query : queries) result.push_back(match_one(left, right, query));
@@ -140,23 +131,18 @@ DepthMatcher::DepthMatcher(const StereoRig& rig, const TrackerConfig& config)
       max_inverse_depth_(1.0 / config.min_depth_m),
       edge_(depth_edge_threshold(rig)) {}
 
-std::vector<std::optional<StereoMatch>> DepthMatcher::match(const DepthImage* depth,
-                                                            std::span<const StereoQuery> queries) {
-  statistics_ = {};
+std::vector<std::optional<StereoMatch>> DepthMatcher::match(
+    const DepthImage* depth, std::span<const StereoQuery> queries) const {
   std::vector<std::optional<StereoMatch>> result(queries.size());
   for (std::size_t i = 0; i < queries.size(); ++i) {
     const StereoQuery& query = queries[i];
     const auto inverse_depth = depth != nullptr
                                    ? inverse_depth_at(*depth, query.left_px.cast<double>(), edge_)
                                    : std::nullopt;
-    if (!inverse_depth || *inverse_depth > max_inverse_depth_) {
-      ++statistics_.no_start;
-      continue;
-    }
+    if (!inverse_depth || !(*inverse_depth <= max_inverse_depth_)) continue;
     const Eigen::Vector3d right = T_right_left_.linear() * query.left.homogeneous() +
                                   *inverse_depth * T_right_left_.translation();
     result[i] = StereoMatch{right.hnormalized(), *inverse_depth};
-    ++statistics_.matched;
   }
   return result;
 }

@@ -25,15 +25,7 @@ struct StereoMatch {
   double inverse_depth = 0.0;  ///< 1/z in the left camera [1/m]; not negative, 0 is infinity.
 };
 
-/// Number of queries in the last image, by result.
-struct StereoStatistics {
-  int matched = 0;
-  int no_start = 0;    ///< Queries with no or several similar patches along the epipolar line.
-  int dissimilar = 0;  ///< Patches that differ too much or exceed the image.
-  int epipolar = 0;    ///< Positions too far from the epipolar line, or behind the cameras.
-};
-
-/// Finds points of the left image in the right one to a fraction of a pixel. Not thread-safe.
+/// Finds points of the left image in the right one to a fraction of a pixel.
 ///
 /// A point without an expected depth is searched at half resolution along its epipolar curve (the
 /// images are not rectified) by zero-mean normalised correlation. The point is refused if a second
@@ -45,16 +37,13 @@ class StereoMatcher {
   StereoMatcher(const StereoRig& rig, const TrackerConfig& config);
 
   /// The match of each query; nullopt if there is none. Precondition: `left` has derivatives.
-  [[nodiscard]] std::vector<std::optional<StereoMatch>> match(const ImagePyramid& left,
-                                                              const ImagePyramid& right,
-                                                              std::span<const StereoQuery> queries);
+  [[nodiscard]] std::vector<std::optional<StereoMatch>> match(
+      const ImagePyramid& left, const ImagePyramid& right,
+      std::span<const StereoQuery> queries) const;
 
   /// Bearing in the right camera of a left bearing at `inverse_depth` [1/m].
   [[nodiscard]] Eigen::Vector2d right_bearing(const Eigen::Vector2d& left,
                                               double inverse_depth) const;
-
-  /// Counts of the last match().
-  [[nodiscard]] const StereoStatistics& statistics() const { return statistics_; }
 
  private:
   // Ray of any length from the right camera to the point.
@@ -70,18 +59,17 @@ class StereoMatcher {
                                             const StereoQuery& query) const;
   [[nodiscard]] std::optional<StereoMatch> match_one(const ImagePyramid& left,
                                                      const ImagePyramid& right,
-                                                     const StereoQuery& query);
+                                                     const StereoQuery& query) const;
   [[nodiscard]] std::optional<StereoMatch> triangulate(const StereoQuery& query,
                                                        const Eigen::Vector2f& right_px) const;
 
   StereoRig rig_;
   TrackerConfig config_;
   SE3 T_right_left_;
-  StereoStatistics statistics_;
 };
 
 /// Replaces StereoMatcher for RGB-D rigs: computes from a depth image where the virtual right
-/// camera would see the points. Not thread-safe.
+/// camera would see the points.
 ///
 /// The right bearing is a function of the left bearing and the depth, so both contain the same
 /// error. The smoother assumes independent errors, as for stereo and as ORB-SLAM2 does. The row of
@@ -94,17 +82,13 @@ class DepthMatcher {
   /// The match of each query, whose expected depth is not used; nullopt if there is none. All are
   /// nullopt if `depth` is null. A depth below TrackerConfig::min_depth_m counts as none.
   /// Precondition: `depth` fits the rig.
-  [[nodiscard]] std::vector<std::optional<StereoMatch>> match(const DepthImage* depth,
-                                                              std::span<const StereoQuery> queries);
-
-  /// Counts of the last match(): `no_start` counts points without a depth, or on a depth edge.
-  [[nodiscard]] const StereoStatistics& statistics() const { return statistics_; }
+  [[nodiscard]] std::vector<std::optional<StereoMatch>> match(
+      const DepthImage* depth, std::span<const StereoQuery> queries) const;
 
  private:
   SE3 T_right_left_;
   double max_inverse_depth_;
   double edge_;
-  StereoStatistics statistics_;
 };
 
 }  // namespace km

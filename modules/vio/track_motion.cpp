@@ -139,7 +139,7 @@ Eigen::Vector3d transfer(const DepthPair& pair, const SE3& T_previous_current) {
 
 double reprojection_distance(const DepthPair& pair, const SE3& T_previous_current) {
   const Eigen::Vector3d X = transfer(pair, T_previous_current);
-  if (X.z() <= 0.0) return std::numeric_limits<double>::infinity();
+  if (!(X.z() > 0.0)) return std::numeric_limits<double>::infinity();
   return (X.head<2>() / X.z() - pair.current).norm();
 }
 

@@ -11,14 +11,9 @@ struct TrackerConfig {
   int max_features = 180;
   int min_distance_px = 20;
   int fast_threshold = 12;
-  int window_px = 15;
-  int pyramid_levels = 2;
-  double max_forward_backward_px = 1.0;
   double max_epipolar_px = 1.5;
-  double max_reprojection_px = 1.5;
   double min_depth_m = 0.3;
   double readout_s = 0.0;
-  int seed = 1;
 
   void visit_fields(auto& visitor) {
     visitor.field("max_features", max_features, {1, 5000},
@@ -30,19 +25,9 @@ struct TrackerConfig {
     visitor.field("fast_threshold", fast_threshold, {1, 100},
                   "[grey levels] lowest FAST threshold; lower for dim or blurred images, higher "
                   "for noisy ones");
-    visitor.field("window_px", window_px, {5, 41},
-                  "[px] side of the square window around a feature, odd");
-    visitor.field("pyramid_levels", pyramid_levels, {1, 6},
-                  "number of levels above the full image; each doubles the reach of a search");
-    visitor.field("max_forward_backward_px", max_forward_backward_px, {0.0, 10.0},
-                  "[px] largest distance to which a feature tracked forward and back must return; "
-                  "0: no check");
     visitor.field("max_epipolar_px", max_epipolar_px, {0.1, 20.0},
                   "[px] largest distance of a right image point from its epipolar line; larger for "
                   "an imprecise calibration");
-    visitor.field(
-        "max_reprojection_px", max_reprojection_px, {0.1, 50.0},
-        "[px] largest distance of a feature from the position that the common motion predicts");
     visitor.field(
         "min_depth_m", min_depth_m, {0.02, 10.0},
         "[m] smallest depth: of the stereo search, and of values of a depth image that are used");
@@ -51,7 +36,6 @@ struct TrackerConfig {
         "[s] time from the first to the last row of an image with a rolling shutter, whose "
         "stamp is that of the middle row; 0: global shutter, or unknown (see "
         "vio.calibration_readout_s)");
-    visitor.field("seed", seed, {0, 2147483647}, "seed of the random samples");
   }
 };
 

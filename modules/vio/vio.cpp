@@ -19,6 +19,19 @@ namespace {
 // Largest lead of a sample over its image; a wrong stamp would block all later samples.
 constexpr double kMaxAhead_s = 1.0;
 constexpr double kMaxCostPerLandmark = 100.0;  // a hundred times that of a usable fit
+// Larger estimated biases show that the estimate has diverged. Without an inertial sensor the bias
+// of the gyroscope is the angular rate.
+constexpr double kMaxGyroBias_radps = 0.5;
+constexpr double kMaxAccelBias_mps2 = 3.0;
+constexpr double kUnbounded = std::numeric_limits<double>::infinity();
+
+// After this time without a successful start, the oldest images held back are dropped.
+constexpr double kStartTimeout_s = 3.0;
+
+// Number of keyframes in a row whose verticals share one error, because biases change slowly. The
+// optimiser treats the errors as independent, so each vertical gets the root of this times
+// VioConfig::tilt_sigma.
+constexpr double kTiltKeyframes = 120.0;
 
 // An image contradicts the estimate if it has at least kMinStereoFeatures features with a right
 // observation, but the window has fewer located landmarks than 1 / kMaxFeaturesPerLandmark of these
@@ -252,7 +265,7 @@ void Vio::try_start(VioResult& result) {
     }
     result.start = StartStatus::kInconsistent;
   }
-  if (span_s < config_.start_timeout_s) return;
+  if (span_s < kStartTimeout_s) return;
   result.problem = VioProblem::kStartTimeout;
   while (seconds_between(held_.front().data.tracked.stamp, held_.back().data.tracked.stamp) >
          0.5 * config_.start_s) {
@@ -367,8 +380,8 @@ bool Vio::plausible(const SmootherUpdate& update) const {
     return false;
   const double allowed = kMaxCostPerLandmark * (50.0 + update.landmarks);
   return update.solution.final_cost < allowed && s.v_odom.norm() < config_.max_speed_mps &&
-         s.gyro_bias.norm() < config_.max_gyro_bias_radps &&
-         s.accel_bias.norm() < config_.max_accel_bias_mps2;
+         s.gyro_bias.norm() < (rig_.has_imu ? kMaxGyroBias_radps : kUnbounded) &&
+         s.accel_bias.norm() < kMaxAccelBias_mps2;
 }
 
 void Vio::restart(Held held) {
@@ -427,7 +440,7 @@ std::optional<UncertainCalibration> Vio::known_calibration() const {
 }
 
 std::optional<Vertical> Vio::vertical_at(const OdometryState& state) const {
-  const double sigma_rad = config_.tilt_sigma * std::sqrt(config_.tilt_keyframes);
+  const double sigma_rad = config_.tilt_sigma * std::sqrt(kTiltKeyframes);
   if (config_.tilt_sigma < kLeastTiltSigma || sigma_rad > kMostTiltSigma) return std::nullopt;
   return Vertical{state.T_odom_body.linear().transpose() * Eigen::Vector3d::UnitZ(), sigma_rad};
 }

@@ -69,7 +69,7 @@ TEST_CASE("config/robot.yaml shows every key with its default", "[robot]") {
 TEST_CASE("The effective configuration gives the same configuration again", "[robot]") {
   RobotOptions options;
   options.configs = {"config/datasets/tunnels.yaml"};
-  options.settings = {"vio.iterations=5", "dds.team=blue"};
+  options.settings = {"vio.start_s=1", "dds.team=blue"};
   const std::string effective = load_robot_config(options).effective;
   const TemporaryFolder folder;
   RobotOptions again;

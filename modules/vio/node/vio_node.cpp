@@ -62,10 +62,9 @@ const char* text(StartStatus status) {
   return "unknown start";
 }
 
-// Share of the features of the previous image that are still tracked. Crowded features are not
-// counted, because they lie at features that are still tracked.
+// Share of the features of the previous image that are still tracked.
 std::optional<double> tracked_share(const TrackerStatistics& s) {
-  const int before = s.tracked + s.lost + s.backward + s.motion;
+  const int before = s.tracked + s.lost + s.motion;
   if (before == 0) return std::nullopt;
   return static_cast<double>(s.tracked) / before;
 }

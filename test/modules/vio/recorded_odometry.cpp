@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 #include <fstream>
+#include <limits>
 #include <map>
 #include <memory>
 #include <numbers>
@@ -13,20 +13,37 @@
 #include <utility>
 
 #include "modules/core/depth_lookup.hpp"
-#include "modules/core/lie.hpp"
 #include "modules/dense_sensing/stereo_depth.hpp"
+#include "modules/evaluation/association.hpp"
 #include "modules/evaluation/trajectory_error.hpp"
+#include "modules/evaluation/trajectory_file.hpp"
 #include "modules/sensors/node/euroc_rig.hpp"
-#include "test/support/processor_use.hpp"
+#include "modules/sensors/node/open_folder.hpp"
+#include "modules/sensors/text_file.hpp"
 #include "test/support/temporary_folder.hpp"
 
 namespace km {
 namespace {
 
-double thread_cpu_ms() {
-  timespec t;
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return 1e3 * static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_nsec);
+// Poses of the body from poses.txt, whose rows are 3x4 matrices of camera poses. A row belongs to
+// the row of times.txt (KITTI), or begins with the number of the frame at 30 Hz (7-Scenes).
+std::vector<StampedPose> read_camera_poses(const std::filesystem::path& folder,
+                                           const SE3& T_cam_body) {
+  const bool is_kitti = layout_of(folder) == FolderLayout::kKitti;
+  const std::string text = read_file(folder / "poses.txt");
+  const std::string times = is_kitti ? read_file(folder / "times.txt") : "";
+  const std::vector<TextRow> stamps = split_rows(times);
+  std::vector<StampedPose> poses;
+  for (const TextRow& row : split_rows(text)) {
+    const double t_s =
+        is_kitti ? number_in(stamps.at(poses.size()), 0).value() : number_in(row, 0).value() / 30.0;
+    Eigen::Matrix<double, 3, 4, Eigen::RowMajor> T;
+    for (std::size_t i = 0; i < 12; ++i)
+      T.data()[i] = number_in(row, i + (is_kitti ? 0 : 1)).value();
+    poses.push_back(
+        {nanoseconds(t_s), make_pose(nearest_rotation(T.leftCols<3>()), T.col(3)) * T_cam_body});
+  }
+  return poses;
 }
 
 // The pixel at which a rectified camera sees the ray of a pixel of the left camera, and the ratio
@@ -92,6 +109,29 @@ void repeat(std::vector<SensorPacket>& packets, std::size_t count) {
 
 }  // namespace
 
+Recording read_recording(const std::filesystem::path& folder, double from_s, double to_s,
+                         bool imu) {
+  EurocOptions options;
+  options.from_s = from_s;
+  options.to_s = to_s;
+  options.imu = imu;
+  const auto reader = open_folder(folder, options);
+  Recording result;
+  result.rig = reader->rig();
+  const auto truth =
+      layout_of(folder) == FolderLayout::kEuroc
+          ? read_trajectory(folder / "mav0/state_groundtruth_estimate0")
+          : read_camera_poses(folder, result.rig.stereo.cameras[0].T_body_cam.inverse());
+  const Eigen::Matrix4d unknown =
+      Eigen::Matrix4d::Constant(std::numeric_limits<double>::quiet_NaN());
+  while (auto packet = reader->next()) {
+    result.T_world_body.push_back(
+        pose_at(truth, packet->frame->stamp, 0.1, 0.0).value_or(SE3(unknown)));
+    result.packets.push_back(std::move(*packet));
+  }
+  return result;
+}
+
 OdometryRun run_odometry(const Recording& recording, std::size_t first, std::size_t last,
                          const TrackerConfig& tracker, const VioConfig& config,
                          const std::optional<VioCheckpoint>& checkpoint) {
@@ -99,12 +139,9 @@ OdometryRun run_odometry(const Recording& recording, std::size_t first, std::siz
   if (checkpoint) vio.continue_from(*checkpoint);
   OdometryRun run;
   std::map<Stamp, const SE3*> truth;
-  const ProcessorUse before = processor_use();
   for (std::size_t k = first; k < last; ++k) {
     truth[recording.packets[k].frame->stamp] = &recording.T_world_body[k];
-    const double begin = thread_cpu_ms();
     VioResult result = vio.process(recording.packets[k]);
-    run.cpu_ms.push_back(thread_cpu_ms() - begin);
     for (const OdometryState& state : result.states) {
       run.states.push_back(state);
       run.truth.push_back(*truth.at(state.stamp));
@@ -112,7 +149,6 @@ OdometryRun run_odometry(const Recording& recording, std::size_t first, std::siz
     run.keyframes.insert(run.keyframes.end(), result.keyframes.begin(), result.keyframes.end());
     run.results.push_back(std::move(result));
   }
-  run.kernel_share = kernel_share(before, static_cast<double>(last - first));
   run.statistics = vio.statistics();
   return run;
 }
@@ -135,7 +171,6 @@ OdometryErrors odometry_errors(std::span<const OdometryState> states, std::span<
   const TrajectoryError error = trajectory_error({&input, 1}).joint;
   return {
       .ate_m = error.position_m.rmse,
-      .max_m = error.position_m.max,
       .rpe_m = error.rpe_translation_m.rmse,
       .rpe_deg = error.rpe_rotation_deg.rmse,
       .tilt_deg = 180.0 / std::numbers::pi * std::sqrt(tilt / static_cast<double>(pairs.size())),
@@ -154,10 +189,8 @@ Recording standing_recording(const std::filesystem::path& folder, double duratio
   return result;
 }
 
-Recording disturbed(const Recording& recording, double late_s, double turned_rad) {
+Recording delayed(const Recording& recording, double late_s) {
   Recording result = recording;
-  const Eigen::Matrix3d R = so3_exp(turned_rad * Eigen::Vector3d::Ones().normalized());
-  for (Camera& camera : result.rig.stereo.cameras) camera.T_body_cam.prerotate(R);
   std::vector<ImuSample> samples;
   for (const SensorPacket& packet : recording.packets)
     for (const ImuSample& sample : packet.imu)
@@ -184,7 +217,7 @@ Recording darkened(Recording recording, std::size_t first, std::size_t last) {
   return recording;
 }
 
-Recording as_rgbd(const Recording& recording, std::size_t every, std::size_t first) {
+Recording as_rgbd(const Recording& recording) {
   const StereoRig& rig = recording.rig.stereo;
   constexpr double kMaxDepth_m = 60.0;  // below the range of 16 bits of millimetres
   StereoDepth stereo(rig, {.min_depth_m = 0.4, .max_depth_m = kMaxDepth_m});
@@ -204,13 +237,11 @@ Recording as_rgbd(const Recording& recording, std::size_t every, std::size_t fir
   Recording rgbd = recording;
   rgbd.rig.stereo = rgbd_rig(rig.cameras[0], rig.baseline_m());
   rgbd.rig.depth = DepthRange{};
-  for (std::size_t k = 0; k < rgbd.packets.size(); ++k) {
-    SensorPacket& packet = rgbd.packets[k];
+  for (SensorPacket& packet : rgbd.packets) {
     const StereoFrame& pair = *packet.frame;
     StereoFrame frame{pair.stamp, pair.left, {}};
-    if (k % every == first)
-      frame.depth =
-          std::make_shared<const DepthImage>(through_lens(stereo.compute(pair.left, pair.right)));
+    frame.depth =
+        std::make_shared<const DepthImage>(through_lens(stereo.compute(pair.left, pair.right)));
     packet.frame = std::make_shared<const StereoFrame>(std::move(frame));
   }
   return rgbd;

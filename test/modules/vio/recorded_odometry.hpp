@@ -4,23 +4,33 @@
 #include <filesystem>
 #include <optional>
 #include <span>
-#include <string>
 #include <vector>
 
+#include "modules/core/camera.hpp"
+#include "modules/core/frame.hpp"
 #include "modules/core/geometry.hpp"
 #include "modules/core/odometry.hpp"
 #include "modules/vio/vio.hpp"
-#include "recorded_tracking.hpp"
 
 namespace km {
+
+/// A recording with the true pose of the body at each image.
+struct Recording {
+  SensorRig rig;
+  std::vector<SensorPacket> packets;
+  std::vector<SE3> T_world_body;  ///< NaN where the truth has a gap.
+};
+
+/// Images of `folder` (see FolderLayout) from `from_s` to `to_s`, with the poses of its
+/// groundtruth_tum.txt or poses.txt. `imu`: with the inertial sensor, if there is one.
+Recording read_recording(const std::filesystem::path& folder, double from_s, double to_s,
+                         bool imu = true);
 
 /// Results of Vio on a recording.
 struct OdometryRun {
   std::vector<OdometryState> states;
   std::vector<SE3> truth;  ///< True poses of the states.
   std::vector<KeyframeOdometry> keyframes;
-  std::vector<double> cpu_ms;  ///< Processor time of each process() in this thread.
-  std::string kernel_share;    ///< Share of a whole call, see test/support/processor_use.hpp.
   std::vector<VioResult> results;
   VioStatistics statistics;
 };
@@ -35,9 +45,8 @@ OdometryRun run_odometry(const Recording& recording, std::size_t first, std::siz
 /// repeated for `duration_s`.
 Recording standing_recording(const std::filesystem::path& folder, double duration_s);
 
-/// `recording` with the stamps of inertial samples `late_s` too late. The calibration of its
-/// cameras is rotated by `turned_rad` about [1, 1, 1] of the body against the true one.
-Recording disturbed(const Recording& recording, double late_s, double turned_rad);
+/// `recording` with the stamps of inertial samples `late_s` too late.
+Recording delayed(const Recording& recording, double late_s);
 
 /// `recording` with images `first` to `last`, not included, black.
 Recording darkened(Recording recording, std::size_t first, std::size_t last);
@@ -45,7 +54,6 @@ Recording darkened(Recording recording, std::size_t first, std::size_t last);
 /// Errors of a trajectory against the true poses of the same instants.
 struct OdometryErrors {
   double ate_m = 0.0;  ///< Root mean square after SE(3) alignment.
-  double max_m = 0.0;  ///< Largest after that alignment.
   double rpe_m = 0.0;  ///< Root mean square over pairs 1 s apart.
   double rpe_deg = 0.0;
   double tilt_deg = 0.0;  ///< Root mean square angle between the verticals, no alignment.
@@ -58,9 +66,7 @@ struct OdometryErrors {
 
 /// `recording` as an RGB-D camera in place of the stereo pair would have recorded it. It has the
 /// left images, with depth that StereoDepth computes from both, seen through the left camera's
-/// lens. The baseline is the same, but virtual. Only every `every`th image has depth, from index
-/// `first` on.
-[[nodiscard]] Recording as_rgbd(const Recording& recording, std::size_t every = 1,
-                                std::size_t first = 0);
+/// lens. The baseline is the same, but virtual.
+[[nodiscard]] Recording as_rgbd(const Recording& recording);
 
 }  // namespace km

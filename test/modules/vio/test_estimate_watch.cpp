@@ -40,16 +40,6 @@ TEST_CASE("A wrong estimate is contradicted within half a second of images",
   CHECK(images <= 10);  // at 20 Hz
 }
 
-TEST_CASE("Images with few points are not judged", "[vio][contradiction]") {
-  EstimateWatch watch;
-  for (int k = 0; k < 100; ++k)
-    watch.add({.points = EstimateWatch::kMinPoints - 1,
-               .contradicting = EstimateWatch::kMinPoints - 1,
-               .median_square = 1e4});
-  CHECK(watch.evidence() == 0.0);
-  CHECK(watch.variance_factor() == 1.0);
-}
-
 // Errors of points with three times the assumed standard deviation.
 TEST_CASE("The variance factor is the squared ratio of errors to their assumed deviation",
           "[vio][contradiction]") {

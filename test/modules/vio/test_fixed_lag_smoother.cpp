@@ -4,12 +4,6 @@
 #include <optional>
 #include <vector>
 
-// glog, which comes with Ceres, has its own CHECK, which ends the program.
-#pragma push_macro("CHECK")
-#undef CHECK
-#include <ceres/ceres.h>
-#pragma pop_macro("CHECK")
-
 #include "modules/core/lie.hpp"
 #include "modules/vio/fixed_lag_smoother.hpp"
 #include "modules/vio/window_optimizer.hpp"
@@ -17,204 +11,6 @@
 
 namespace km {
 namespace {
-
-using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-
-// A frame of the window as 15 parameters: local coordinates of its pose about the first one, then
-// velocity, gyro bias and accelerometer bias.
-struct Chart {
-  OdometryState origin;
-  FirstEstimate held;
-
-  [[nodiscard]] Vector15 parameters() const {
-    Vector15 x;
-    x << Vector6::Zero(), origin.v_odom, origin.gyro_bias, origin.accel_bias;
-    return x;
-  }
-  [[nodiscard]] OdometryState state(const double* x) const {
-    OdometryState state = origin;
-    state.T_odom_body = retract(origin.T_odom_body, Eigen::Map<const Vector6>(x));
-    state.v_odom = Eigen::Map<const Eigen::Vector3d>(x + 6);
-    state.gyro_bias = Eigen::Map<const Eigen::Vector3d>(x + 9);
-    state.accel_bias = Eigen::Map<const Eigen::Vector3d>(x + 12);
-    return state;
-  }
-  // Derivative of the step that retracts the state by the parameters.
-  [[nodiscard]] Matrix15 step_by_parameters(const double* x) const {
-    const Eigen::Vector3d phi = Eigen::Map<const Eigen::Vector3d>(x);
-    Matrix15 D = Matrix15::Identity();
-    D.block<3, 3>(0, 0) = so3_right_jacobian(phi);
-    D.block<3, 3>(3, 3) = so3_exp(-phi);
-    return D;
-  }
-  // Stores J, derivatives by the first columns of the step, as one by the parameters.
-  void store(const Eigen::MatrixXd& J, const double* x, double* jacobian) const {
-    if (jacobian != nullptr)
-      Eigen::Map<RowMatrix>(jacobian, J.rows(), 15) = J * step_by_parameters(x).topRows(J.cols());
-  }
-};
-
-// Blocks: frame, landmark.
-class ReprojectionCost final : public ceres::SizedCostFunction<2, 15, 3> {
- public:
-  ReprojectionCost(const ViewModel& view, const Eigen::Vector2d& bearing, const Chart& frame)
-      : view_(view), bearing_(bearing), frame_(frame) {}
-
-  bool Evaluate(double const* const* x, double* residuals, double** jacobians) const override {
-    const SE3 T = frame_.state(x[0]).T_odom_body;
-    ReprojectionTerm term;
-    if (!linearize_reprojection(view_, bearing_, T, frame_.held.pose.value_or(T),
-                                Eigen::Map<const Eigen::Vector3d>(x[1]), term))
-      return false;
-    Eigen::Map<Eigen::Vector2d>{residuals} = term.r;
-    if (jacobians == nullptr) return true;
-    frame_.store(term.J_pose, x[0], jacobians[0]);
-    if (jacobians[1] != nullptr) Eigen::Map<RowMatrix>(jacobians[1], 2, 3) = term.J_point;
-    return true;
-  }
-
- private:
-  const ViewModel& view_;
-  Eigen::Vector2d bearing_;
-  const Chart& frame_;
-};
-
-// Blocks: frames i and j.
-class ImuCost final : public ceres::SizedCostFunction<15, 15, 15> {
- public:
-  ImuCost(const ImuFactor& factor, const Chart& i, const Chart& j)
-      : factor_(factor), i_(i), j_(j) {}
-
-  bool Evaluate(double const* const* x, double* residuals, double** jacobians) const override {
-    const OdometryState i = i_.state(x[0]), j = j_.state(x[1]);
-    const ImuTerm term = factor_.linearize(i, j, i_.held.applied_to(i), j_.held.applied_to(j));
-    Eigen::Map<Vector15>{residuals} = term.r;
-    if (jacobians == nullptr) return true;
-    i_.store(term.J_i, x[0], jacobians[0]);
-    j_.store(term.J_j, x[1], jacobians[1]);
-    return true;
-  }
-
- private:
-  const ImuFactor& factor_;
-  const Chart& i_;
-  const Chart& j_;
-};
-
-// Blocks: the frames of the prior. Its J is the derivative at every state: the first estimate.
-class PriorCost final : public ceres::CostFunction {
- public:
-  PriorCost(const StatePrior& prior, std::vector<const Chart*> frames)
-      : prior_(prior), frames_(std::move(frames)) {
-    set_num_residuals(static_cast<int>(prior.r.size()));
-    mutable_parameter_block_sizes()->assign(frames_.size(), 15);
-  }
-
-  bool Evaluate(double const* const* x, double* residuals, double** jacobians) const override {
-    std::vector<OdometryState> states;
-    for (std::size_t k = 0; k < frames_.size(); ++k) states.push_back(frames_[k]->state(x[k]));
-    std::vector<const OdometryState*> pointers;
-    for (const OdometryState& state : states) pointers.push_back(&state);
-    Eigen::Map<Eigen::VectorXd>(residuals, prior_.r.size()) =
-        prior_.J * prior_offset(prior_, pointers) + prior_.r;
-    if (jacobians == nullptr) return true;
-    for (std::size_t k = 0; k < frames_.size(); ++k) {
-      const Eigen::Index column = k == 0 ? 0 : 9 + 6 * static_cast<Eigen::Index>(k);
-      frames_[k]->store(prior_.J.middleCols(column, k == 0 ? 15 : 6), x[k], jacobians[k]);
-    }
-    return true;
-  }
-
- private:
-  const StatePrior& prior_;
-  std::vector<const Chart*> frames_;
-};
-
-// A window as parameter blocks. The costs refer to it and to the window.
-class WindowProblem {
- public:
-  explicit WindowProblem(const Window& window);
-
-  void solve(const ceres::Solver::Options& options, ceres::Solver::Summary& summary) {
-    ceres::Solve(options, &problem_, &summary);
-  }
-  [[nodiscard]] std::shared_ptr<ceres::ParameterBlockOrdering> ordering() {
-    auto order = std::make_shared<ceres::ParameterBlockOrdering>();
-    for (Eigen::Vector3d& point : points_)  // eliminated first
-      if (problem_.HasParameterBlock(point.data())) order->AddElementToGroup(point.data(), 0);
-    for (Vector15& state : states_) order->AddElementToGroup(state.data(), 1);
-    return order;
-  }
-  void write_to(Window& window) const {
-    for (std::size_t k = 0; k < states_.size(); ++k)
-      window.frames[k].state = charts_[k].state(states_[k].data());
-    for (std::size_t l = 0; l < points_.size(); ++l) window.landmarks[l].p_odom = points_[l];
-  }
-
- private:
-  void add_landmarks(const Window& window);
-
-  std::vector<Chart> charts_;
-  std::vector<Vector15> states_;
-  std::vector<Eigen::Vector3d> points_;
-  ceres::Problem problem_;
-};
-
-WindowProblem::WindowProblem(const Window& window) {
-  const std::vector<FirstEstimate> held = first_estimates(window);
-  for (std::size_t k = 0; k < window.frames.size(); ++k) {
-    charts_.push_back({window.frames[k].state, held[k]});
-    states_.push_back(charts_.back().parameters());
-  }
-  for (std::size_t k = 0; k < window.frames.size(); ++k) {
-    problem_.AddParameterBlock(states_[k].data(), 15);
-    if (k > 0 && window.frames[k].imu)
-      problem_.AddResidualBlock(new ImuCost(*window.frames[k].imu, charts_[k - 1], charts_[k]),
-                                nullptr, states_[k - 1].data(), states_[k].data());
-  }
-  add_landmarks(window);
-  if (window.prior.frames.empty()) return;
-  std::vector<const Chart*> charts;
-  std::vector<double*> blocks;
-  for (const std::uint64_t id : window.prior.frames) {
-    const std::size_t k = frame_index(window, id);
-    charts.push_back(&charts_[k]);
-    blocks.push_back(states_[k].data());
-  }
-  problem_.AddResidualBlock(new PriorCost(window.prior, charts), nullptr, blocks);
-}
-
-void WindowProblem::add_landmarks(const Window& window) {
-  for (const WindowLandmark& landmark : window.landmarks) points_.push_back(landmark.p_odom);
-  for (std::size_t l = 0; l < points_.size(); ++l) {
-    const WindowLandmark& landmark = window.landmarks[l];
-    if (!landmark.located || landmark.observations.size() < 2) continue;
-    for (const WindowObservation& o : landmark.observations)
-      for (std::size_t c = 0; c < 2; ++c)
-        if (o.bearings[c])
-          problem_.AddResidualBlock(
-              new ReprojectionCost(window.views[c], *o.bearings[c], charts_[o.frame]),
-              new ceres::CauchyLoss(window.loss_scale), states_[o.frame].data(), points_[l].data());
-  }
-}
-
-// An independent optimize(): minimises the same cost by trust-region steps of Ceres with the
-// landmarks eliminated (DENSE_SCHUR). If Ceres fails, the solution is not usable and the window is
-// unchanged.
-WindowSolution optimize_by_ceres(Window& window, int max_iterations) {
-  WindowProblem problem(window);
-  ceres::Solver::Options options;
-  options.linear_solver_type = ceres::DENSE_SCHUR;
-  options.linear_solver_ordering = problem.ordering();
-  options.max_num_iterations = max_iterations;
-  options.logging_type = ceres::SILENT;
-  ceres::Solver::Summary summary;
-  problem.solve(options, summary);
-  const bool usable = summary.IsSolutionUsable();
-  if (usable) problem.write_to(window);
-  return {static_cast<int>(summary.iterations.size()) - 1, summary.initial_cost, summary.final_cost,
-          usable};
-}
 
 constexpr int kStartImages = 15;
 
@@ -257,19 +53,6 @@ double position_error(const OdometryState& state, const SyntheticWorld& world) {
   return (state.T_odom_body.translation() -
           world.motion().position(seconds_between(0, state.stamp)))
       .norm();
-}
-
-TEST_CASE("The motion at constant velocity is estimated exactly from exact data", "[vio]") {
-  const auto motion = SyntheticMotion::straight({0.5, 0.0, 0.0});
-  SyntheticWorld world(motion, 1);
-  const auto frames = world.frames(60);
-  const Run run = run_smoother(frames, world, 0.01, gaussian_config());
-  for (const OdometryState& state : run.states) {
-    CHECK(position_error(state, world) < 1e-6);
-    CHECK((state.v_odom - motion.velocity).norm() < 1e-6);
-    CHECK(state.gyro_bias.norm() < 1e-7);
-    CHECK(state.accel_bias.norm() < 1e-5);
-  }
 }
 
 TEST_CASE("Biases and a varied motion are estimated from exact data", "[vio]") {
@@ -322,19 +105,6 @@ TEST_CASE("A landmark without distance ties the rotations of images, and is no f
     const double apart = 2.0 * (term.J_pose * turn).squaredNorm();
     CHECK(information(turn, -turn) == Approx(apart).epsilon(1e-6).margin(1e-3 * observed));
   }
-}
-
-TEST_CASE("The window stays bounded and its prior covers keyframes only", "[vio]") {
-  SyntheticWorld world(SyntheticMotion{}, 3);
-  const VioConfig config = gaussian_config();
-  const Run run = run_smoother(world.frames(120, 0.5), world, 0.01, config);
-  const Window& window = run.smoother.window();
-  CHECK(window.frames.size() <=
-        static_cast<std::size_t>(config.window_keyframes + config.window_recent + 2));
-  REQUIRE_FALSE(window.prior.frames.empty());
-  CHECK(window.prior.frames.front() == window.frames.front().id);
-  for (const std::uint64_t id : window.prior.frames)
-    CHECK(window.frames.at(frame_index(window, id)).keyframe);
 }
 
 // Directions of a common rotation about the vertical and a common shift, as each state sees them.
@@ -405,7 +175,6 @@ void add_inertial_noise(std::vector<InertialFrame>& frames, const VioConfig& con
 struct ModelledRun {
   SyntheticMotion motion;
   FixedLagSmoother smoother;
-  OdometryState last;
 };
 
 // Noise in images and samples, and errors of the guessed biases, all as modelled.
@@ -420,10 +189,9 @@ ModelledRun run_as_modelled(unsigned seed, const VioConfig& config) {
   add_inertial_noise(frames, config, rng);
   std::vector<OdometryState> guess = world.states(kStartImages);
   for (OdometryState& state : guess) state.gyro_bias = state.accel_bias = {0.0, 0.0, 0.0};
-  ModelledRun run{motion, FixedLagSmoother(synthetic_rig(), config), {}};
+  ModelledRun run{motion, FixedLagSmoother(synthetic_rig(), config)};
   REQUIRE(run.smoother.start(std::span(frames).first(kStartImages), guess));
-  for (std::size_t k = kStartImages; k < frames.size(); ++k)
-    run.last = run.smoother.add(frames[k]).state;
+  for (std::size_t k = kStartImages; k < frames.size(); ++k) (void)run.smoother.add(frames[k]);
   return run;
 }
 
@@ -450,17 +218,6 @@ TEST_CASE("The errors of relative poses agree with their covariance", "[vio]") {
   CHECK(std::abs(sum - 6.0) < 3 * sigma);
 }
 
-// Components of a StateCovariance, for the difference from `estimate` to `truth`.
-Eigen::Matrix<double, 11, 1> difference(const OdometryState& estimate, const OdometryState& truth) {
-  const Eigen::Vector3d turn =
-      so3_log(truth.T_odom_body.linear() * estimate.T_odom_body.linear().transpose());
-  Eigen::Matrix<double, 11, 1> e;
-  e << turn.head<2>(),
-      truth.v_odom - estimate.v_odom - turn.z() * Eigen::Vector3d::UnitZ().cross(estimate.v_odom),
-      truth.gyro_bias - estimate.gyro_bias, truth.accel_bias - estimate.accel_bias;
-  return e;
-}
-
 TEST_CASE("A gyroscope that is noisier than assumed has less weight", "[vio]") {
   const auto scale_with = [](double factor) {
     const VioConfig config = gaussian_config();
@@ -479,23 +236,6 @@ TEST_CASE("A gyroscope that is noisier than assumed has less weight", "[vio]") {
   const double tenfold = scale_with(10.0);
   CHECK(tenfold > 2.0);
   CHECK(tenfold <= GyroNoiseScale::kMaxScale);
-}
-
-TEST_CASE("The errors of states agree with their covariance", "[vio]") {
-  // Mean of chi-squared with 11 degrees of freedom over 20 runs: 11 with a standard deviation of
-  // 1.05.
-  double sum = 0.0;
-  constexpr int kRuns = 20;
-  for (unsigned seed = 0; seed < kRuns; ++seed) {
-    const ModelledRun run = run_as_modelled(seed, gaussian_config());
-    const auto covariance = run.smoother.state_covariance(run.last.stamp);
-    REQUIRE(covariance);
-    CHECK(is_usable(*covariance));
-    const auto e = difference(run.last, run.motion.state(run.last.stamp));
-    sum += e.dot(covariance->ldlt().solve(e)) / kRuns;
-  }
-  CAPTURE(sum);
-  CHECK(std::abs(sum - 11.0) < 3 * 1.05);
 }
 
 TEST_CASE("A start from a state with its covariance keeps that covariance", "[vio]") {
@@ -524,29 +264,31 @@ TEST_CASE("A start from a state with its covariance keeps that covariance", "[vi
   }
 }
 
-TEST_CASE("Ceres reaches the same minimum of a window with a prior", "[vio]") {
+TEST_CASE("No small step lowers the cost of an optimised window with a prior", "[vio]") {
   const unsigned seed = GENERATE(range(0U, 3U));
   CAPTURE(seed);
   SyntheticWorld world(SyntheticMotion{}, seed + 20);
   VioConfig config = gaussian_config();
   config.loss_scale = 1.5;
   config.calibrate = false;
-  Window by_schur = run_smoother(world.frames(60, 0.5), world, 0.01, config).smoother.window();
-  REQUIRE_FALSE(by_schur.prior.frames.empty());
+  Window window = run_smoother(world.frames(60, 0.5), world, 0.01, config).smoother.window();
+  REQUIRE_FALSE(window.prior.frames.empty());
   std::mt19937 rng(seed);
-  for (WindowFrame& frame : by_schur.frames)
+  for (WindowFrame& frame : window.frames)
     frame.state.T_odom_body = retract(frame.state.T_odom_body, 1e-3 * random_vector<6>(rng));
-  Window by_ceres = by_schur;
-  const WindowSolution schur = optimize(by_schur, 50), ceres = optimize_by_ceres(by_ceres, 100);
-  REQUIRE(schur.usable);
-  REQUIRE(ceres.usable);
-  CHECK(schur.initial_cost == Approx(ceres.initial_cost).epsilon(1e-9));
-  CHECK(schur.final_cost < 0.9 * schur.initial_cost);
-  CHECK(schur.final_cost == Approx(ceres.final_cost).epsilon(1e-5));
-  for (std::size_t k = 0; k < by_schur.frames.size(); ++k)
-    CHECK(local_coordinates(by_schur.frames[k].state.T_odom_body,
-                            by_ceres.frames[k].state.T_odom_body)
-              .norm() < 1e-4);
+  const WindowSolution solution = optimize(window, 50);
+  REQUIRE(solution.usable);
+  CHECK(solution.final_cost < 0.9 * solution.initial_cost);
+  for (int trial = 0; trial < 50; ++trial) {
+    Window moved = window;
+    for (WindowFrame& frame : moved.frames) {
+      frame.state.T_odom_body = retract(frame.state.T_odom_body, 1e-5 * random_vector<6>(rng));
+      frame.state.v_odom += 1e-5 * random_vector<3>(rng);
+    }
+    for (WindowLandmark& landmark : moved.landmarks)
+      if (landmark.located) landmark.p_odom += 1e-5 * random_vector<3>(rng);
+    CHECK(optimize(moved, 0).initial_cost > solution.final_cost);
+  }
 }
 
 TEST_CASE("Wrong observations are dropped and do not increase the error", "[vio]") {
@@ -599,20 +341,6 @@ TEST_CASE("Points that contradict the estimate are counted before they are dropp
   }
 }
 
-TEST_CASE("A second without features is bridged by the inertial samples", "[vio]") {
-  SyntheticWorld world(SyntheticMotion{}, 7);
-  auto frames = world.frames(80, 0.5);
-  for (std::size_t k = 30; k < 50; ++k) frames[k].tracked.features.clear();
-  for (std::size_t k = 50; k < frames.size(); ++k)  // the tracker sees new features afterwards
-    for (TrackedFeature& feature : frames[k].tracked.features) feature.id += 1000;
-  VioConfig config = gaussian_config();
-  config.calibrate = false;  // seven more unknowns are not well known after 1.5 s
-  const Run run = run_smoother(frames, world, 0.005, config);
-  for (const SmootherUpdate& update : run.updates) CHECK(update.solution.usable);
-  CHECK(position_error(run.states[49], world) < 0.05);
-  CHECK(position_error(run.states.back(), world) < 0.05);
-}
-
 TEST_CASE("During a long rest the window keeps its keyframes and does not grow", "[vio][rest]") {
   SyntheticWorld world(SyntheticMotion::standing(), 12);
   constexpr std::size_t kRest = kStartImages + 20, kFilled = kRest + 5, kImages = kRest + 200;
@@ -646,20 +374,6 @@ TEST_CASE("During a long rest the window keeps its keyframes and does not grow",
   CHECK(T->T.translation().norm() < 5e-3);
   // A centimetre is not noticed at rest.
   CHECK(T->Sigma.diagonal().maxCoeff() < 2e-4);
-}
-
-TEST_CASE("An image that samples do not cover leaves no usable solution", "[vio]") {
-  SyntheticWorld world(SyntheticMotion{}, 9);
-  auto frames = world.frames(kStartImages + 1);
-  Run run = run_smoother({frames.begin(), frames.end() - 1}, world, 0.0, gaussian_config());
-  frames.back().samples.pop_back();
-  CHECK_FALSE(run.smoother.add(frames.back()).solution.usable);
-}
-
-TEST_CASE("The smoother refuses a configuration out of bounds", "[vio]") {
-  VioConfig config;
-  config.window_keyframes = 1;
-  CHECK_THROWS_AS(FixedLagSmoother(synthetic_rig(), config), ConfigError);
 }
 
 }  // namespace

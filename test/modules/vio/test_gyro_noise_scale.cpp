@@ -1,4 +1,5 @@
 #include <catch2/catch.hpp>
+#include <limits>
 #include <random>
 
 #include "modules/vio/gyro_noise_scale.hpp"
@@ -26,6 +27,13 @@ TEST_CASE("The scale of the gyroscope's noise follows the images within bounds",
   CHECK(scale_after(noise, 2.0, 30.0) == Approx(2.0).margin(0.4));
   CHECK(scale_after(noise, 100.0, 30.0) == Approx(GyroNoiseScale::kMaxScale).margin(1e-3));
   CHECK(scale_after(noise, 0.5, 30.0) == 1.0);
+}
+
+TEST_CASE("A diverged estimate does not change the noise of the gyroscope", "[vio]") {
+  GyroNoiseScale noise;
+  noise.add(std::numeric_limits<double>::quiet_NaN(), 3.0 * kSigma_rad * kSigma_rad, 0.05);
+  CHECK(noise.scale() == 1.0);
+  CHECK(scale_after(noise, 2.0, 30.0) == Approx(2.0).margin(0.4));
 }
 
 TEST_CASE("One image does not change the noise of the gyroscope", "[vio]") {

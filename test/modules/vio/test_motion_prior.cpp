@@ -65,21 +65,6 @@ TEST_CASE("A motion at constant velocity and angular rate has no error under the
 }
 
 // Variances of white noise of the acceleration, q^2 [dt, dt^2/2; dt^2/2, dt^3/3].
-TEST_CASE("The uncertainty of the prior grows as that of white noise on the acceleration",
-          "[vio][images]") {
-  const Stamp to = GENERATE(50'000'000, 1'000'000'000);
-  const double dt = seconds_between(0, to);
-  const VioConfig config = without_imu();
-  const Matrix9& Sigma = virtual_preintegration(to).covariance();
-  const double q2 = config.motion_accel * config.motion_accel;
-  CHECK(Sigma(3, 3) == Approx(q2 * dt));
-  CHECK(Sigma(3, 6) == Approx(q2 * dt * dt / 2.0));
-  constexpr double kTwoSteps = 0.07;  // the integration has two steps
-  CHECK(Sigma(6, 6) == Approx(q2 * dt * dt * dt / 3.0).epsilon(kTwoSteps));
-  CHECK(Sigma(0, 0) ==
-        Approx(config.motion_turn * config.motion_turn * dt * dt * dt / 3.0).epsilon(kTwoSteps));
-}
-
 TEST_CASE("Images alone determine the motion from exact tracks", "[vio][images]") {
   SyntheticWorld world(SyntheticMotion{}, 7);
   SensorRig rig = synthetic_rig();

@@ -85,41 +85,6 @@ TEST_CASE("Two-point RANSAC finds exactly the false matches", "[vio]") {
   CHECK(cosine > std::cos(0.2));
 }
 
-TEST_CASE("In a pure rotation two-point RANSAC keeps all true matches", "[vio]") {
-  std::mt19937 rng(5);
-  Vector6 twist = Vector6::Zero();
-  twist.head<3>() << 0.02, -0.05, 0.01;
-  const Scene scene = random_scene(rng, twist, 60, 0.0);
-  const TwoPointResult result =
-      two_point_ransac(scene.mono(), scene.T_previous_current.linear(), kThreshold, rng);
-  CHECK(result.inliers == 60);
-}
-
-TEST_CASE("Two-point RANSAC keeps all of fewer than three pairs", "[vio]") {
-  std::mt19937 rng(1);
-  const auto count = static_cast<std::size_t>(GENERATE(0, 1, 2));
-  const std::vector<BearingPair> pairs(count, {Eigen::Vector2d(0.1, 0.2), Eigen::Vector2d(-1, 3)});
-  const TwoPointResult result = two_point_ransac(pairs, Eigen::Matrix3d::Identity(), 1e-3, rng);
-  CHECK(result.inlier == std::vector<bool>(count, true));
-}
-
-TEST_CASE("The epipolar distance is the distance to the line of all depths", "[vio]") {
-  std::mt19937 rng(7);
-  const SE3 T = se3_exp(moderate_twist(rng));
-  const Eigen::Vector2d previous(0.2, -0.1);
-  const auto at_depth = [&](double z) {
-    return Eigen::Vector2d(
-        (T.inverse() * Eigen::Vector3d(z * previous.x(), z * previous.y(), z)).hnormalized());
-  };
-  const Eigen::Vector2d near = at_depth(0.7);
-  const Eigen::Vector2d along = (at_depth(50.0) - near).normalized();
-  const Eigen::Vector2d across(-along.y(), along.x());
-  CHECK(epipolar_distance({previous, near}, T.linear(), T.translation()) < 1e-12);
-  const double distance = epipolar_distance({previous, near + 0.3 * along - 0.01 * across},
-                                            T.linear(), T.translation());
-  CHECK(distance == Approx(0.01).epsilon(1e-9));
-}
-
 TEST_CASE("The stereo motion is found among false matches with a biased gyroscope", "[vio]") {
   const auto seed = GENERATE(range(1U, 11U));
   CAPTURE(seed);
@@ -138,26 +103,6 @@ TEST_CASE("The stereo motion is found among false matches with a biased gyroscop
   const Vector6 error = se3_log(T->inverse() * scene.T_previous_current);
   CHECK(error.head<3>().norm() < 1e-3);
   CHECK(error.tail<3>().norm() < 4e-3);
-}
-
-TEST_CASE("Without a majority there is no stereo motion", "[vio]") {
-  std::mt19937 rng(3);
-  const Scene scene = random_scene(rng, moderate_twist(rng), 60, 1.0);
-  CHECK_FALSE(estimate_motion(scene.pairs, SE3::Identity(), 1.0 / kFocalPx, rng));
-  const std::span few(scene.pairs.data(), kMinMotionPairs - 1);
-  CHECK_FALSE(estimate_motion(few, SE3::Identity(), 1.0 / kFocalPx, rng));
-}
-
-TEST_CASE("Landmarks at infinity give the rotation alone", "[vio]") {
-  std::mt19937 rng(4);
-  Vector6 twist = Vector6::Zero();
-  twist.head<3>() << 0.02, -0.03, 0.01;
-  Scene scene = random_scene(rng, twist, 40, 0.0);
-  for (DepthPair& pair : scene.pairs) pair.inverse_depth = 0.0;
-  const auto T = estimate_motion(scene.pairs, SE3::Identity(), 1.0 / kFocalPx, rng);
-  REQUIRE(T);
-  CHECK(angle_of(T->linear().transpose() * scene.T_previous_current.linear()) < 1e-3);
-  CHECK(T->translation().norm() == 0.0);
 }
 
 }  // namespace

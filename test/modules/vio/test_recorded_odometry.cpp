@@ -57,51 +57,6 @@ TEST_CASE("MH_01_easy: the same input gives the same states to the last bit", "[
     CHECK(a.states[k].T_odom_body.matrix() == b.states[k].T_odom_body.matrix());
 }
 
-TEST_CASE("MH_01_easy: depth at a quarter of the rate suffices", "[vio]") {
-  const Recording* const stereo = recording();
-  if (stereo == nullptr) return;
-  const std::size_t first = 2;
-  const Recording data = as_rgbd(*stereo, 4, first);
-  const OdometryRun run = run_odometry(data, 0, data.packets.size(), TrackerConfig{}, {});
-  // Images before the first depth have no pose, because no start was possible on them.
-  CHECK(run.states.size() == data.packets.size() - first);
-  CHECK(run.statistics.images_without_pose == static_cast<int>(first));
-  CHECK(run.statistics.starts == 1);
-  REQUIRE(run.keyframes.size() >= 5);  // in 4 s, in motion
-  std::set<Stamp> with_depth;
-  for (const SensorPacket& packet : data.packets)
-    if (packet.frame->depth != nullptr) with_depth.insert(packet.frame->stamp);
-  for (const KeyframeOdometry& keyframe : run.keyframes) CHECK(with_depth.contains(keyframe.stamp));
-  const OdometryErrors errors = odometry_errors(run.states, run.truth);
-  CHECK(errors.ate_m < 0.015);
-  CHECK(errors.rpe_deg < 0.3);
-}
-
-TEST_CASE("MH_01_easy: odometry continues over a second of black images", "[vio]") {
-  const Recording* const data = recording();
-  if (data == nullptr) return;
-  const OdometryRun run = run_in_one_piece(darkened(*data, 36, 56));
-  const OdometryErrors errors = odometry_errors(run.states, run.truth);
-  CHECK(errors.ate_m < 0.03);
-  CHECK(errors.max_m < 0.10);
-}
-
-TEST_CASE("MH_01_easy: odometry continues over half a second without inertial samples", "[vio]") {
-  const Recording* const data = recording();
-  if (data == nullptr) return;
-  Recording gap = *data;
-  const Stamp begin = gap.packets[36].frame->stamp, end = gap.packets[46].frame->stamp;
-  for (SensorPacket& packet : gap.packets)
-    std::erase_if(packet.imu, [&](const ImuSample& sample) {
-      return sample.stamp >= begin && sample.stamp < end;
-    });
-  const OdometryRun run = run_in_one_piece(gap);
-  CHECK(run.statistics.gaps == 1);
-  const OdometryErrors errors = odometry_errors(run.states, run.truth);
-  CHECK(errors.ate_m < 0.02);
-  CHECK(errors.max_m < 0.05);
-}
-
 TEST_CASE("MH_01_easy: over a second without images and samples the body continues at its speed",
           "[vio]") {
   const Recording* const data = recording();
@@ -128,29 +83,6 @@ TEST_CASE("MH_01_easy: over a second without images and samples the body continu
 }
 
 // The velocity after the dark contradicts the images if the time offset is not estimated.
-TEST_CASE("MH_01_easy: after five seconds of black images with late stamps odometry continues",
-          "[vio]") {
-  const auto folder = shared_data("euroc/MH_01_easy");
-  if (!folder) return;
-  constexpr Stamp kLate = 20'000'000;
-  Recording late = darkened(read_recording(*folder, 0.0, 11.0), 20, 120);
-  for (SensorPacket& packet : late.packets) {
-    auto frame = std::make_shared<StereoFrame>(*packet.frame);
-    frame->stamp += kLate;
-    packet.frame = frame;
-  }
-  VioConfig config;
-  config.calibrate = false;
-  const OdometryRun run = run_odometry(late, 0, late.packets.size(), TrackerConfig{}, config);
-  CHECK(run.statistics.starts == 2);
-  CHECK(run.statistics.divergences == 1);
-  constexpr std::size_t kLast = 60;  // three seconds
-  REQUIRE(run.states.size() > kLast);
-  const OdometryErrors errors =
-      odometry_errors(std::span(run.states).last(kLast), std::span(run.truth).last(kLast));
-  CHECK(errors.ate_m < 0.01);
-}
-
 // The prior from the dark would move the pose for seconds more.
 TEST_CASE("MH_01_easy: one second after five seconds of black images odometry is accurate again",
           "[vio]") {
@@ -168,14 +100,6 @@ TEST_CASE("MH_01_easy: one second after five seconds of black images odometry is
   const OdometryErrors after = errors_after(darkened(light, kBack - 100, kBack));
   INFO(after.ate_m << " m, undisturbed " << undisturbed.ate_m << " m");
   CHECK(after.ate_m < 1.2 * undisturbed.ate_m);
-}
-
-TEST_CASE("MH_01_easy: an offset of 20 ms in the stamps of images is estimated",
-          "[vio][calibration]") {
-  const Recording* const data = recording();
-  if (data == nullptr) return;
-  const OdometryRun run = run_in_one_piece(disturbed(*data, -0.02, 0.0));
-  CHECK(odometry_errors(run.states, run.truth).ate_m < 0.01);
 }
 
 TEST_CASE(
@@ -215,7 +139,7 @@ TEST_CASE("MH_01_easy: odometry resumed from a keyframe knows the time offset of
   if (data == nullptr) return;
   const double late_s = GENERATE(-0.02, 0.02);
   CAPTURE(late_s);
-  const Recording late = disturbed(*data, late_s, 0.0);
+  const Recording late = delayed(*data, late_s);
   const OdometryRun whole = run_odometry(late, 0, late.packets.size(), TrackerConfig{}, {});
   const std::size_t middle = whole.keyframes.size() / 2;
   const KeyframeOdometry& keyframe = whole.keyframes[middle];
@@ -238,26 +162,6 @@ TEST_CASE("MH_01_easy: odometry resumed from a keyframe knows the time offset of
   forgetful.calibration.reset();
   const UncertainCalibration anew = rest_of(forgetful).keyframes.front().calibration.value();
   CHECK(next.covariance(0, 0) < anew.covariance(0, 0));
-}
-
-// Ground truth at the start of V1_01_easy.
-const Eigen::Vector3d kStaticGyroBias(-0.00225, 0.02154, 0.07703);
-
-TEST_CASE("V1_01_easy: a start at rest, at five images a second", "[vio]") {
-  const auto folder = shared_data("euroc/V1_01_easy");
-  if (!folder) return;
-  const Recording data = standing_recording(*folder, 4.6);
-  REQUIRE(data.packets.size() == 24);
-  const OdometryRun run = run_odometry(data, 0, 24, TrackerConfig{}, {});
-  CHECK(std::ranges::count_if(run.results, [](const VioResult& result) {
-          return result.start == StartStatus::kAtRest;
-        }) == 1);
-  REQUIRE(run.states.size() == 24);
-  for (const OdometryState& state : run.states) {  // the body stands, so only the estimate moves
-    CHECK(state.T_odom_body.translation().norm() < 5e-3);
-    CHECK(state.v_odom.norm() < 0.02);
-  }
-  CHECK((run.states.back().gyro_bias - kStaticGyroBias).norm() < 2e-3);
 }
 
 TEST_CASE("V1_01_easy: two minutes at rest, rotors idling", "[vio][rest]") {
@@ -299,13 +203,9 @@ TEST_CASE("The odometry node publishes the results of odometry in order of time"
   Topic<VioStatistics> statistics;
   std::vector<Stamp> stamps;  // written by the node's thread, read after it has ended
   std::vector<std::uint32_t> indices;
-  std::vector<UncertainCalibration> calibrated;
   std::vector<LocatedFrame> located;
   odometry.subscribe([&](const auto& state) { stamps.push_back(state->stamp); });
-  keyframes.subscribe([&](const auto& keyframe) {
-    indices.push_back(keyframe->id.index);
-    if (keyframe->calibration) calibrated.push_back(*keyframe->calibration);
-  });
+  keyframes.subscribe([&](const auto& keyframe) { indices.push_back(keyframe->id.index); });
   frames.subscribe([&](const auto& frame) { located.push_back(*frame); });
   Topic<TrackedImage> images;
   std::vector<TrackedImage> tracked;
@@ -339,11 +239,7 @@ TEST_CASE("The odometry node publishes the results of odometry in order of time"
   REQUIRE(located.size() == stamps.size());
   for (std::size_t k = 0; k < stamps.size(); ++k) CHECK(located[k].frame->stamp == stamps[k]);
   CHECK(located.back().keyframe == indices.back());
-  REQUIRE(tracked.size() == 40);
-  for (const TrackedImage& image : tracked) CHECK(image.bearings.size() > 20);
-  CHECK(tracked.back().frame == data->packets[39].frame);
-  REQUIRE(calibrated.size() == indices.size());
-  CHECK(std::abs(calibrated.back().calibration.offset_s) < 5e-3);
+  CHECK(tracked.size() == 40);
 }
 
 }  // namespace

@@ -1,8 +1,8 @@
 #include <Eigen/Cholesky>
 #include <catch2/catch.hpp>
 
-#include "modules/vio/marginalization.hpp"
 #include "modules/vio/preintegration.hpp"
+#include "modules/vio/window.hpp"
 #include "synthetic_motion.hpp"
 #include "test/support/numeric_jacobian.hpp"
 #include "test/support/random_pose.hpp"
@@ -66,23 +66,6 @@ TEST_CASE("A reprojection error is in standard deviations of the image point", "
                                  camera.T_body_cam * Eigen::Vector3d(0, 0, -1), r));
 }
 
-TEST_CASE("Only the derivatives are taken at a first estimate", "[vio]") {
-  std::mt19937 rng(3);
-  const ViewModel view = view_model(synthetic_rig().stereo.cameras[0], 1.0);
-  const SE3 T = random_pose(rng);
-  const SE3 T_first = retract(T, 0.05 * random_vector<6>(rng));
-  const Eigen::Vector3d p = T * Eigen::Vector3d(3.0, 0.5, -0.4);
-  const Eigen::Vector2d bearing(0.1, -0.2);
-  ReprojectionTerm now, first, both;
-  REQUIRE(linearize_reprojection(view, bearing, T, T, p, now));
-  REQUIRE(linearize_reprojection(view, bearing, T_first, T_first, p, first));
-  REQUIRE(linearize_reprojection(view, bearing, T, T_first, p, both));
-  CHECK((both.r - now.r).norm() < 1e-12);
-  CHECK((both.J_pose - first.J_pose).norm() < 1e-9);
-  CHECK((both.J_point - first.J_point).norm() < 1e-9);
-  CHECK((both.J_pose - now.J_pose).norm() > 1e-3);
-}
-
 void check_imu_derivatives(const ImuFactor& factor, const OdometryState& i,
                            const OdometryState& j) {
   const ImuTerm term = factor.linearize(i, j, i, j);
@@ -128,28 +111,6 @@ TEST_CASE("The inertial error of the true motion is zero in any frame", "[vio]")
     s->v_odom = shift.linear() * s->v_odom;
   }
   CHECK(factor.error(i, j).norm() == Approx(standard_deviations).margin(1e-6));
-}
-
-TEST_CASE("An inertial factor over no time is refused", "[vio]") {
-  const ImuPreintegration imu(ImuNoise{}, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
-  CHECK_FALSE(ImuFactor::of(imu, kGravity_mps2));
-}
-
-TEST_CASE("One inertial step between two images is enough for a factor", "[vio]") {
-  const SyntheticMotion motion;
-  const Stamp to = 50'000'000;
-  ImuPreintegration imu(ImuNoise{}, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
-  REQUIRE(imu.add(motion.samples(0, to, to), 0, to));
-  CHECK(ImuFactor::of(imu, kGravity_mps2));
-}
-
-TEST_CASE("Noise too small for a double makes no factor", "[vio]") {
-  const SyntheticMotion motion;
-  const Stamp to = 50'000'000;
-  const ImuNoise noise{.gyro_noise_density = 1e-300, .accel_noise_density = 1e-300};
-  ImuPreintegration imu(noise, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
-  REQUIRE(imu.add(motion.samples(0, to, 5'000'000), 0, to));
-  CHECK_FALSE(ImuFactor::of(imu, kGravity_mps2));
 }
 
 TEST_CASE("A factor at rest holds the state with any gravity and biases", "[vio][rest]") {
@@ -221,17 +182,6 @@ TEST_CASE("Preintegration predicts a motion known in closed form to second order
   const double coarse = prediction_error(5 * kMillisecond);
   CHECK(coarse < 5e-5);
   CHECK(coarse / prediction_error(kMillisecond) > 20.0);  // 25 for order two, 5 for order one
-}
-
-TEST_CASE("Preintegration interpolates at both borders", "[vio]") {
-  const SyntheticMotion motion;
-  const Stamp from = 12 * kMillisecond + 345'678, to = 98 * kMillisecond + 7;
-  ImuPreintegration imu(ImuNoise{}, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
-  REQUIRE(imu.add(motion.samples(0, 200 * kMillisecond, 5 * kMillisecond), from, to));
-  CHECK(imu.dt_s() == Approx(seconds_between(from, to)).epsilon(1e-12));
-  const OdometryState predicted = predict(motion.state(from), imu, kGravity_mps2);
-  const SE3 error = motion.state(to).T_odom_body.inverse() * predicted.T_odom_body;
-  CHECK(se3_log(error).norm() < 1e-5);
 }
 
 TEST_CASE("Preintegration refuses an interval that its samples do not cover", "[vio]") {
@@ -345,26 +295,6 @@ TEST_CASE("Later measurements and a prior give the solution of all measurements"
   const Eigen::MatrixXd H = prior.J.transpose() * prior.J + late.H.bottomRightCorner(kLeft, kLeft);
   const Eigen::VectorXd g = prior.J.transpose() * prior.r + late.g.tail(kLeft);
   CHECK((-H.ldlt().solve(g) - batch.tail(kLeft)).norm() < 1e-10);
-}
-
-TEST_CASE("Directions without information get none by marginalisation", "[vio]") {
-  // Six measurements of twelve variables; scales differ by 1e8, as radians and accelerations do.
-  Quadratic q = random_quadratic(5, 6);
-  Eigen::VectorXd scale = Eigen::VectorXd::Ones(kSize);
-  scale.tail(3).setConstant(1e4);
-  q.H = scale.asDiagonal() * q.H * scale.asDiagonal();
-  q.g = scale.asDiagonal() * q.g;
-  const SquareRootPrior prior = marginalize(q.H, q.g, kTaken);
-  CHECK(prior.J.rows() == 1);  // the eliminated variables use five of the six
-  CHECK(prior.J.allFinite());
-  CHECK(prior.r.allFinite());
-}
-
-TEST_CASE("Elimination of no variable leaves the quadratic itself", "[vio]") {
-  const Quadratic q = random_quadratic(3, 30);
-  const SquareRootPrior prior = marginalize(q.H, q.g, 0);
-  CHECK((prior.J.transpose() * prior.J - q.H).norm() < 1e-9 * q.H.norm());
-  CHECK((prior.J.transpose() * prior.r - q.g).norm() < 1e-9 * q.g.norm());
 }
 
 }  // namespace

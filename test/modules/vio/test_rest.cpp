@@ -153,22 +153,6 @@ TEST_CASE("After a rest the next keyframe is measured from the one before it", "
   CHECK(T.translation().norm() == Approx(glide.distance_m).epsilon(0.02));
 }
 
-TEST_CASE("A body that comes to rest keeps its pose and its chain of keyframes", "[vio][rest]") {
-  Ride ride(Glide{.begin_s = 3.0, .duration_s = 2.0, .distance_m = 0.4});
-  Vio vio = ride.vio();
-  (void)feed(vio, ride, 7.0);
-  CHECK(vio.statistics().rests == 2);
-  const VioResult result = feed(vio, ride, 10.0);
-  CHECK(result.keyframes.empty());
-  for (std::size_t k = 0; k < result.states.size(); ++k) {
-    CHECK(result.states[k].T_odom_body.translation().norm() == Approx(0.4).margin(0.01));
-    CHECK(result.states[k].v_odom.norm() < 5e-3);
-    CHECK((result.frames.front().T_odom_body.inverse() * result.frames[k].T_odom_body)
-              .translation()
-              .norm() < 1e-3);
-  }
-}
-
 TEST_CASE("Slow motion does not shorten the trajectory", "[vio][rest]") {
   // 2.5, 10 and 25 mm/s on average
   const auto [distance_m, duration_s] =
