@@ -75,17 +75,14 @@ RosOutputNode::RosOutputNode(std::string_view name, std::unique_ptr<RosSink> sin
           [this](const Input& input) {
             std::visit([this](const auto& message) { step(message); }, input);
           },
-          node_name_),
+          node_name_, std::chrono::seconds(1), [] { return std::make_shared<const Tick>(); }),
       encoder_(
           kImages, Overflow::kDropOldest,
           [this](const Encoded& input) {
             work_in_background();
             std::visit([this](const auto& message) { encode(message); }, input);
           },
-          node_name_ + "_enc"),
-      clock_(
-          std::chrono::seconds(1), [this] { worker_.post(std::make_shared<const Tick>()); },
-          "ros_tick") {
+          node_name_ + "_enc") {
   open_topics(topics.images.has_value());
   const auto post = [this](const auto& message) { worker_.post(message); };
   topics.odometry.subscribe(post);
@@ -130,13 +127,11 @@ void RosOutputNode::open_slices() {
 void RosOutputNode::start() {
   worker_.start();
   encoder_.start();
-  clock_.start();
   if (options_.logs) log::set_listener([this](const log::Entry& entry) { listen(entry); });
 }
 
 void RosOutputNode::stop() noexcept {
   if (options_.logs) log::set_listener({});
-  clock_.stop();
   encoder_.stop();
   worker_.stop();
 }

@@ -26,7 +26,7 @@
 #include "modules/ros_dds/surface_pieces.hpp"
 #include "runtime/log.hpp"
 #include "runtime/node.hpp"
-#include "runtime/periodic.hpp"
+#include "runtime/ticking_worker.hpp"
 #include "runtime/token_bucket.hpp"
 #include "runtime/topic.hpp"
 #include "runtime/worker.hpp"
@@ -221,9 +221,8 @@ class RosOutputNode final : public Node {
   SurfacePieces pieces_;
   TokenBucket piece_bytes_;
   std::vector<PublishedClosure> newest_closures_;
-  Worker<Input> worker_;
-  Worker<Encoded> encoder_;
-  Periodic clock_;  // last member: stops first
+  TickingWorker<Input> worker_;
+  Worker<Encoded> encoder_;  // last member: stops first
 };
 
 }  // namespace km
