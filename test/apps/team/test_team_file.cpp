@@ -133,10 +133,11 @@ TEST_CASE("The command line of a robot has the options of its plan", "[team]") {
   robot.from_s = 7.5;
   robot.arguments = {"--set", "a.b=1"};
   CHECK(robot_command("/bin/robot", plan, robot) ==
-        std::vector<std::string>{
-            "/bin/robot", "--config", "/c.yaml",   "--config", "/d.yaml", "--robot", "4",
-            "--name",     "x",        "--dataset", "/data",    "--from",  "7.5",     "--rate",
-            "auto",       "--domain", "9",         "--output", "out/x",   "--set",   "a.b=1"});
+        std::vector<std::string>{"/bin/robot", "--config", "/c.yaml",  "--config", "/d.yaml",
+                                 "--robot",    "4",        "--name",   "x",        "--dataset",
+                                 "/data",      "--from",   "7.5",      "--rate",   "auto",
+                                 "--domain",   "9",        "--output", "out/x",    "--view",
+                                 "--set",      "a.b=1"});
 }
 
 TEST_CASE("Every problem of a team file is reported with its line", "[team]") {
