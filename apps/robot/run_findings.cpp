@@ -30,7 +30,7 @@ std::string commonest(const std::map<std::string, std::uint64_t>& reasons, std::
          ')';
 }
 
-// What the two robots of a finding may do about places that look alike.
+// Advice to two robots without a common place.
 constexpr const char* kMeetElsewhere = "let both robots see one place from about the same side";
 
 // Finding that closures did not join two robots: the first stage that stopped them. The caller adds
