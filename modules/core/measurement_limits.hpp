@@ -18,7 +18,7 @@ inline constexpr Bounds<double> kPosition_m{-1e8, 1e8};
 /// Trace of the rotation [rad^2] and translation [m^2] blocks of a covariance that robots optimise.
 inline constexpr Bounds<double> kVariance{1e-12, 1e12};
 
-/// Variance on one axis in a graph file [rad^2], [m^2], also of graphs for modules/pgo_study only.
+/// Variance on one axis in a graph file [rad^2], [m^2], also of graphs that no robot solves.
 inline constexpr Bounds<double> kAxisVariance{1e-15, 1e12};
 
 /// Standard deviation on each axis of the step between two runs of a robot [m]: it was carried, so

@@ -9,11 +9,4 @@ SymmetricEigen symmetric_eigen(const Eigen::Ref<const Eigen::MatrixXd>& A) {
   return {solver.eigenvalues(), solver.eigenvectors()};
 }
 
-SymmetricEigen tridiagonal_eigen(const Eigen::VectorXd& diagonal,
-                                 const Eigen::VectorXd& subdiagonal) {
-  Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver;
-  solver.computeFromTridiagonal(diagonal, subdiagonal);
-  return {solver.eigenvalues(), solver.eigenvectors()};
-}
-
 }  // namespace km

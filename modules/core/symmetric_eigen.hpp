@@ -15,9 +15,4 @@ struct [[nodiscard]] SymmetricEigen {
 /// up to 3x3 is faster with Eigen's own.
 SymmetricEigen symmetric_eigen(const Eigen::Ref<const Eigen::MatrixXd>& A);
 
-/// Eigenvalues and eigenvectors of a symmetric tridiagonal matrix, from the n entries of its
-/// diagonal and the n - 1 entries below.
-SymmetricEigen tridiagonal_eigen(const Eigen::VectorXd& diagonal,
-                                 const Eigen::VectorXd& subdiagonal);
-
 }  // namespace km

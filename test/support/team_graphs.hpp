@@ -5,7 +5,7 @@
 #include <numbers>
 #include <vector>
 
-#include "apps/lab/pgo_study/team_graph_file.hpp"
+#include "apps/lab/pgo/team_graph_file.hpp"
 #include "modules/core/lie.hpp"
 #include "test/support/random_pose.hpp"
 

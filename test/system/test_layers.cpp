@@ -41,7 +41,6 @@ const std::map<std::string, std::set<std::string>> kModuleUses = {
     {"rbcd", {"pose_graph"}},
     {"ros_dds", {"images", "mesh", "objects", "recordings"}},
     {"sensors", {"images", "recordings"}},
-    {"pgo_study", {"outlier_rejection", "pose_graph", "rbcd", "recorded_graph"}},
     {"evaluation", {"charts", "images", "mesh", "objects"}},
     {"simulation", {"images", "mesh"}},
     {"semantic_mapping", {"mesh"}},
@@ -111,7 +110,7 @@ std::string violation(const fs::path& file, const std::string& header) {
 
 TEST_CASE("Every include obeys the layers", "[layers]") {
   std::size_t files = 0;
-  for (const char* root : {"modules", "runtime", "apps/lab/pgo_study", "apps/lab/simulation"})
+  for (const char* root : {"modules", "runtime", "apps/lab/simulation"})
     for (const auto& entry : fs::recursive_directory_iterator(root)) {
       if (!is_source(entry.path())) continue;
       ++files;
@@ -210,7 +209,7 @@ TEST_CASE("The layer rules refuse what they are for", "[layers]") {
   CHECK_FALSE(violation("runtime/log.hpp", "modules/vio/vio.hpp").empty());
   CHECK_FALSE(violation("modules/vio/vio.cpp", "apps/lab/simulation/world/world.hpp").empty());
   CHECK_FALSE(violation("apps/lab/simulation/world/world.cpp", "thread").empty());
-  CHECK_FALSE(violation("apps/lab/simulation/a.cpp", "apps/lab/pgo_study/b.hpp").empty());
+  CHECK_FALSE(violation("apps/lab/simulation/a.cpp", "apps/lab/pgo/b.hpp").empty());
   CHECK_FALSE(violation("apps/lab/simulation/a.cpp", "modules/vio/vio.hpp").empty());
   CHECK(violation("apps/lab/simulation/a.cpp", "apps/lab/simulation/b.hpp").empty());
   CHECK(violation("modules/vio/node/vio_node.cpp", "runtime/node.hpp").empty());

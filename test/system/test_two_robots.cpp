@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <memory>
 
-#include "apps/lab/pgo_study/team_graph_file.hpp"
+#include "apps/lab/pgo/team_graph_file.hpp"
 #include "modules/core/input_file.hpp"
 #include "modules/mesh/mesh_file.hpp"
 #include "test/support/eavesdropper.hpp"

@@ -4,46 +4,36 @@
 #include <stdexcept>
 #include <utility>
 
-#include "apps/lab/pgo_study/team_graph_file.hpp"
+#include "apps/lab/pgo/team_graph_file.hpp"
 #include "modules/core/input_file.hpp"
 
 namespace km {
 
-void GraphInput::define(Command app) {
+void GraphInput::define(CLI::App& app) {
   app.add_option(
          "FILE", file,
          "Pose graph (*.g2o), a team's (*.jrl), or a folder with one file per robot, or a team's\n"
          "results")
-      .required()
-      .existing_path();
+      ->required()
+      ->check(CLI::ExistingPath);
   app.add_option("--robots", robots, "Number of robots among which a single file is divided")
-      .within(1, 65535);
-  app.add_option("--partition", partition,
-                 "contiguous: runs of equal length; or a file with rows \"vertex robot\"");
+      ->check(CLI::Range(1, 65535));
   app.add_flag("--keep-steps", keep_steps,
                "Keep the odometry between two robots that a cut leaves. The default is without:\n"
                "closures alone join robots in the field");
 }
 
-LabelledTeamGraph GraphInput::read(Command app) const {
+LabelledTeamGraph GraphInput::read(const CLI::App& app) const {
   const bool folder = is_folder(file);
   const bool of_a_team = folder || file.extension() == ".jrl";
-  const bool contiguous = partition == "contiguous";
-  if (of_a_team && !contiguous)
-    throw std::runtime_error(
-        "--partition is for a single g2o file, " + file.string() +
-        (folder ? " is a folder with one file per robot" : " says which robot each pose is of"));
   LabelledTeamGraph team =
-      folder      ? LabelledTeamGraph{read_team_folder(file)}
-      : of_a_team ? labelled_team(read_jrl(file), file.string())
-      : contiguous
-          ? LabelledTeamGraph{partition_contiguously(read_g2o(file), robots, file.string())}
-          : LabelledTeamGraph{
-                partition_graph(read_g2o(file), read_partition(partition), partition)};
+      folder ? LabelledTeamGraph{read_team_folder(file)}
+      : of_a_team
+          ? labelled_team(read_jrl(file), file.string())
+          : LabelledTeamGraph{partition_contiguously(read_g2o(file), robots, file.string())};
   if (app.count("--robots") > 0 && team.graph.robots() != robots)
     throw std::runtime_error("--robots " + std::to_string(robots) + ": there are " +
-                             std::to_string(team.graph.robots()) +
-                             " robots in the file, folder or partition");
+                             std::to_string(team.graph.robots()) + " robots in the file or folder");
   if (keep_steps || of_a_team) return team;
   team.graph = without_cut_steps(std::move(team.graph));
   const std::vector<Eigen::Index> part = part_of_poses(team.graph);

@@ -4,34 +4,33 @@
 #include <filesystem>
 #include <string>
 
-#include "apps/command_line.hpp"
-#include "apps/lab/pgo_study/team_graph_file.hpp"
+#include "apps/lab/pgo/team_graph_file.hpp"
+#include "apps/program_options.hpp"
 #include "apps/report_files.hpp"
 
 namespace km {
 
 /// Adds a subcommand of kimera_multi_pgo to `app`, which runs as soon as the command line names it.
 /// Throws a std::exception with the reason if the input cannot be used.
-void add_solve(Command app);
-void add_pcm(Command app);
-void add_outliers(Command app);
+void add_solve(CLI::App& app);
+void add_pcm(CLI::App& app);
+void add_outliers(CLI::App& app);
 
 /// The pose graph of a team, as the command line names it.
 struct GraphInput {
   std::filesystem::path file = {};
   std::size_t robots = 1;
-  std::string partition = "contiguous";
   bool keep_steps = false;
 
-  /// Defines FILE, --robots, --partition and --keep-steps, which set the members. This object must
+  /// Defines FILE, --robots and --keep-steps, which set the members. This object must
   /// outlive `app`.
-  void define(Command app);
+  void define(CLI::App& app);
 
   /// Reads the graph with the ground truth of the file, and without odometry between robots unless
   /// keep_steps. Throws std::runtime_error if there is no such graph, or if it is not connected
   /// after a g2o graph is divided. Throws it too if --robots was given to `app` and differs from
   /// the number of robots.
-  [[nodiscard]] LabelledTeamGraph read(Command app) const;
+  [[nodiscard]] LabelledTeamGraph read(const CLI::App& app) const;
 };
 
 /// Notice on edges whose information matrix is not positive definite. Such edges are weighed only

@@ -1,5 +1,5 @@
-#include "apps/command_line.hpp"
 #include "apps/lab/pgo/commands.hpp"
+#include "apps/program_options.hpp"
 
 namespace {
 

@@ -2,27 +2,142 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
-#include <random>
-#include <set>
 #include <stdexcept>
 #include <utility>
 
-#include "apps/lab/pgo_study/team_closures.hpp"
+#include "apps/lab/pgo/connected_parts.hpp"
+#include "apps/lab/pgo/odometry_start.hpp"
+#include "apps/lab/pgo/solvers.hpp"
 #include "modules/evaluation/trajectory_error.hpp"
+#include "modules/outlier_rejection/chi_squared.hpp"
 #include "modules/outlier_rejection/pcm.hpp"
-#include "modules/outlier_rejection/random_outliers.hpp"
+#include "modules/pose_graph/chordal.hpp"
+#include "modules/pose_graph/corroboration.hpp"
+#include "modules/pose_graph/lone_solution.hpp"
+#include "modules/pose_graph/robust_schedule.hpp"
+#include "modules/pose_graph/tree_front.hpp"
 #include "modules/rbcd/rounding.hpp"
+#include "modules/recorded_graph/recorded_graph.hpp"
 
 namespace km {
-std::vector<bool> pairwise_consistent(const TeamGraph& graph, const PcmConfig& config,
-                                      double noise_scale) {
+namespace {
+
+using Eigen::Index;
+
+// Chordal initialisation of each connected part of the `kept` edges.
+std::vector<SE3> chordal_start(const TeamGraph& graph, const std::vector<bool>& kept) {
+  std::vector<SE3> start(static_cast<std::size_t>(graph.poses()));
+  for (const ConnectedPart& part : connected_parts(graph, kept)) {
+    const auto poses = chordal_initialisation(part.graph.poses(), part.graph.edges);
+    for (std::size_t k = 0; k < poses.size(); ++k) start[part.poses[k]] = poses[k];
+  }
+  return start;
+}
+
+double residual(const BlockEdge& e, const std::vector<SE3>& poses) {
+  return residual_of(edge_of_one_robot(e), poses[static_cast<std::size_t>(e.i)],
+                     poses[static_cast<std::size_t>(e.j)]);
+}
+
+TeamGraph with_weights(const TeamGraph& graph, const std::vector<double>& weights) {
+  TeamGraph weighed = graph;
+  for (std::size_t k = 0; k < weights.size(); ++k) {
+    weighed.edges[k].kappa *= weights[k];
+    weighed.edges[k].tau *= weights[k];
+  }
+  return weighed;
+}
+
+PlacedTeam solve_by_newton(const TeamGraph& graph, std::vector<bool> kept, int max_rounds) {
+  const SolverRun run = run_solver(with_edges(graph, kept), {},
+                                   {.method = "newton", .run = {.max_rounds = max_rounds}}, {});
+  std::size_t in_part = 0;
+  for (std::size_t k = 0; k < kept.size(); ++k)
+    if (kept[k]) kept[k] = run.decision->kept[in_part++];
+  return {.T_frame_kf = round_to_poses(run.X, run.X.leftCols<4>()),
+          .frame_of = std::vector<Index>(static_cast<std::size_t>(graph.poses()), 0),
+          .kept = std::move(kept),
+          .decided = run.decision->decided,
+          .rounds = static_cast<std::size_t>(run.rounds.back().round),
+          .bytes = run.rounds.back().work.bytes};
+}
+
+PlacedTeam solve_reference(const ScenarioGraph& drawn) {
+  TeamGraph honest = drawn.graph;
+  std::vector<bool> kept;
+  for (std::size_t k = 0; k < honest.edges.size(); ++k) {
+    honest.edges[k].kappa = drawn.honest[k].kappa;
+    honest.edges[k].tau = drawn.honest[k].tau;
+    kept.push_back(!drawn.is_false[k]);
+  }
+  return solve_centrally(honest, std::move(kept), drawn.truth);
+}
+
+// An edge in the robots' own numbering of poses.
+RelativePose relative_pose(const TeamGraph& graph, const BlockEdge& e) {
+  return {graph.keyframe_of(e.i), graph.keyframe_of(e.j), e.T_i_j,
+          covariance_in({e.kappa, e.tau}, graph.dimension)};
+}
+
+// The odometry of each robot, by pose of the graph. Throws std::invalid_argument if the odometry of
+// a robot is interrupted.
+std::vector<OdometryPose> odometry_of_team(const TeamGraph& graph,
+                                           const std::vector<bool>& odometry) {
+  std::vector<RecordedGraph> chains(graph.robots());
+  for (std::size_t k = 0; k < odometry.size(); ++k) {
+    const BlockEdge& e = graph.edges[k];
+    if (odometry[k] && graph.robot_of(e.i) == graph.robot_of(e.j))
+      chains[graph.robot_of(e.i)].odometry.push_back(relative_pose(graph, e));
+  }
+  std::vector<OdometryPose> poses;
+  for (std::size_t robot = 0; robot < chains.size(); ++robot) {
+    RecordedGraph& chain = chains[robot];
+    chain.robot = static_cast<RobotId>(robot);
+    std::ranges::sort(chain.odometry, {}, &RelativePose::from);
+    std::size_t chained = 0;
+    while (chained < chain.odometry.size() && chain.odometry[chained].from.index == chained)
+      ++chained;
+    if (chained + 1 < static_cast<std::size_t>(graph.poses_of(robot)))
+      throw std::invalid_argument(
+          "no odometry leads to pose " +
+          to_string(graph.ids[static_cast<std::size_t>(graph.first[robot]) + chained + 1]));
+    std::ranges::move(odometry_poses(chain), std::back_inserter(poses));
+  }
+  return poses;
+}
+
+PlacedTeam solve_by(const std::string& method, const ScenarioGraph& drawn,
+                    const OutlierStudyOptions& options) {
+  const TeamGraph& graph = drawn.graph;
+  if (method == "reference") return solve_reference(drawn);
+  if (method == "gnc") return solve_by_gnc(graph);
+  std::vector<bool> kept(graph.edges.size(), true);
+  if (method.starts_with("pcm")) kept = pairwise_consistent(graph, options.pcm);
+  if (method.ends_with("newton"))
+    return solve_by_newton(graph, std::move(kept), options.max_rounds);
+  if (method != "pcm" && method != "trust-all")
+    throw std::invalid_argument("outlier study: unknown method " + method);
+  std::vector<SE3> start = chordal_start(graph, kept);
+  return solve_centrally(graph, std::move(kept), std::move(start));
+}
+
+}  // namespace
+
+std::vector<bool> pairwise_consistent(const TeamGraph& graph, const PcmConfig& config) {
   std::vector<bool> kept = odometry_edges(graph);
+  const std::vector<OdometryPose> poses = odometry_of_team(graph, kept);
   std::map<std::pair<RobotId, RobotId>, Pcm> pairs;
   std::map<ClosureId, std::size_t> edge_of;
-  for (const TeamClosure& measured : team_closures(graph, noise_scale)) {
-    const Closure& closure = measured.closure;
-    if (kept[measured.edge] || !edge_of.emplace(closure.id(), measured.edge).second) continue;
+  for (std::size_t k = 0; k < kept.size(); ++k) {
+    if (kept[k]) continue;
+    const RelativePose measured = relative_pose(graph, graph.edges[k]);
+    const Closure closure{.from = poses[static_cast<std::size_t>(graph.edges[k].i)],
+                          .to = poses[static_cast<std::size_t>(graph.edges[k].j)],
+                          .T_from_to = measured.T_from_to,
+                          .covariance = measured.covariance};
+    if (!edge_of.emplace(closure.id(), k).second) continue;
     const auto [a, b] = std::minmax({closure.from.id.robot, closure.to.id.robot});
     Pcm& pcm = pairs.try_emplace({a, b}, a, b, config).first->second;
     (void)pcm.add(closure);
@@ -32,177 +147,130 @@ std::vector<bool> pairwise_consistent(const TeamGraph& graph, const PcmConfig& c
   return kept;
 }
 
-namespace {
-
-double rmse_m(const std::vector<SE3>& truth, const std::vector<SE3>& estimate) {
-  std::vector<PosePair> pairs;
-  for (std::size_t i = 0; i < truth.size(); ++i)
-    pairs.push_back({static_cast<Stamp>(i), truth[i], estimate[i]});
-  return statistics_of(aligned_errors_m(pairs)).rmse;
-}
-
-// Runs one method on a graph whose edges from index `own_edges` on are false closures.
-OutlierResult attempt(const std::string& method, const TeamGraph& graph, std::size_t own_edges,
-                      const std::vector<SE3>& truth, const OutlierStudyOptions& options,
-                      const TeamMeter& meter) {
-  const bool by_pcm = method.starts_with("pcm");
-  const bool rejects = method.ends_with("newton");
-  const std::vector<bool> odometry = odometry_edges(graph);
-  OutlierResult result{.method = method};
-  std::vector<bool> kept(graph.edges.size(), true);
-  const double begin_s = meter.cpu_s();
-  if (by_pcm) kept = pairwise_consistent(graph, options.pcm, options.pcm_sigmas);
-  const double pcm_s = meter.cpu_s() - begin_s;
-
-  const TeamGraph part = with_edges(graph, kept);
-  const SolverRun run = run_solver(part, {},
-                                   {.method = "newton",
-                                    .run = {.max_rounds = options.max_rounds},
-                                    .trust_all = !rejects,
-                                    .barc = options.barc},
-                                   meter);
-  result.rmse_m = rmse_m(truth, round_to_poses(run.X, run.X.leftCols<4>()));
-  result.rounds = run.rounds.back().round;
-  result.decided = run.decision->decided;
-  result.noise_scale = run.decision->noise_scale;
-  result.bytes = run.rounds.back().work.bytes;
-  result.cpu_s = pcm_s + run.rounds.back().work.total_cpu_s;
-  std::size_t in_part = 0;
-  for (std::size_t k = 0; k < kept.size(); ++k) {
-    if (!kept[k]) continue;
-    const bool stays = !rejects || run.decision->kept[in_part];
-    ++in_part;
-    if (stays && !odometry[k]) ++(k >= own_edges ? result.false_kept : result.true_kept);
+PlacedTeam solve_centrally(const TeamGraph& graph, std::vector<bool> kept, std::vector<SE3> start,
+                           std::uint32_t most_steps) {
+  PlacedTeam placed{.T_frame_kf = std::move(start), .frame_of = {}, .kept = std::move(kept)};
+  placed.frame_of = part_of_poses(with_edges(graph, placed.kept));
+  for (const ConnectedPart& part : connected_parts(graph, placed.kept)) {
+    SessionGraph alone;
+    for (const std::size_t i : part.poses) alone.start.push_back(placed.T_frame_kf[i]);
+    for (const BlockEdge& e : part.graph.edges) alone.own.push_back(edge_of_one_robot(e));
+    const LoneSolution solved = solve_alone(std::move(alone), {.dimension = graph.dimension,
+                                                               .absolute_tolerance = 1e-12,
+                                                               .max_rounds = most_steps,
+                                                               .robust = false});
+    placed.decided = placed.decided && solved.converged;
+    for (std::size_t k = 0; k < part.poses.size(); ++k)
+      placed.T_frame_kf[part.poses[k]] = solved.poses[k];
   }
-  return result;
+  return placed;
 }
 
-}  // namespace
-
-std::vector<double> aligned_errors_m(std::span<const PosePair> pairs) {
-  const Alignment alignment = align(pairs, false);
-  std::vector<double> errors;
-  for (const PosePair& pair : pairs)
-    errors.push_back(
-        (pair.T_truth_body.translation() - alignment.apply(pair.T_estimate_body).translation())
-            .norm());
-  return errors;
-}
-
-double half_extent_m(const std::vector<SE3>& poses) {
-  Eigen::AlignedBox3d box;
-  for (const SE3& T : poses) box.extend(T.translation());
-  return 0.5 * box.sizes().maxCoeff();
-}
-
-TeamGraph corrupt(const TeamGraph& graph, std::size_t count, double half_side_m, unsigned seed) {
+PlacedTeam solve_by_gnc(const TeamGraph& graph) {
+  constexpr double kConfidence = 0.99;
+  constexpr double kSteeper = 1.4;   // as the paper recommends
+  constexpr double kFloor = 1e-10;   // keeps the equations regular
+  constexpr int kMostUpdates = 100;  // as in the paper
+  constexpr std::uint32_t kStepsOfUpdate = 20;
+  const double c2 = chi_squared_6_quantile(kConfidence);
   const std::vector<bool> odometry = odometry_edges(graph);
-  std::vector<std::size_t> closures;
+  const std::vector<bool> all(graph.edges.size(), true);
+  const bool joined = std::ranges::count(part_of_poses(graph), 0) == graph.poses();
+  PlacedTeam placed =
+      solve_centrally(graph, all, joined ? odometry_start(graph) : chordal_start(graph, all));
+  double largest = 0.0;
   for (std::size_t k = 0; k < odometry.size(); ++k)
-    if (!odometry[k]) closures.push_back(k);
-  if (closures.empty()) throw std::invalid_argument("corrupt: the graph has no loop closure");
-  TeamGraph corrupted = graph;
-  std::mt19937 rng(seed);
-  const RandomOutlierModel model{.keyframes = static_cast<std::size_t>(graph.poses()),
-                                 .planar = graph.dimension == 2,
-                                 .half_side_m = half_side_m};
-  std::uniform_int_distribution<std::size_t> closure(0, closures.size() - 1);
-  // Each pair of poses gets at most one closure, because parallel edges would share one verdict.
-  std::set<std::pair<Eigen::Index, Eigen::Index>> taken;
-  for (const BlockEdge& e : graph.edges) taken.insert(std::minmax(e.i, e.j));
-  const auto poses = static_cast<std::size_t>(graph.poses());
-  if (2 * (taken.size() + count) > poses * (poses - 1))
-    throw std::invalid_argument("corrupt: " + std::to_string(poses) + " poses are too few for " +
-                                std::to_string(count) + " false closures");
-  while (corrupted.edges.size() < graph.edges.size() + count) {
-    const RelativePose e = random_outliers(1, model, rng).front();
-    const auto i = static_cast<Eigen::Index>(e.from.index);
-    const auto j = static_cast<Eigen::Index>(e.to.index);
-    if (!taken.insert(std::minmax(i, j)).second) continue;
-    const BlockEdge& claimed = graph.edges[closures[closure(rng)]];
-    corrupted.edges.push_back({i, j, e.T_from_to, claimed.kappa, claimed.tau});
+    if (!odometry[k]) largest = std::max(largest, residual(graph.edges[k], placed.T_frame_kf));
+  double mu = first_mu(largest * largest, c2);
+  std::vector<double> weights(graph.edges.size(), 1.0);
+  bool decided = false;
+  for (int update = 0; update < kMostUpdates && !decided; ++update, mu *= kSteeper) {
+    decided = true;
+    for (std::size_t k = 0; k < odometry.size(); ++k) {
+      if (odometry[k]) continue;
+      const double r = residual(graph.edges[k], placed.T_frame_kf);
+      const double weight = std::max(kFloor, robust_weight(r * r, c2, mu));
+      decided = decided && (weight == 1.0 || weight == kFloor);
+      weights[k] = weight;
+    }
+    PlacedTeam next =
+        solve_centrally(with_weights(graph, weights), all, placed.T_frame_kf, kStepsOfUpdate);
+    placed.T_frame_kf = std::move(next.T_frame_kf);
   }
-  return corrupted;
+  for (std::size_t k = 0; k < odometry.size(); ++k) placed.kept[k] = weights[k] > 0.5;
+  PlacedTeam end = solve_centrally(graph, placed.kept, placed.T_frame_kf);
+  end.decided = end.decided && decided;
+  return end;
 }
 
-std::vector<BlockEdge> false_place(const std::vector<SE3>& poses, Eigen::Index a, Eigen::Index b,
-                                   std::size_t size, const SE3& T_a_b, const Precision& claimed) {
-  std::vector<BlockEdge> edges;
-  for (Eigen::Index k = 0; k < static_cast<Eigen::Index>(size); ++k) {
-    const auto moved = [&](Eigen::Index first) {
-      return poses[static_cast<std::size_t>(first)].inverse() *
-             poses[static_cast<std::size_t>(first + k)];
-    };
-    edges.push_back(
-        {a + k, b + k, moved(a).inverse() * T_a_b * moved(b), claimed.kappa, claimed.tau});
-  }
-  return edges;
-}
-
-TeamGraph corrupt_in_clusters(const TeamGraph& graph, const Clusters& clusters,
-                              const std::vector<SE3>& poses, double half_side_m, unsigned seed) {
-  TeamGraph corrupted = graph;
-  if (clusters.places == 0) return corrupted;
+OutlierResult judge(const ScenarioGraph& drawn, const PlacedTeam& placed) {
+  OutlierResult result{.rounds = placed.rounds, .bytes = placed.bytes, .decided = placed.decided};
+  const TeamGraph& graph = drawn.graph;
   const std::vector<bool> odometry = odometry_edges(graph);
-  const auto closure = std::find(odometry.begin(), odometry.end(), false);
-  if (closure == odometry.end())
-    throw std::invalid_argument("corrupt: the graph has no loop closure");
-  const BlockEdge& claimed = graph.edges[static_cast<std::size_t>(closure - odometry.begin())];
-  const auto length = static_cast<Eigen::Index>(clusters.size);
-  std::mt19937 rng(seed);
-  const auto any_place = [&](std::size_t robot) {
-    if (graph.poses_of(robot) < length)
-      throw std::invalid_argument("corrupt: robot " + std::to_string(robot) + " has " +
-                                  std::to_string(graph.poses_of(robot)) + " poses");
-    return std::uniform_int_distribution<Eigen::Index>(graph.first[robot],
-                                                       graph.first[robot + 1] - length)(rng);
-  };
-  const RandomOutlierModel model{
-      .keyframes = 3, .planar = graph.dimension == 2, .half_side_m = half_side_m};
-  for (std::size_t n = 0; n < clusters.places; ++n) {
-    const Eigen::Index a = any_place(0);
-    const Eigen::Index b = any_place(graph.robots() - 1);
-    const SE3 T_a_b = random_outliers(1, model, rng).front().T_from_to;
-    for (const BlockEdge& e :
-         false_place(poses, a, b, clusters.size, T_a_b, {claimed.kappa, claimed.tau}))
-      corrupted.edges.push_back(e);
+  for (std::size_t k = 0; k < odometry.size(); ++k) {
+    if (odometry[k]) continue;
+    if (drawn.is_false[k]) {
+      ++result.false_closures;
+      if (placed.kept[k]) ++result.false_kept;
+      continue;
+    }
+    const bool between = graph.robot_of(graph.edges[k].i) != graph.robot_of(graph.edges[k].j);
+    ++result.true_closures;
+    if (between) ++result.between;
+    if (placed.kept[k]) continue;
+    ++result.true_lost;
+    if (between) ++result.between_lost;
   }
-  return corrupted;
+  std::map<Index, std::vector<PosePair>> frames;
+  for (std::size_t i = 0; i < drawn.truth.size(); ++i)
+    frames[placed.frame_of[i]].push_back(
+        {static_cast<Stamp>(i), drawn.truth[i], placed.T_frame_kf[i]});
+  std::vector<double> errors;
+  for (const auto& [frame, pairs] : frames) {
+    const Alignment alignment = align(pairs, false);
+    for (const PosePair& pair : pairs)
+      errors.push_back(
+          (pair.T_truth_body.translation() - alignment.apply(pair.T_estimate_body).translation())
+              .norm());
+  }
+  const Statistics statistics = statistics_of(std::move(errors));
+  result.frames = frames.size();
+  result.rms_m = statistics.rmse;
+  result.max_m = statistics.max;
+  return result;
 }
 
 OutlierStudy run_outlier_study(const TeamGraph& clean, const OutlierStudyOptions& options,
                                const TeamMeter& meter, const OutlierProgress& progress) {
-  for (const double percent : options.shares_percent)
+  const Scenario scenario = options.scenario.value_or(Scenario{});
+  std::vector<double> shares = options.shares_percent;
+  if (shares.empty()) shares = {scenario.random_percent};
+  for (const double percent : shares)
     if (!(percent >= 0.0 && std::isfinite(percent)))
       throw std::invalid_argument("outlier study: a share of " + std::to_string(percent) + " %");
   const CentralOptimum central = central_optimum(clean);
-  const std::vector<SE3> truth = round_to_poses(central.X, central.X.leftCols<4>());
-  const std::vector<bool> odometry = odometry_edges(clean);
-  OutlierStudy study{
-      .robots = clean.robots(),
-      .poses = static_cast<std::size_t>(clean.poses()),
-      .true_closures =
-          static_cast<std::size_t>(std::count(odometry.begin(), odometry.end(), false)),
-      .certified = central.certified,
-      .half_side_m = options.half_side_m > 0.0 ? options.half_side_m : half_extent_m(truth),
-      .results = {}};
-  const std::size_t all =
-      options.shares_percent.size() * options.methods.size() * options.seeds.size();
-  for (const double percent : options.shares_percent)
+  const std::vector<SE3> optimum = round_to_poses(central.X, central.X.leftCols<4>());
+  OutlierStudy study{.scenario = scenario.name, .certified = central.certified, .results = {}};
+  const std::size_t all = shares.size() * options.methods.size() * options.seeds.size();
+  for (const double percent : shares)
     for (const std::string& method : options.methods)
       for (const unsigned seed : options.seeds) {
         if (progress) progress(study.results.size(), all);
-        const auto count = static_cast<std::size_t>(
-            std::lround(0.01 * percent * static_cast<double>(study.true_closures)));
-        const TeamGraph corrupted =
-            corrupt_in_clusters(corrupt(clean, count, study.half_side_m, seed), options.clusters,
-                                truth, study.half_side_m, seed);
-        OutlierResult result =
-            attempt(method, corrupted, clean.edges.size(), truth, options, meter);
+        Scenario with_share = scenario;
+        with_share.random_percent = percent;
+        const ScenarioGraph drawn = options.scenario
+                                        ? draw_scenario(clean, optimum, with_share, seed)
+                                        : as_measured(clean, optimum, percent, seed);
+        study.robots = drawn.graph.robots();
+        study.poses = drawn.truth.size();
+        const double begin_s = meter.cpu_s();
+        const PlacedTeam placed = solve_by(method, drawn, options);
+        const double cpu_s = meter.cpu_s() - begin_s;
+        OutlierResult& result = study.results.emplace_back(judge(drawn, placed));
+        result.method = method;
         result.share_percent = percent;
         result.seed = seed;
-        result.false_closures = corrupted.edges.size() - clean.edges.size();
-        study.results.push_back(std::move(result));
+        result.cpu_s = cpu_s;
       }
   if (progress) progress(all, all);
   return study;

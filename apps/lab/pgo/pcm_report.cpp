@@ -47,18 +47,16 @@ std::vector<std::size_t> row_sizes(std::size_t vertices) {
 std::vector<std::string> table_row(Additions until) {
   const PcmAddition& now = until.back();
   const Additions recent = until.last(std::min(kWindow, until.size()));
-  const bool labelled = now.true_members.has_value();
-  return {
-      std::to_string(now.vertices),
-      std::to_string(now.clique),
-      labelled ? std::to_string(*now.true_members) + '/' + std::to_string(*now.true_vertices) : "-",
-      labelled ? std::to_string(now.clique - *now.true_members) : "-",
-      std::to_string(now.bound),
-      fixed(median_ms(recent, &PcmAddition::search_s), 3),
-      fixed(1e3 * statistics_of(values(until, &PcmAddition::search_s)).max, 3),
-      fixed(total(until, &PcmAddition::search_s), 3),
-      fixed(median_ms(recent, &PcmAddition::check_s), 3),
-      fixed(total(until, &PcmAddition::check_s), 3)};
+  return {std::to_string(now.vertices),
+          std::to_string(now.clique),
+          std::to_string(now.true_members) + '/' + std::to_string(now.true_vertices),
+          std::to_string(now.clique - now.true_members),
+          std::to_string(now.bound),
+          fixed(median_ms(recent, &PcmAddition::search_s), 3),
+          fixed(1e3 * statistics_of(values(until, &PcmAddition::search_s)).max, 3),
+          fixed(total(until, &PcmAddition::search_s), 3),
+          fixed(median_ms(recent, &PcmAddition::check_s), 3),
+          fixed(total(until, &PcmAddition::check_s), 3)};
 }
 
 std::string totals_text(const PcmRun& run) {
@@ -115,13 +113,12 @@ void write_pcm_json(std::ostream& out, std::span<const PcmRun> runs) {
   for (const PcmRun& run : runs) {
     Json additions = Json::array();
     for (const PcmAddition& a : run.additions)
-      additions.push_back(
-          {{"vertices", a.vertices},
-           {"check_s", a.check_s},
-           {"search_s", a.search_s},
-           {"clique", a.clique},
-           {"true_members", a.true_members ? Json(*a.true_members) : Json()},
-           {"false_members", a.true_members ? Json(a.clique - *a.true_members) : Json()}});
+      additions.push_back({{"vertices", a.vertices},
+                           {"check_s", a.check_s},
+                           {"search_s", a.search_s},
+                           {"clique", a.clique},
+                           {"true_members", a.true_members},
+                           {"false_members", a.clique - a.true_members}});
     all.push_back({{"search", run.search}, {"additions", std::move(additions)}});
   }
   out << json_text(runs.size() == 1 ? all.front() : all);
@@ -144,13 +141,11 @@ std::vector<Plot> pcm_plots(std::span<const PcmRun> runs) {
         {search, points(additions, [](const auto& a) { return a.clique; }), colour});
   }
   const Additions first = runs.empty() ? Additions() : Additions(runs.front().additions);
-  if (total(first, &PcmAddition::check_s) > 0.0)
-    time.series.push_back(
-        {"consistency checks", running_median_ms(first, &PcmAddition::check_s), runs.size()});
-  if (!first.empty() && first.back().true_vertices)
-    size.series.push_back({"true closures added",
-                           points(first, [](const auto& a) { return a.true_vertices.value_or(0); }),
-                           runs.size()});
+  time.series.push_back(
+      {"consistency checks", running_median_ms(first, &PcmAddition::check_s), runs.size()});
+  size.series.push_back({"true closures added",
+                         points(first, [](const auto& a) { return a.true_vertices; }),
+                         runs.size()});
   return {time, size};
 }
 

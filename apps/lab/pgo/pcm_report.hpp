@@ -15,7 +15,7 @@ namespace km {
 
 /// One object for one run: {"search", "additions": [{"vertices", "check_s", "search_s", "clique",
 /// "true_members", "false_members"}]}. "true_members" and "false_members" count the closures of the
-/// clique by label, and are null without labels. Several runs are an array of such objects.
+/// clique by label. Several runs are an array of such objects.
 void write_pcm_json(std::ostream& out, std::span<const PcmRun> runs);
 
 /// Time of search and checks, and size of the clique, against vertices.

@@ -1,22 +1,18 @@
 #include "apps/lab/pgo/pcm_run.hpp"
 
 #include <algorithm>
-#include <istream>
 #include <iterator>
-#include <limits>
 #include <random>
 #include <span>
 #include <stdexcept>
 
 #include "apps/lab/pgo/solvers.hpp"
-#include "modules/core/text_rows.hpp"
 #include "modules/outlier_rejection/cycle_test.hpp"
 #include "modules/outlier_rejection/max_clique.hpp"
 #include "modules/outlier_rejection/pcm.hpp"
 #include "modules/outlier_rejection/random_outliers.hpp"
 #include "modules/recorded_graph/g2o_io.hpp"
 #include "modules/recorded_graph/recorded_graph.hpp"
-#include "modules/recorded_graph/text_fields.hpp"
 
 namespace km {
 namespace {
@@ -85,63 +81,13 @@ PcmRun run_pcm(const std::vector<LabelledClosure>& closures, const PcmConfig& co
   return std::move(additions.run);
 }
 
-PcmRun run_pcm(const ConsistencyRows& rows, const PcmConfig& config, const PcmProgress& progress) {
-  RecordedSearch additions(checked(config));
-  for (std::size_t n = 0; n < rows.size(); ++n) {
-    if (progress) progress(n);
-    additions.add(rows[n], 0.0);
-  }
-  return std::move(additions.run);
-}
-
 std::string to_string(CliqueMethod method) {
   return method == CliqueMethod::kExact         ? "exact"
          : method == CliqueMethod::kIncremental ? "incremental"
                                                 : "batch";
 }
 
-namespace {
-
-constexpr std::int64_t kMaxIndex = std::numeric_limits<std::uint32_t>::max();
-constexpr std::int64_t kMostVertices = 100000;  // the adjacency of more takes over a gigabyte
-
-std::string text_of(std::istream& in, const std::string& file) {
-  std::string text(std::istreambuf_iterator<char>(in), {});
-  if (in.bad()) throw std::runtime_error(file + ": cannot be read to its end");
-  return text;
-}
-
-std::vector<std::size_t> read_neighbours(TextFields& fields, std::size_t vertex) {
-  std::set<std::size_t> earlier;
-  while (!fields.at_end()) {
-    const std::uint64_t u = fields.integer("neighbour");
-    if (u >= vertex)
-      fields.fail("neighbour " + std::to_string(u) + " of vertex " + std::to_string(vertex) +
-                  " is not an earlier one");
-    if (!earlier.insert(u).second)
-      fields.fail("a neighbour of vertex " + std::to_string(vertex) + " is given twice");
-  }
-  return {earlier.begin(), earlier.end()};
-}
-
-}  // namespace
-
-KeyframePairs read_outlier_labels(std::istream& in, const std::string& file) {
-  const std::string text = text_of(in, file);
-  KeyframePairs pairs;
-  for (const TextRow& row : split_rows(text)) {
-    TextFields fields(row, file);
-    const auto i = static_cast<std::uint32_t>(fields.integer("keyframe", kMaxIndex));
-    const auto j = static_cast<std::uint32_t>(fields.integer("keyframe", kMaxIndex));
-    const bool outlier = fields.integer("label", 1) == 1;
-    if (!fields.at_end()) fields.fail("more fields than two keyframes and a label");
-    if (outlier) pairs.insert(std::minmax(i, j));
-  }
-  return pairs;
-}
-
-ClosureInput read_closures(const std::filesystem::path& file, const KeyframePairs& false_pairs,
-                           const ClosureChoice& selection) {
+ClosureInput read_closures(const std::filesystem::path& file, const ClosureChoice& selection) {
   const G2oGraph g2o = read_g2o(file);
   const RecordedGraph graph = make_recorded_graph(g2o.edges, file.string());
   if (!graph.inter_closures.empty())
@@ -166,8 +112,7 @@ ClosureInput read_closures(const std::filesystem::path& file, const KeyframePair
     kept.clear();
     std::sample(closures.begin(), closures.end(), std::back_inserter(kept), selection.keep, rng);
   }
-  for (const RelativePose& edge : kept)
-    add(edge, false_pairs.contains(std::minmax({edge.from.index, edge.to.index})));
+  for (const RelativePose& edge : kept) add(edge, false);
   if (selection.outliers > 0)
     for (const RelativePose& edge : random_outliers(selection.outliers,
                                                     {.robot = graph.robot,
@@ -177,32 +122,8 @@ ClosureInput read_closures(const std::filesystem::path& file, const KeyframePair
                                                     .covariance = closures.front().covariance},
                                                     rng))
       add(edge, true);
-  if (selection.shuffle) std::shuffle(labelled.begin(), labelled.end(), rng);
+  std::shuffle(labelled.begin(), labelled.end(), rng);
   return {std::move(labelled), g2o.indefinite_edges};
-}
-
-ConsistencyRows read_consistency_rows(std::istream& in, const std::string& file) {
-  const std::string text = text_of(in, file);
-  const std::vector<TextRow> table = split_rows(text);  // empty lines of isolated vertices are
-                                                        // dropped
-  if (table.empty() || table.front().line != 1)
-    throw std::runtime_error(file + ":1: must be the number of vertices");
-  TextFields header(table.front(), file);
-  const std::uint64_t vertices = header.integer("number of vertices", kMostVertices);
-  if (!header.at_end()) header.fail("more than the number of vertices");
-  const auto lines = static_cast<std::uint64_t>(std::count(text.begin(), text.end(), '\n')) +
-                     (text.ends_with('\n') ? 0 : 1);
-  if (lines <= vertices)
-    throw std::runtime_error(file + ": ends after " + std::to_string(lines) + " lines, " +
-                             std::to_string(vertices) + " vertices need one each and the first");
-  ConsistencyRows rows(vertices);
-  for (const TextRow& row : std::span(table).subspan(1)) {
-    const auto v = static_cast<std::size_t>(row.line) - 2;
-    TextFields fields(row, file);
-    if (v >= vertices) fields.fail("more lines than vertices");
-    rows[v] = read_neighbours(fields, v);
-  }
-  return rows;
 }
 
 }  // namespace km

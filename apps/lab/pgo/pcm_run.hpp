@@ -4,11 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
-#include <iosfwd>
-#include <optional>
-#include <set>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "modules/core/pose_graph.hpp"
@@ -22,20 +18,15 @@ struct LabelledClosure {
   bool outlier = false;
 };
 
-/// Adjacency of a graph: [i] has the neighbours of vertex i that come before it.
-using ConsistencyRows = std::vector<std::vector<std::size_t>>;
-
 /// State after the addition of one vertex. Times are CPU times of one thread.
 struct PcmAddition {
   std::size_t vertices = 0;
   double check_s = 0.0;   ///< Consistency checks of the new closure against all others.
   double search_s = 0.0;  ///< Search for a larger clique.
   std::size_t clique = 0;
-  std::optional<std::size_t> true_members = {};   ///< True closures in the clique; nullopt without
-                                                  ///< labels.
-  std::optional<std::size_t> true_vertices = {};  ///< True closures in the graph; nullopt without
-                                                  ///< labels.
-  std::size_t bound = 0;                          ///< Proven upper bound of the clique size.
+  std::size_t true_members = 0;   ///< True closures in the clique.
+  std::size_t true_vertices = 0;  ///< True closures in the graph.
+  std::size_t bound = 0;          ///< Proven upper bound of the clique size.
 };
 
 struct PcmRun {
@@ -55,10 +46,6 @@ using PcmProgress = std::function<void(std::size_t)>;
 [[nodiscard]] PcmRun run_pcm(const std::vector<LabelledClosure>& closures, const PcmConfig& config,
                              const PcmProgress& progress = {});
 
-/// Adds the vertices of a consistency graph one at a time, without consistency checks.
-[[nodiscard]] PcmRun run_pcm(const ConsistencyRows& rows, const PcmConfig& config,
-                             const PcmProgress& progress = {});
-
 /// "exact", "incremental" or "batch".
 [[nodiscard]] std::string to_string(CliqueMethod method);
 
@@ -68,16 +55,8 @@ struct ClosureChoice {
   double outlier_half_side_m = 20;  ///< Range of their translations, see RandomOutlierModel.
   std::size_t keep = 0;             ///< Number of the file's closures to use, drawn at random; 0:
                                     ///< all.
-  bool shuffle = true;              ///< Whether the order of all closures is random.
   unsigned seed = 1;
 };
-
-/// Pairs of keyframes, the lower index first.
-using KeyframePairs = std::set<std::pair<std::uint32_t, std::uint32_t>>;
-
-/// Reads rows "i j flag" with flag 1 for an outlier and 0 for a true closure, and returns the pairs
-/// of the outliers. Throws std::runtime_error "file:line: what".
-[[nodiscard]] KeyframePairs read_outlier_labels(std::istream& in, const std::string& file);
 
 /// Result of read_closures().
 struct [[nodiscard]] ClosureInput {
@@ -85,16 +64,11 @@ struct [[nodiscard]] ClosureInput {
   std::size_t indefinite_edges = 0;  ///< Number in the file, odometry included, see G2oGraph.
 };
 
-/// Reads the closures of one robot's g2o file (2D or 3D). Closures of the pairs in `false_pairs`
-/// are labelled false. Random outliers are added with the covariance of the file's first closure.
-/// Throws std::runtime_error "file[:line]: what" if the file is not one robot's pose graph with
-/// closures, or has fewer closures than `selection` keeps.
+/// Reads the closures of one robot's g2o file (2D or 3D) as true ones. Random outliers are added
+/// with the covariance of the file's first closure, and the order of all is random. Throws
+/// std::runtime_error "file[:line]: what" if the file is not one robot's pose graph with closures,
+/// or has fewer closures than `selection` keeps.
 [[nodiscard]] ClosureInput read_closures(const std::filesystem::path& file,
-                                         const KeyframePairs& false_pairs,
                                          const ClosureChoice& selection);
-
-/// Reads a consistency graph: the number of vertices, then one line per vertex with its earlier
-/// neighbours, empty if it has none. Throws std::runtime_error "file:line: what".
-[[nodiscard]] ConsistencyRows read_consistency_rows(std::istream& in, const std::string& file);
 
 }  // namespace km

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 #include <random>
+#include <set>
 #include <stdexcept>
 #include <utility>
 
@@ -56,23 +57,6 @@ const std::vector<Preset>& presets() {
        "torus3D", "the same, 5 times, of four robots"},
       {with(garage, "clusters", [](Scenario& s) { s.clusters = {.places = 1, .size = 7}; }),
        "parking-garage", "seven false closures at one place, at most six true ones a pair"},
-      {with({.robots = 2, .closures_per_pair = 10}, "clusters-torus",
-            [](Scenario& s) { s.clusters = {.places = 1, .size = 3}; }),
-       "torus3D", "two robots: three false closures at one place, ten true ones"},
-      {with(garage, "single-closure",
-            [](Scenario& s) {
-              s.robots = 2;
-              s.closures_per_pair = 0;
-              s.clusters = {.places = 1, .size = 1};
-            }),
-       "parking-garage", "two robots: one false closure is all there is between them"},
-      {with(garage, "three-closures",
-            [](Scenario& s) {
-              s.robots = 2;
-              s.closures_per_pair = 0;
-              s.clusters = {.places = 3, .size = 1};
-            }),
-       "parking-garage", "the same with three that contradict each other"},
       {with({.robots = 3}, "three-folders",
             [](Scenario& s) {
               s.random_percent = 10.0;
@@ -99,12 +83,7 @@ const std::vector<Preset>& presets() {
               s.closure_share = 0.2;
               s.place_bias = 3.0;
             }),
-       "parking-garage", "closures of a place share an error of 3 sigma"},
-      {with(garage, "good-odometry",
-            [](Scenario& s) {
-              s.odometry_sigma = {{1, 0.1}};
-            }),
-       "parking-garage", "odometry of robot 1 is 10 times as good as the others', and says so"}};
+       "parking-garage", "closures of a place share an error of 3 sigma"}};
   return presets;
 }
 
@@ -117,8 +96,7 @@ void check(const Scenario& scenario, std::size_t robots) {
   const auto refuse = [&](const std::string& what) {
     throw std::invalid_argument("scenario " + scenario.name + ": " + what);
   };
-  for (const auto* factors :
-       {&scenario.odometry_sigma, &scenario.odometry_noise, &scenario.closure_noise})
+  for (const auto* factors : {&scenario.odometry_noise, &scenario.closure_noise})
     for (const auto& [robot, factor] : *factors) {
       if (robot >= robots)
         refuse("robot " + std::to_string(robot) + " of " + std::to_string(robots));
@@ -250,14 +228,9 @@ void measure(ScenarioGraph& drawn, const Scenario& scenario, std::mt19937& rng) 
     NoiseSigma claimed = sigma_of({e.kappa, e.tau}, graph.dimension);
     if (const auto& given = odometry[k] ? scenario.step_sigma : scenario.closure_sigma)
       claimed = *given;
-    double factor = 1.0;
-    if (odometry[k]) {
-      const double better = factor_of(scenario.odometry_sigma, a);
-      claimed = {better * claimed.rotation_rad, better * claimed.translation_m};
-      factor = factor_of(scenario.odometry_noise, a);
-    } else {
-      factor = std::max(factor_of(scenario.closure_noise, a), factor_of(scenario.closure_noise, b));
-    }
+    const double factor = odometry[k] ? factor_of(scenario.odometry_noise, a)
+                                      : std::max(factor_of(scenario.closure_noise, a),
+                                                 factor_of(scenario.closure_noise, b));
     Vector6 errors = factor * normal_tangent(graph.dimension, rng);
     double variance = factor * factor;
     if (!odometry[k] && scenario.place_bias > 0.0) {
@@ -287,6 +260,29 @@ Precision closure_claims(const TeamGraph& graph, const Scenario& scenario) {
     throw std::invalid_argument("scenario " + scenario.name + ": the graph has no loop closure");
   const BlockEdge& e = graph.edges[static_cast<std::size_t>(closure - odometry.begin())];
   return {e.kappa, e.tau};
+}
+
+// Half the longest side of the box around all positions.
+double half_extent_m(const std::vector<SE3>& poses) {
+  Eigen::AlignedBox3d box;
+  for (const SE3& T : poses) box.extend(T.translation());
+  return 0.5 * box.sizes().maxCoeff();
+}
+
+// False closures from poses a, a + 1, ... of one robot to poses b, b + 1, ... of another. They
+// agree with the motion of `poses` and with `T_a_b` between the first two.
+std::vector<BlockEdge> false_place(const std::vector<SE3>& poses, Eigen::Index a, Eigen::Index b,
+                                   std::size_t size, const SE3& T_a_b, const Precision& claimed) {
+  std::vector<BlockEdge> edges;
+  for (Eigen::Index k = 0; k < static_cast<Eigen::Index>(size); ++k) {
+    const auto moved = [&](Eigen::Index first) {
+      return poses[static_cast<std::size_t>(first)].inverse() *
+             poses[static_cast<std::size_t>(first + k)];
+    };
+    edges.push_back(
+        {a + k, b + k, moved(a).inverse() * T_a_b * moved(b), claimed.kappa, claimed.tau});
+  }
+  return edges;
 }
 
 // Adds false places: successive poses of one robot are matched to successive poses of another, with
@@ -328,6 +324,24 @@ void add_clusters(ScenarioGraph& drawn, const Scenario& scenario, std::mt19937& 
   }
 }
 
+TeamGraph with_random(const TeamGraph& graph, const std::vector<SE3>& truth, double share_percent,
+                      unsigned seed) {
+  const std::vector<bool> odometry = odometry_edges(graph);
+  const auto closures = static_cast<double>(std::ranges::count(odometry, false));
+  const auto count = static_cast<std::size_t>(std::lround(0.01 * share_percent * closures));
+  return corrupt(graph, count, half_extent_m(truth), seed);
+}
+
+// Edges from `true_edges` on are false. Their weights are their claims, as those of all edges that
+// no noise was drawn for.
+void label(ScenarioGraph& drawn, std::size_t true_edges) {
+  for (std::size_t k = 0; k < drawn.graph.edges.size(); ++k) {
+    drawn.is_false.push_back(k >= true_edges);
+    const BlockEdge& e = drawn.graph.edges[k];
+    if (k >= drawn.honest.size()) drawn.honest.push_back({e.kappa, e.tau});
+  }
+}
+
 }  // namespace
 
 const std::vector<Scenario>& scenarios() {
@@ -352,6 +366,36 @@ std::string scenario_list() {
   return text;
 }
 
+TeamGraph corrupt(const TeamGraph& graph, std::size_t count, double half_side_m, unsigned seed) {
+  const std::vector<bool> odometry = odometry_edges(graph);
+  std::vector<std::size_t> closures;
+  for (std::size_t k = 0; k < odometry.size(); ++k)
+    if (!odometry[k]) closures.push_back(k);
+  if (closures.empty()) throw std::invalid_argument("corrupt: the graph has no loop closure");
+  TeamGraph corrupted = graph;
+  std::mt19937 rng(seed);
+  const RandomOutlierModel model{.keyframes = static_cast<std::size_t>(graph.poses()),
+                                 .planar = graph.dimension == 2,
+                                 .half_side_m = half_side_m};
+  std::uniform_int_distribution<std::size_t> closure(0, closures.size() - 1);
+  // Each pair of poses gets at most one closure, because parallel edges would share one verdict.
+  std::set<std::pair<Eigen::Index, Eigen::Index>> taken;
+  for (const BlockEdge& e : graph.edges) taken.insert(std::minmax(e.i, e.j));
+  const auto poses = static_cast<std::size_t>(graph.poses());
+  if (2 * (taken.size() + count) > poses * (poses - 1))
+    throw std::invalid_argument("corrupt: " + std::to_string(poses) + " poses are too few for " +
+                                std::to_string(count) + " false closures");
+  while (corrupted.edges.size() < graph.edges.size() + count) {
+    const RelativePose e = random_outliers(1, model, rng).front();
+    const auto i = static_cast<Eigen::Index>(e.from.index);
+    const auto j = static_cast<Eigen::Index>(e.to.index);
+    if (!taken.insert(std::minmax(i, j)).second) continue;
+    const BlockEdge& claimed = graph.edges[closures[closure(rng)]];
+    corrupted.edges.push_back({i, j, e.T_from_to, claimed.kappa, claimed.tau});
+  }
+  return corrupted;
+}
+
 ScenarioGraph draw_scenario(const TeamGraph& whole, const std::vector<SE3>& optimum,
                             const Scenario& scenario, unsigned seed) {
   ScenarioGraph drawn{
@@ -364,17 +408,20 @@ ScenarioGraph draw_scenario(const TeamGraph& whole, const std::vector<SE3>& opti
   thin_out(drawn.graph, scenario, rng);
   measure(drawn, scenario, rng);
   const std::size_t true_edges = drawn.graph.edges.size();
-  const std::vector<bool> odometry = odometry_edges(drawn.graph);
-  const auto closures = static_cast<double>(std::ranges::count(odometry, false));
-  const auto random =
-      static_cast<std::size_t>(std::lround(0.01 * scenario.random_percent * closures));
-  if (random > 0) drawn.graph = corrupt(drawn.graph, random, half_extent_m(drawn.truth), seed);
+  if (scenario.random_percent > 0.0)
+    drawn.graph = with_random(drawn.graph, drawn.truth, scenario.random_percent, seed);
   add_clusters(drawn, scenario, rng);
-  for (std::size_t k = 0; k < drawn.graph.edges.size(); ++k) {
-    drawn.is_false.push_back(k >= true_edges);
-    const BlockEdge& e = drawn.graph.edges[k];
-    if (k >= true_edges) drawn.honest.push_back({e.kappa, e.tau});
-  }
+  label(drawn, true_edges);
+  return drawn;
+}
+
+ScenarioGraph as_measured(const TeamGraph& graph, const std::vector<SE3>& optimum,
+                          double share_percent, unsigned seed) {
+  ScenarioGraph drawn{.graph = with_random(graph, optimum, share_percent, seed),
+                      .truth = optimum,
+                      .is_false = {},
+                      .honest = {}};
+  label(drawn, graph.edges.size());
   return drawn;
 }
 

@@ -6,8 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "apps/lab/pgo/outlier_study.hpp"
-#include "apps/lab/pgo_study/team_graph.hpp"
+#include "apps/lab/pgo/team_graph.hpp"
 #include "modules/core/precision.hpp"
 
 namespace km {
@@ -16,6 +15,13 @@ namespace km {
 struct NoiseSigma {
   double rotation_rad = 0.0;
   double translation_m = 0.0;
+};
+
+/// False closures that agree with one another within their noise, as between aisles of the same
+/// appearance. Each cluster joins successive poses of one robot to successive poses of another.
+struct Clusters {
+  std::size_t places = 0;  ///< Number of clusters.
+  std::size_t size = 5;    ///< Closures in each.
 };
 
 struct RobotFactor {
@@ -37,7 +43,6 @@ struct Scenario {
   double inside_share = 1.0;   ///< Further probability for a closure inside a robot.
   std::optional<std::size_t> closures_per_pair = {};  ///< Largest number between two robots.
 
-  std::vector<RobotFactor> odometry_sigma = {};  ///< Factor on claims and noise of odometry.
   std::vector<RobotFactor> odometry_noise = {};  ///< Ratio of the noise of odometry to its claim.
   /// Ratio of noise to claim for closures with an end on the robot. Between two robots the larger
   /// factor counts.
@@ -76,5 +81,18 @@ struct ScenarioGraph {
 /// out. Throws std::invalid_argument if the scenario does not fit the graph.
 [[nodiscard]] ScenarioGraph draw_scenario(const TeamGraph& whole, const std::vector<SE3>& optimum,
                                           const Scenario& scenario, unsigned seed);
+
+/// The measurements of `graph` and random false closures, `share_percent` for every 100 true ones.
+/// `optimum` is the truth. Throws as corrupt() does.
+[[nodiscard]] ScenarioGraph as_measured(const TeamGraph& graph, const std::vector<SE3>& optimum,
+                                        double share_percent, unsigned seed);
+
+/// Appends `count` false closures to the edges. Each joins a uniformly drawn pair of poses that do
+/// not follow each other. Its rotation is uniform, and its translation is uniform within
+/// +-half_side_m along every axis (both in the plane for planar graphs). It claims the weights of a
+/// true closure drawn at random. Throws std::invalid_argument if `graph` has no closures to draw
+/// from.
+[[nodiscard]] TeamGraph corrupt(const TeamGraph& graph, std::size_t count, double half_side_m,
+                                unsigned seed);
 
 }  // namespace km

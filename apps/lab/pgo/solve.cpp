@@ -16,70 +16,62 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kSolveDetails =
-    "Every robot has only its part of the graph, and receives only the messages that would cross\n"
-    "the network.\n"
-    "\n"
-    "FILE is a g2o file, 2D or 3D, divided among --robots robots; or a folder with one *.csv or\n"
-    "*.g2o per robot; or the results of a team's run; or a team's JRL file (COSMO-Bench).\n"
-    "The cost is the chordal one without 1/2. Weights are read as SE-Sync reads them. For the\n"
-    "results of a team and for JRL files they are those of the robots:\n"
-    "  F = sum kappa |R_j - R_i R_ij|^2 + tau |t_j - t_i - R_i t_ij|^2\n"
-    "A vertical in a g2o file (EDGE_SE3_PRIOR with information on the tilt alone, as\n"
-    "kimera_multi_robot writes it) adds |R_i up_i - z|^2 / sigma_i^2. dgs does not support\n"
-    "verticals. Other priors are refused.\n"
-    "\n"
-    "Methods:\n"
-    "  local        every robot alone; their frames joined by one closure each\n"
-    "  dgs          two-stage distributed Gauss-Seidel (Choudhary et al., IJRR 2017)\n"
-    "  rbcd         Riemannian block-coordinate descent (Tian et al., TRO 2021) as robots "
-    "run\n"
-    "               it: in a round all robots update, in turn, over-relaxed unless\n"
-    "               --over-relaxation is 1; ends when the cost hardly decreases any more\n"
-    "  centralized  the whole graph on one computer: Newton, certified; otherwise the\n"
-    "               staircase of SE-Sync\n"
-    "  newton       default of the robots: Newton steps of the whole team up and down a tree\n"
-    "               of robots. It estimates how noisy closures are and rejects false ones\n"
-    "               (graduated non-convexity: weights and a step, in turn). It ends with the\n"
-    "               optimum of the closures that it keeps. --trust-all keeps all closures\n"
-    "newton starts from odometry; each robot first relaxes the closures inside it. newton\n"
-    "--trust-all and the other methods start from the chordal initialisation of the whole\n"
-    "graph, whose time is shown separately (local: of each robot's own graph).\n"
-    "\n"
-    "A round is one exchange of messages. For newton it is one pass up the tree and one pass "
-    "down.\n"
-    "For rbcd it is an update by every robot, and poses are available after every fifth round.\n"
-    "The table shows when each gap to the certified optimum was reached (computed centrally "
-    "unless\n"
-    "given): the number of rounds, the bytes sent by all robots so far, and the CPU time, both\n"
-    "summed over the slowest robot of each exchange and over all robots. newton and rbcd encode\n"
-    "the robots' own messages, which have one receiver each. Messages of other methods are not\n"
-    "encoded, and a broadcast counts once. The certificate proves an upper bound of the gap. For\n"
-    "newton without --trust-all the table shows the kept closures instead.\n"
-    "\n"
-    "If a JRL file labels false closures, a table shows how many false and true ones were kept. "
-    "If\n"
-    "it has true poses, a table shows the ATE: the RMSE [m] of the positions of all robots under\n"
-    "one rigid alignment, then of each robot under that alignment and under its own. With both,\n"
-    "the optimum of all closures that are not labelled false is shown for comparison. Priors are\n"
-    "left out. --instants N solves the graph known at N evenly spread times, according to the\n"
-    "stamps of the file. Parts that no closure connects yet are solved and aligned separately.\n"
-    "\n"
-    "Examples:\n"
-    "  kimera_multi_pgo solve sphere2500.g2o --robots 5 --method newton --trust-all --json "
-    "out.json\n"
-    "  kimera_multi_pgo solve tunnels_8robots --method rbcd --rounds 300 --plot gap.html\n"
-    "  kimera_multi_pgo solve tunnels_8robots\n"
-    "  kimera_multi_pgo solve tunnels_8robots --barc 20 --links chain\n"
-    "  kimera_multi_pgo solve ntu_r3_02_d02_n04_n13_wifi.jrl --instants 10\n"
-    "  kimera_multi_pgo solve manhattan.g2o --method centralized --output manhattan.tum";
+    R"(Every robot has only its part of the graph, and receives only the messages that would cross
+the network.
+
+FILE is a g2o file, 2D or 3D, divided among --robots robots; or a folder with one *.csv or
+*.g2o per robot; or the results of a team's run; or a team's JRL file (COSMO-Bench).
+The cost is the chordal one without 1/2. Weights are read as SE-Sync reads them. For the
+results of a team and for JRL files they are those of the robots:
+  F = sum kappa |R_j - R_i R_ij|^2 + tau |t_j - t_i - R_i t_ij|^2
+A vertical in a g2o file (EDGE_SE3_PRIOR with information on the tilt alone, as
+kimera_multi_robot writes it) adds |R_i up_i - z|^2 / sigma_i^2. dgs does not support
+verticals. Other priors are refused.
+
+Methods:
+  local        every robot alone; their frames joined by one closure each
+  dgs          two-stage distributed Gauss-Seidel (Choudhary et al., IJRR 2017)
+  rbcd         Riemannian block-coordinate descent (Tian et al., TRO 2021) as robots run
+               it: in a round all robots update, in turn, over-relaxed unless
+               --over-relaxation is 1; ends when the cost hardly decreases any more
+  centralized  the whole graph on one computer: Newton, certified; otherwise the
+               staircase of SE-Sync
+  newton       default of the robots: Newton steps of the whole team up and down a tree
+               of robots. It estimates how noisy closures are and rejects false ones
+               (graduated non-convexity: weights and a step, in turn). It ends with the
+               optimum of the closures that it keeps. --trust-all keeps all closures
+newton starts from odometry; each robot first relaxes the closures inside it. newton
+--trust-all and the other methods start from the chordal initialisation of the whole
+graph, whose time is shown separately (local: of each robot's own graph).
+
+A round is one exchange of messages. For newton it is one pass up the tree and one pass down.
+For rbcd it is an update by every robot, and poses are available after every fifth round.
+The table shows when each gap to the certified optimum was reached (computed centrally):
+the number of rounds, the bytes sent by all robots so far, and the CPU time, both
+summed over the slowest robot of each exchange and over all robots. newton and rbcd encode
+the robots' own messages, which have one receiver each. Messages of other methods are not
+encoded, and a broadcast counts once. The certificate proves an upper bound of the gap. For
+newton without --trust-all the table shows the kept closures instead.
+
+If a JRL file labels false closures, a table shows how many false and true ones were kept. If
+it has true poses, a table shows the ATE: the RMSE [m] of the positions of all robots under
+one rigid alignment, then of each robot under that alignment and under its own. With both,
+the optimum of all closures that are not labelled false is shown for comparison. Priors are
+left out.
+
+Examples:
+  kimera_multi_pgo solve sphere2500.g2o --robots 5 --method newton --trust-all --json out.json
+  kimera_multi_pgo solve tunnels_8robots --method rbcd --rounds 300
+  kimera_multi_pgo solve tunnels_8robots
+  kimera_multi_pgo solve tunnels_8robots --barc 20 --links chain
+  kimera_multi_pgo solve ntu_r3_02_d02_n04_n13_wifi.jrl
+  kimera_multi_pgo solve manhattan.g2o --method centralized --output manhattan.tum)";
 
 struct SolveCommand {
   GraphInput input;
   bool no_vertical = false;
   SolverOptions solver;
-  std::optional<double> optimum;
-  std::size_t instants = 0;
-  ReportFiles files;
+  fs::path json;
   fs::path output;
 };
 
@@ -90,60 +82,42 @@ struct Takers {
 };
 
 std::vector<Takers> takers() {
-  const std::vector<std::string> newton{"newton", "newton --trust-all"};
-  const std::vector<std::string> judged{"rbcd", "local", "dgs", "centralized",
-                                        "newton --trust-all"};
   return {{"--rank", {"rbcd"}},
-          {"--gradient", judged},
-          {"--optimum", judged},
-          {"--plot", judged},
           {"--over-relaxation", {"rbcd"}},
           {"--barc", {"newton"}},
-          {"--reject-odometry", {"newton"}},
-          {"--share-private", newton},
           {"--links", {"newton", "newton --trust-all", "rbcd"}}};
 }
 
-void define_method(Command app, SolveCommand& command) {
+void define_method(CLI::App& app, SolveCommand& command) {
   SolverOptions& solver = command.solver;
-  app.add_option("--method", solver.method, "See below").one_of_unlisted(kMethods);
+  app.add_option("--method", solver.method, "See below")
+      ->check(CLI::IsMember(kMethods).description(""));
   app.add_flag("--no-vertical", command.no_vertical, "Leave out the verticals of the files");
-  app.add_option("--rounds", solver.run.max_rounds, "Largest number of rounds").within(0, 1000000);
-  app.add_option("--gradient", solver.run.gradient_tolerance,
-                 "Stop once the norm of the Riemannian gradient is at most this")
-      .not_negative();
-  app.add_option("--rank", solver.rank, "rbcd: rank of the relaxation").within(3, 10);
+  app.add_option("--rounds", solver.run.max_rounds, "Largest number of rounds")
+      ->check(CLI::Range(0, 1000000));
+  app.add_option("--rank", solver.rank, "rbcd: rank of the relaxation")->check(CLI::Range(3, 10));
   app.add_option("--over-relaxation", solver.over_relaxation,
                  "rbcd: largest step of a robot, relative to that to the minimum of its block")
-      .within(1.0, 1.99);
+      ->check(CLI::Range(1.0, 1.99));
   app.add_option_function<std::string>(
          "--links",
          [&solver](const std::string& shape) {
            solver.shape = shape == "chain" ? TeamShape::kChain : TeamShape::kAll;
          },
          "newton, rbcd: links of the robots: all, or chain (robot k to k - 1 and k + 1)")
-      .one_of({"all", "chain"})
-      .default_text("all");
-  app.add_option("--instants", command.instants,
-                 "JRL: number of times at which the graph known so far is solved, with the ATE")
-      .within(1, 10000);
-  app.add_option("--optimum", command.optimum, "The optimum, if known, so that it is not computed")
-      .positive();
+      ->check(CLI::IsMember(std::vector<std::string>{"all", "chain"}))
+      ->default_str("all");
 }
 
-void define_newton(Command app, SolveCommand& command) {
+void define_newton(CLI::App& app, SolveCommand& command) {
   SolverOptions& solver = command.solver;
-  app.group("newton");
+  app.option_defaults()->group("newton");
   app.add_flag("--trust-all", solver.trust_all, "Treat all closures as true");
   app.add_option(
          "--barc", solver.barc,
          "Largest residual [sigma] of a closure that is kept, sqrt of its cost; 0: exceeded by\n"
          "one in a million Gaussian residuals, times the noise scale that the team estimates")
-      .not_negative();
-  app.add_flag("--share-private", solver.share_private,
-               "Also send private poses to other robots if that saves bytes");
-  app.add_flag("--reject-odometry", solver.reject_odometry,
-               "Also reject false steps of odometry inside a robot");
+      ->check(CLI::NonNegativeNumber);
 }
 
 std::string listed(const std::vector<std::string>& names) {
@@ -152,7 +126,7 @@ std::string listed(const std::vector<std::string>& names) {
   return text;
 }
 
-void check(Command app, SolveCommand& command) {
+void check(CLI::App& app, SolveCommand& command) {
   if (command.solver.trust_all && command.solver.method != "newton")
     throw std::runtime_error("--trust-all is for --method newton only");
   const std::string method = command.solver.name();
@@ -160,7 +134,7 @@ void check(Command app, SolveCommand& command) {
     if (app.count(option) > 0 && std::find(methods.begin(), methods.end(), method) == methods.end())
       throw std::runtime_error(std::string(option) + " is for --method " + listed(methods) +
                                " only, not for " + method);
-  command.files.check();
+  check_output_folder(command.json);
   check_output_folder(command.output);
 }
 
@@ -193,28 +167,20 @@ std::vector<bool> kept_by(const Solution& solution) {
   return solution.run.decision ? solution.run.decision->kept : std::vector<bool>();
 }
 
-void run(Command app, SolveCommand& command) {
+void run(CLI::App& app, SolveCommand& command) {
   check(app, command);
   LabelledTeamGraph team = command.input.read(app);
   TeamGraph& graph = team.graph;
-  if (command.instants > 0 && team.truth.edge_stamps.empty())
-    throw std::runtime_error("--instants: " + command.input.file.string() +
-                             " has no times, as JRL files have them");
   if (command.no_vertical) graph.verticals.clear();
-  const Solution solution = solve(graph, command.solver, command.optimum, cpu_meter());
+  const Solution solution = solve(graph, command.solver, cpu_meter());
   for (const SE3& T_world_kf : solution.T_world_kf)
     if (!T_world_kf.matrix().allFinite())
       throw std::runtime_error(command.input.file.string() + ": " + command.solver.name() +
                                " found no finite poses: do steps and weights make sense?");
   const TruthScore truth = score(team, solution.T_world_kf, kept_by(solution));
   std::cout << left_out_text(team) << solution_text(graph, solution) << score_text(graph, truth);
-  const std::vector<Instant> instants =
-      command.instants > 0 ? play(team, command.solver, command.instants, cpu_meter())
-                           : std::vector<Instant>();
-  std::cout << timeline_text(instants);
-  command.files.write(
-      [&](std::ostream& out) { write_solution_json(out, graph, solution, truth, instants); },
-      "Gap to the optimum: " + command.input.file.string(), [&] { return gap_plots(solution); });
+  write_output(command.json,
+               [&](std::ostream& out) { write_solution_json(out, graph, solution, truth); });
   write_output(command.output, [&](std::ostream& out) {
     command.output.extension() == ".tum" ? write_tum(out, solution.T_world_kf)
                                          : write_solved(out, graph, solution.T_world_kf);
@@ -223,25 +189,24 @@ void run(Command app, SolveCommand& command) {
 
 }  // namespace
 
-void add_solve(Command parent) {
-  const Command app = parent.add_subcommand("solve", "Optimises a pose graph by a team of robots");
+void add_solve(CLI::App& parent) {
+  CLI::App& app = *parent.add_subcommand("solve", "Optimises a pose graph by a team of robots");
   app.footer(kSolveDetails);
-  app.show_defaults();
+  app.option_defaults()->always_capture_default();
   const auto command = std::make_shared<SolveCommand>();
   command->input.define(app);
   define_method(app, *command);
   define_newton(app, *command);
-  app.group("Output");
-  command->files.define(app, "every round",
-                        "the gap against rounds, bytes and time (not newton without --trust-all)");
+  app.option_defaults()->group("Output");
+  app.add_option("--json", command->json, "Also write every round to this file, as JSON");
   app.add_option("--output", command->output,
                  "Also write the rounded poses: *.tum (numbers of the poses as times) or *.g2o")
-      .check([](const std::string& file) {
+      ->check([](const std::string& file) {
         return file.ends_with(".tum") || file.ends_with(".g2o")
                    ? std::string()
                    : file + ": --output writes *.tum or *.g2o";
       });
-  app.callback([app, command] { run(app, *command); });
+  app.callback([&app, command] { run(app, *command); });
 }
 
 }  // namespace km

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <nlohmann/json.hpp>
 #include <ostream>
 #include <sstream>
@@ -14,23 +13,12 @@
 namespace km {
 namespace {
 
-constexpr std::size_t kMostMarks = 40;  // with more rounds, marks would hide the line
-
 // Gap relative to the optimum. Without noise the optimum is only rounding error, so kNoCost bounds
 // the divisor.
 double gap(const Solution& solution, const TeamRound& round) {
   constexpr double kNoCost = 1e-9;
   const double optimum = solution.comparison->optimum;
   return (round.cost - optimum) / std::max(optimum, kNoCost);
-}
-
-// Bottom of a logarithmic axis of gaps: the decade below the least positive gap. Rounding makes
-// gaps at the optimum 0 or negative.
-double gap_floor(const Solution& solution) {
-  double least = 1.0;
-  for (const TeamRound& round : solution.run.rounds)
-    if (const double g = gap(solution, round); g > 0.0) least = std::min(least, g);
-  return std::pow(10.0, std::floor(std::log10(least)));
 }
 
 std::string work_bytes(const TeamWork& work) {
@@ -69,7 +57,6 @@ std::string certificate_text(const Certificate& certificate) {
           rounded(std::max(certificate.relative_gap, 1e-12), 2) +
           " of itself (lambda_min at least " + rounded(certificate.lambda_bound, 3);
   if (certificate.lambda_min) text += ", estimated " + rounded(*certificate.lambda_min, 3);
-  if (certificate.hidden_by_rounding) text += ", the rest being what rounding could hide";
   return text + ")\n";
 }
 
@@ -153,37 +140,8 @@ Json ate_json(const TeamGraph& graph, const TeamAte& ate) {
   return {{"team_m", ate.team_m}, {"parts", ate.parts}, {"robots", std::move(robots)}};
 }
 
-// NaN if either is unknown.
-double ate_ratio(const std::optional<TeamAte>& ate, const std::optional<TeamAte>& optimum) {
-  return ate && optimum ? ate->team_m / optimum->team_m : std::numeric_limits<double>::quiet_NaN();
-}
-
-void add_truth(const TeamGraph& graph, const std::optional<LabelCounts>& closures,
-               const std::optional<TeamAte>& ate, const std::optional<TeamAte>& optimum,
-               Json& json) {
-  if (closures)
-    json["closures"] = {{"inside", counts_json(closures->inside)},
-                        {"between", counts_json(closures->between)}};
-  if (ate) json["ate"] = ate_json(graph, *ate);
-  if (!ate || !optimum) return;
-  json["optimum_of_true"] = ate_json(graph, *optimum);
-  json["ate_ratio"] = ate_ratio(ate, optimum);
-}
-
-Json instant_json(const TeamGraph& graph, const Instant& instant) {
-  Json json = {{"after_s", instant.after_s},
-               {"poses", instant.poses},
-               {"known_closures", instant.closures},
-               {"parts", instant.parts},
-               {"decided", instant.decided},
-               {"rounds", instant.rounds},
-               {"critical_path_s", instant.critical_path_s}};
-  add_truth(graph, instant.counts, instant.ate, instant.optimum_of_true, json);
-  return json;
-}
-
-std::string metres(const std::optional<TeamAte>& ate) {
-  return ate ? fixed(ate->team_m, 3) : "-";
+double ate_ratio(const TruthScore& truth) {
+  return truth.ate->team_m / truth.optimum_of_true->team_m;
 }
 
 }  // namespace
@@ -214,7 +172,7 @@ std::string score_text(const TeamGraph& graph, const TruthScore& truth) {
   std::vector<std::vector<std::string>> rows{std::move(header), ate_row("solution", *truth.ate)};
   if (truth.optimum_of_true) {
     rows.push_back(ate_row("optimum of the true closures", *truth.optimum_of_true));
-    rows.push_back({"ratio", fixed(ate_ratio(truth.ate, truth.optimum_of_true), 3)});
+    rows.push_back({"ratio", fixed(ate_ratio(truth), 3)});
     rows.back().resize(rows.front().size());
   }
   text += align_columns(rows);
@@ -226,28 +184,8 @@ std::string score_text(const TeamGraph& graph, const TruthScore& truth) {
   return text;
 }
 
-std::string timeline_text(const std::vector<Instant>& instants) {
-  if (instants.empty()) return {};
-  std::vector<std::vector<std::string>> rows{{"after [s]", "poses", "closures", "parts",
-                                              "true lost", "false kept", "rounds", "ATE [m]",
-                                              "optimum of true", "ratio"}};
-  for (const Instant& instant : instants) {
-    const auto& counts = instant.counts;
-    const auto sum = [&](auto ClosureCounts::*member) {
-      return counts ? std::to_string(counts->inside.*member + counts->between.*member) : "-";
-    };
-    rows.push_back({fixed(instant.after_s, 1), std::to_string(instant.poses),
-                    std::to_string(instant.closures), std::to_string(instant.parts),
-                    sum(&ClosureCounts::true_lost), sum(&ClosureCounts::false_kept),
-                    std::to_string(instant.rounds) + (instant.decided ? "" : ", not decided"),
-                    metres(instant.ate), metres(instant.optimum_of_true),
-                    fixed(ate_ratio(instant.ate, instant.optimum_of_true), 3)});
-  }
-  return align_columns(rows);
-}
-
 void write_solution_json(std::ostream& out, const TeamGraph& graph, const Solution& solution,
-                         const TruthScore& truth, const std::vector<Instant>& instants) {
+                         const TruthScore& truth) {
   Json rounds = Json::array();
   for (const TeamRound& round : solution.run.rounds)
     rounds.push_back({{"round", round.round},
@@ -284,35 +222,16 @@ void write_solution_json(std::ostream& out, const TeamGraph& graph, const Soluti
     for (std::size_t k = 0; k < decision->kept.size(); ++k)
       if (decision->kept[k]) json["kept"].push_back(k);
   }
-  add_truth(graph, truth.closures, truth.ate, truth.optimum_of_true, json);
-  if (truth.optimum_of_true) json["optimum_of_true"]["certified"] = truth.certified;
-  for (const Instant& instant : instants) json["instants"].push_back(instant_json(graph, instant));
+  if (truth.closures)
+    json["closures"] = {{"inside", counts_json(truth.closures->inside)},
+                        {"between", counts_json(truth.closures->between)}};
+  if (truth.ate) json["ate"] = ate_json(graph, *truth.ate);
+  if (truth.optimum_of_true) {
+    json["optimum_of_true"] = ate_json(graph, *truth.optimum_of_true);
+    json["optimum_of_true"]["certified"] = truth.certified;
+    json["ate_ratio"] = ate_ratio(truth);
+  }
   out << json_text(json);
-}
-
-std::vector<Plot> gap_plots(const Solution& solution) {
-  const std::vector<TeamRound>& rounds = solution.run.rounds;
-  const double floor = gap_floor(solution);
-  const bool clipped = std::any_of(rounds.begin(), rounds.end(), [&](const TeamRound& round) {
-    return gap(solution, round) < floor;
-  });
-  const auto panel = [&](const char* label, const auto& abscissa) {
-    PlotSeries curve;
-    if (rounds.size() <= kMostMarks) curve.style = PlotSeries::Style::kMarkedLine;
-    for (std::size_t k = 0; k < rounds.size(); ++k)
-      curve.points.push_back({abscissa(k), std::max(floor, gap(solution, rounds[k]))});
-    return Plot{.title = solution.method + ": gap to the optimum" +
-                         (clipped ? " (none: at the bottom)" : ""),
-                .x_label = label,
-                .y_label = "(F - F*) / F*",
-                .log_y = true,
-                .series = {std::move(curve)}};
-  };
-  return {panel("rounds", [&](std::size_t k) { return static_cast<double>(rounds[k].round); }),
-          panel("sent by all robots [MB]",
-                [&](std::size_t k) { return 1e-6 * static_cast<double>(rounds[k].work.bytes); }),
-          panel("critical path [s of CPU time]",
-                [&](std::size_t k) { return rounds[k].work.critical_path_s; })};
 }
 
 }  // namespace km

@@ -2,10 +2,9 @@
 
 #include <iosfwd>
 #include <string>
-#include <vector>
 
-#include "apps/lab/pgo/timeline.hpp"
-#include "modules/charts/plot.hpp"
+#include "apps/lab/pgo/solvers.hpp"
+#include "apps/lab/pgo/truth_score.hpp"
 
 namespace km {
 
@@ -26,21 +25,10 @@ namespace km {
 ///     "closures": {"inside", "between": {"true_kept", "true_lost", "false_kept",
 ///     "false_rejected"}}, "ate": {"team_m", "parts", "robots": [{"robot", "in_team_m",
 ///     "alone_m"}]}, "optimum_of_true": as "ate", and "certified"; "ate_ratio".
-/// Keys of a played data set in addition:
-///     "instants": [{"after_s", "poses", "known_closures", "parts", "decided", "rounds",
-///     "critical_path_s", "closures", "ate", "optimum_of_true", "ate_ratio"}].
 void write_solution_json(std::ostream& out, const TeamGraph& graph, const Solution& solution,
-                         const TruthScore& truth, const std::vector<Instant>& instants);
+                         const TruthScore& truth);
 
 /// Tables of kept closures and of the ATE, as far as the data set contains the truth.
 [[nodiscard]] std::string score_text(const TeamGraph& graph, const TruthScore& truth);
-
-/// Text with a row for each instant; empty without instants.
-[[nodiscard]] std::string timeline_text(const std::vector<Instant>& instants);
-
-/// Plots of the relative gap of the cost to the optimum against rounds, bytes and critical-path
-/// time, on a logarithmic axis. Gaps that are zero, or negative by rounding, are at its bottom.
-/// Precondition: `solution.comparison` is not empty.
-[[nodiscard]] std::vector<Plot> gap_plots(const Solution& solution);
 
 }  // namespace km

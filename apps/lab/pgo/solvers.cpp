@@ -4,11 +4,10 @@
 #include <memory>
 #include <stdexcept>
 
-#include "apps/lab/pgo_study/central_solver.hpp"
-#include "apps/lab/pgo_study/central_team.hpp"
-#include "apps/lab/pgo_study/gauss_seidel_team.hpp"
-#include "apps/lab/pgo_study/local_team.hpp"
-#include "apps/lab/pgo_study/odometry_start.hpp"
+#include "apps/lab/pgo/central_solver.hpp"
+#include "apps/lab/pgo/gauss_seidel_team.hpp"
+#include "apps/lab/pgo/local_team.hpp"
+#include "apps/lab/pgo/odometry_start.hpp"
 #include "modules/core/symmetric_eigen.hpp"
 #include "modules/pose_graph/chordal.hpp"
 #include "modules/pose_graph/tree_newton.hpp"
@@ -20,22 +19,51 @@ namespace {
 
 constexpr Eigen::Index kRigidRank = 3;
 
+// The whole graph on one computer, see CentralSolver. A round is one of its steps, and all work
+// counts for robot 0. The bytes for collecting the measurements are not counted.
+class CentralTeam : public TeamSolver {
+ public:
+  CentralTeam(const TeamGraph& graph, const std::vector<SE3>& start)
+      : first_(graph.first),
+        solver_(graph.edges, lift(start, kRigidRank), graph.dimension, graph.verticals),
+        blocks_(graph.robots()) {
+    copy_blocks();
+  }
+
+  int step(RoundMeter& meter) override {
+    const bool stepped = meter.run(0, [&] { return solver_.step(); });
+    copy_blocks();
+    return stepped ? 1 : 0;
+  }
+  [[nodiscard]] const LiftedPoses& block(std::size_t robot) const override {
+    return blocks_[robot];
+  }
+
+ private:
+  void copy_blocks() {
+    for (std::size_t k = 0; k < blocks_.size(); ++k)
+      blocks_[k] = solver_.X().middleCols(4 * first_[k], 4 * (first_[k + 1] - first_[k]));
+  }
+
+  std::vector<Eigen::Index> first_;
+  CentralSolver solver_;
+  std::vector<LiftedPoses> blocks_;
+};
+
 // The configuration of robots with these options.
 PoseGraphConfig config_of(const SolverOptions& options) {
   PoseGraphConfig config;
   config.robust = !options.trust_all;
   config.barc = options.barc;
-  config.share_private = options.share_private;
-  config.rank = static_cast<int>(options.rank);
-  config.max_over_relaxation = options.over_relaxation;
   return config;
 }
 
 // The robots' own block descent, with their own stopping rule.
 std::unique_ptr<TeamSolver> rbcd_team(const TeamGraph& graph, const std::vector<SE3>& start,
                                       const SolverOptions& options) {
-  RbcdOptions rbcd = rbcd_options(config_of(options));
-  rbcd.max_rounds = static_cast<std::uint32_t>(options.run.max_rounds);
+  const RbcdOptions rbcd{.rank = options.rank,
+                         .max_rounds = static_cast<std::uint32_t>(options.run.max_rounds),
+                         .max_over_relaxation = options.over_relaxation};
   return std::make_unique<MemberTeam>(
       graph, kRigidRank, start,
       [rbcd](SessionGraph part, const TreePlace& place) {
@@ -50,7 +78,7 @@ std::unique_ptr<TeamSolver> make_team(const TeamGraph& graph, const std::vector<
   if (method == "local") return std::make_unique<LocalTeam>(graph);
   if (method == "dgs") return std::make_unique<GaussSeidelTeam>(graph, start);
   if (method == "rbcd") return rbcd_team(graph, start, options);
-  if (method == "centralized") return std::make_unique<CentralTeam>(graph, lift(start, kRigidRank));
+  if (method == "centralized") return std::make_unique<CentralTeam>(graph, start);
   throw std::invalid_argument("unknown method " + method);
 }
 
@@ -60,7 +88,6 @@ SolverRun run_newton(const TeamGraph& graph, std::vector<SE3> start, const Solve
   TreeNewtonOptions newton = newton_options(config_of(options));
   newton.dimension = graph.dimension;
   newton.absolute_tolerance = 1e-12;
-  newton.reject_odometry = options.reject_odometry;
   if (start.empty()) start = odometry_start(graph);
   MemberTeam team(
       graph, kRigidRank, std::move(start),
@@ -100,7 +127,7 @@ SolverRun run_solver(const TeamGraph& graph, const std::vector<SE3>& start,
 }
 
 CentralOptimum central_optimum(const TeamGraph& graph, const std::vector<SE3>& start) {
-  CentralSolver solver(graph.edges, lift(start, kRigidRank), graph.dimension, {}, graph.verticals);
+  CentralSolver solver(graph.edges, lift(start, kRigidRank), graph.dimension, graph.verticals);
   while (solver.step()) {
   }
   return {solver.X(), solver.cost(), solver.certificate() && solver.certificate()->certified};
@@ -135,8 +162,7 @@ Eigen::MatrixXd world_of(const TeamGraph& graph, const LiftedPoses& X) {
 
 }  // namespace
 
-Solution solve(const TeamGraph& graph, const SolverOptions& options, std::optional<double> optimum,
-               const TeamMeter& meter) {
+Solution solve(const TeamGraph& graph, const SolverOptions& options, const TeamMeter& meter) {
   Solution solution{.method = options.name()};
   std::vector<SE3> start;
   if (!options.rejects()) {
@@ -148,8 +174,7 @@ Solution solve(const TeamGraph& graph, const SolverOptions& options, std::option
   const LiftedPoses& X = solution.run.X;
   solution.T_world_kf = round_to_poses(X, world_of(graph, X));
   if (options.rejects()) return solution;
-  const CentralOptimum least =
-      optimum ? CentralOptimum{{}, *optimum, true} : central_optimum(graph, start);
+  const CentralOptimum least = central_optimum(graph, start);
   solution.comparison =
       OptimumComparison{.rounded_cost = problem_of(graph, 3).cost(lift(solution.T_world_kf, 3)),
                         .optimum = least.cost,

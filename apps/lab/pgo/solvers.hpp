@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "apps/lab/pgo_study/certificate.hpp"
-#include "apps/lab/pgo_study/member_team.hpp"
-#include "apps/lab/pgo_study/team_solver.hpp"
+#include "apps/lab/pgo/certificate.hpp"
+#include "apps/lab/pgo/member_team.hpp"
+#include "apps/lab/pgo/team_solver.hpp"
 
 namespace km {
 
@@ -26,8 +26,6 @@ struct SolverOptions {
   double over_relaxation = 1.95;  ///< rbcd: largest value; 1: as published.
   bool trust_all = false;         ///< newton: all closures are treated as true.
   double barc = 0.0;              ///< newton: largest residual of an inlier [sigma]; 0: estimated.
-  bool reject_odometry = false;   ///< newton: false steps of odometry are rejected too.
-  bool share_private = false;     ///< newton: see TreeNewtonOptions.
   TeamShape shape = TeamShape::kAll;  ///< newton, rbcd: links between the robots.
 
   [[nodiscard]] bool rejects() const { return method == "newton" && !trust_all; }
@@ -75,9 +73,8 @@ struct CentralOptimum {
 /// Comparison of poses with the optimum, by one computer that has the whole graph.
 struct OptimumComparison {
   double rounded_cost = 0.0;
-  /// The certified or given optimum; otherwise the least known cost.
-  double optimum = 0.0;
-  bool optimum_certified = false;  ///< Certified, or given.
+  double optimum = 0.0;            ///< The least known cost.
+  bool optimum_certified = false;  ///< Proven to be the least of all.
   Certificate certificate = {};
   /// Numerical rank of the rotations; 3 (2 in the plane): the poses are rigid.
   Eigen::Index rank = 0;
@@ -96,9 +93,9 @@ struct Solution {
 
 /// Runs a method. A method that rejects closures starts from odometry. Other methods start from the
 /// chordal initialisation. It is computed centrally; its time is Solution::start_s, and SolverRun
-/// does not count its bytes. With verticals, the initialisation is levelled as a whole. For these
-/// other methods, the optimum is computed if `optimum` is nullopt. Throws as run_solver() does.
+/// does not count its bytes. With verticals, the initialisation is levelled as a whole. Throws as
+/// run_solver() does.
 [[nodiscard]] Solution solve(const TeamGraph& graph, const SolverOptions& options,
-                             std::optional<double> optimum, const TeamMeter& meter);
+                             const TeamMeter& meter);
 
 }  // namespace km

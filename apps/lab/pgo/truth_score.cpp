@@ -30,28 +30,17 @@ struct SquaredErrors {
   }
 };
 
-std::vector<ConnectedPart> true_parts(const LabelledTeamGraph& team,
-                                      const std::vector<bool>& keep_pose,
-                                      std::vector<bool> keep_edge) {
-  for (std::size_t k = 0; k < keep_edge.size(); ++k)
-    if (team.truth.is_false[k]) keep_edge[k] = false;
-  return connected_parts(team.graph, keep_pose, keep_edge);
-}
-
-std::vector<bool> all_of(std::size_t n) {
-  return std::vector<bool>(n, true);
-}
-
 }  // namespace
 
 std::vector<ConnectedPart> true_parts(const LabelledTeamGraph& team) {
-  return true_parts(team, all_of(team.graph.ids.size()), all_of(team.graph.edges.size()));
+  std::vector<bool> keep_edge = team.truth.is_false;
+  keep_edge.flip();
+  return connected_parts(team.graph, keep_edge);
 }
 
-TrueOptimum optimum_of_true(const LabelledTeamGraph& team, const std::vector<bool>& keep_pose,
-                            const std::vector<bool>& keep_edge) {
+TrueOptimum optimum_of_true(const LabelledTeamGraph& team) {
   TrueOptimum optimum;
-  for (const ConnectedPart& part : true_parts(team, keep_pose, keep_edge)) {
+  for (const ConnectedPart& part : true_parts(team)) {
     if (part.edges.empty()) {  // a single pose
       optimum.parts.push_back({part.poses, {SE3::Identity()}});
       continue;
@@ -63,12 +52,11 @@ TrueOptimum optimum_of_true(const LabelledTeamGraph& team, const std::vector<boo
   return optimum;
 }
 
-LabelCounts count_closures(const LabelledTeamGraph& team, const std::vector<bool>& known,
-                           const std::vector<bool>& kept) {
+LabelCounts count_closures(const LabelledTeamGraph& team, const std::vector<bool>& kept) {
   const std::vector<bool> odometry = odometry_edges(team.graph);
   LabelCounts counts;
   for (std::size_t k = 0; k < odometry.size(); ++k) {
-    if (odometry[k] || !known[k]) continue;
+    if (odometry[k]) continue;
     const BlockEdge& e = team.graph.edges[k];
     const bool inside = team.graph.robot_of(e.i) == team.graph.robot_of(e.j);
     ClosureCounts& count = inside ? counts.inside : counts.between;
@@ -114,16 +102,15 @@ TeamAte ate_of(const LabelledTeamGraph& team, const std::vector<SolvedPart>& par
 TruthScore score(const LabelledTeamGraph& team, const std::vector<SE3>& T_world_kf,
                  std::vector<bool> kept) {
   TruthScore score;
-  const std::vector<bool> all_edges = all_of(team.graph.edges.size());
   const bool labels = !team.truth.is_false.empty();
-  if (kept.empty()) kept = all_edges;
-  if (labels) score.closures = count_closures(team, all_edges, kept);
+  if (kept.empty()) kept.assign(team.graph.edges.size(), true);
+  if (labels) score.closures = count_closures(team, kept);
   if (team.truth.T_world_kf.empty()) return score;
   SolvedPart whole{std::vector<std::size_t>(T_world_kf.size()), T_world_kf};
   std::iota(whole.poses.begin(), whole.poses.end(), std::size_t{0});
   score.ate = ate_of(team, {std::move(whole)});
   if (!labels) return score;
-  const TrueOptimum optimum = optimum_of_true(team, all_of(team.graph.ids.size()), all_edges);
+  const TrueOptimum optimum = optimum_of_true(team);
   score.optimum_of_true = ate_of(team, optimum.parts);
   score.certified = optimum.certified;
   return score;

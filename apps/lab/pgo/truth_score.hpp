@@ -4,8 +4,8 @@
 #include <optional>
 #include <vector>
 
-#include "apps/lab/pgo_study/connected_parts.hpp"
-#include "apps/lab/pgo_study/team_graph_file.hpp"
+#include "apps/lab/pgo/connected_parts.hpp"
+#include "apps/lab/pgo/team_graph_file.hpp"
 
 namespace km {
 
@@ -56,15 +56,12 @@ struct TrueOptimum {
   bool certified = true;  ///< Every part is certified.
 };
 
-/// Optimum of the edges in `keep_edge` that are not labelled false. Precondition: labels.
-[[nodiscard]] TrueOptimum optimum_of_true(const LabelledTeamGraph& team,
-                                          const std::vector<bool>& keep_pose,
-                                          const std::vector<bool>& keep_edge);
+/// Optimum of the edges that are not labelled false. Precondition: labels.
+[[nodiscard]] TrueOptimum optimum_of_true(const LabelledTeamGraph& team);
 
-/// Counts the `known` closures by their labels and by whether they were `kept`. Both vectors are by
-/// edge of the graph. Steps of odometry do not count. Precondition: labels.
+/// Counts the closures by their labels and by whether they were `kept` (by edge of the graph).
+/// Steps of odometry do not count. Precondition: labels.
 [[nodiscard]] LabelCounts count_closures(const LabelledTeamGraph& team,
-                                         const std::vector<bool>& known,
                                          const std::vector<bool>& kept);
 
 /// Compares the poses of `parts` with the true ones. Poses without a true one do not count.

@@ -1,8 +1,6 @@
 #include <catch2/catch.hpp>
 
 #include <Eigen/Core>
-#include <cmath>
-#include <numbers>
 #include <random>
 
 #include "modules/core/symmetric_eigen.hpp"
@@ -30,22 +28,6 @@ TEST_CASE("Eigenvalues ascend and belong to orthonormal eigenvectors", "[core]")
         rounding);
   CHECK((eigen.vectors * eigen.values.asDiagonal() * eigen.vectors.transpose() - S).norm() <
         rounding * eigen.values.cwiseAbs().maxCoeff());
-}
-
-TEST_CASE("A tridiagonal matrix has the eigenvalues of the full one", "[core]") {
-  // With 2 on the diagonal and -1 beside it, they are 2 - 2 cos(k pi / (n + 1)) for k = 1 to n.
-  const Eigen::Index n = GENERATE(1, 2, 30);
-  CAPTURE(n);
-  const SymmetricEigen eigen =
-      tridiagonal_eigen(Eigen::VectorXd::Constant(n, 2.0), Eigen::VectorXd::Constant(n - 1, -1.0));
-  Eigen::MatrixXd A = 2.0 * Eigen::MatrixXd::Identity(n, n);
-  A.diagonal(1).setConstant(-1.0);
-  A.diagonal(-1).setConstant(-1.0);
-  for (Eigen::Index k = 0; k < n; ++k)
-    CHECK(eigen.values(k) ==
-          Approx(2.0 - 2.0 * std::cos(static_cast<double>(k + 1) * std::numbers::pi /
-                                      static_cast<double>(n + 1))));
-  CHECK((A * eigen.vectors - eigen.vectors * eigen.values.asDiagonal()).norm() < 1e-12);
 }
 
 TEST_CASE("Only the lower triangle of a symmetric matrix is read", "[core]") {

@@ -8,9 +8,9 @@
 #include <utility>
 #include <vector>
 
-#include "apps/lab/pgo_study/member_team.hpp"
-#include "apps/lab/pgo_study/odometry_start.hpp"
-#include "apps/lab/pgo_study/team_graph_file.hpp"
+#include "apps/lab/pgo/member_team.hpp"
+#include "apps/lab/pgo/odometry_start.hpp"
+#include "apps/lab/pgo/team_graph_file.hpp"
 #include "modules/outlier_rejection/pcm.hpp"
 #include "modules/outlier_rejection/witnessed_pair.hpp"
 #include "modules/pose_graph/tree_newton.hpp"

@@ -4,19 +4,16 @@
 #include <map>
 #include <random>
 #include <set>
-#include <sstream>
 #include <string>
 #include <vector>
 
+#include "apps/lab/pgo/outlier_study.hpp"
 #include "apps/lab/pgo/scenario.hpp"
-#include "apps/lab/pgo/scenario_study.hpp"
-#include "apps/lab/pgo_study/team_graph_file.hpp"
+#include "apps/lab/pgo/team_graph_file.hpp"
 #include "modules/core/lie.hpp"
 #include "modules/recorded_graph/g2o_io.hpp"
-#include "test/support/command.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/team_graphs.hpp"
-#include "test/support/temporary_folder.hpp"
 
 namespace km {
 namespace {
@@ -24,7 +21,6 @@ namespace {
 using Catch::Contains;
 using Eigen::Index;
 
-const std::string kScenarioTool = KM_BIN_DIR "/kimera_multi_pgo outliers ";
 constexpr NoiseSigma kStep{.rotation_rad = 0.002, .translation_m = 0.01};
 constexpr NoiseSigma kClosure{.rotation_rad = 0.005, .translation_m = 0.03};
 
@@ -87,7 +83,6 @@ TEST_CASE("The ratio of noise to claim is that of the scenario", "[scenario]") {
   const Whole whole(600);
   Scenario scenario = two_robots();
   scenario.odometry_noise = {{1, 7.0}};
-  scenario.odometry_sigma = {{0, 0.1}};
   scenario.closure_noise = {{0, 0.25}};
   const ScenarioGraph drawn = draw_scenario(whole.graph, whole.truth, scenario, seed);
   const std::vector<bool> odometry = odometry_edges(drawn.graph);
@@ -96,8 +91,7 @@ TEST_CASE("The ratio of noise to claim is that of the scenario", "[scenario]") {
     const BlockEdge& e = drawn.graph.edges[k];
     const auto robots = std::minmax({drawn.graph.robot_of(e.i), drawn.graph.robot_of(e.j)});
     (odometry[k] ? steps : closures)[robots].add(error_of(drawn, e));
-    const double better = odometry[k] && robots.first == 0 ? 0.1 : 1.0;
-    const double sigma_m = better * (odometry[k] ? kStep : kClosure).translation_m;
+    const double sigma_m = (odometry[k] ? kStep : kClosure).translation_m;
     CHECK(e.tau == Approx(1.0 / (sigma_m * sigma_m)));
   }
   CHECK(steps.size() == 2);  // no steps between the robots
@@ -261,25 +255,22 @@ TEST_CASE("A scenario that does not fit the graph is refused", "[scenario]") {
   refused([](Scenario& s) { s.robots = 40; }, "cannot be divided among 40 robots");
   refused([](Scenario& s) { s.clusters = {.places = 1, .size = 16}; }, "has 15 poses");
   refused([](Scenario& s) { s.cluster_robots = {1, 1}; }, "clusters between robots 1 and 1");
-  CHECK_THROWS_WITH(scenario_of("rain"), Contains("rain"));
 }
 
-// Every method on one drawn scenario.
-std::map<std::string, ScenarioResult> results_of(const Whole& whole, const Scenario& scenario) {
-  const ScenarioStudy study =
-      run_scenario_study(whole.graph, {.scenario = scenario, .seeds = {1}}, {});
-  std::map<std::string, ScenarioResult> results;
-  for (const ScenarioResult& result : study.results) results[result.method] = result;
-  REQUIRE(results.size() == kScenarioMethods.size());
+std::map<std::string, OutlierResult> results_of(const Whole& whole, const Scenario& scenario,
+                                                const std::vector<std::string>& methods) {
+  const OutlierStudy study =
+      run_outlier_study(whole.graph, {.scenario = scenario, .methods = methods}, {});
+  std::map<std::string, OutlierResult> results;
+  for (const OutlierResult& result : study.results) results[result.method] = result;
   return results;
 }
 
 TEST_CASE("Without noise every method finds the truth", "[scenario]") {
-  const Whole whole(90);
   Scenario scenario = two_robots();
   scenario.odometry_noise = {{0, 0.0}, {1, 0.0}};
   scenario.closure_noise = {{0, 0.0}, {1, 0.0}};
-  for (const auto& [method, result] : results_of(whole, scenario)) {
+  for (const auto& [method, result] : results_of(Whole(90), scenario, kRejections)) {
     CAPTURE(method);
     CHECK(result.decided);
     CHECK(result.true_lost == 0);
@@ -298,10 +289,10 @@ TEST_CASE("The central solver finds the truth of exact edges from a wrong start"
     for (double& e : error) e = normal(rng);
     T = T * se3_exp(error);
   }
-  Scenario scenario = two_robots();
-  scenario.odometry_noise = {{0, 0.0}, {1, 0.0}};
-  scenario.closure_noise = {{0, 0.0}, {1, 0.0}};
-  const ScenarioGraph drawn = draw_scenario(whole.graph, whole.truth, scenario, 1);
+  const ScenarioGraph drawn{.graph = whole.graph,
+                            .truth = whole.truth,
+                            .is_false = std::vector<bool>(whole.graph.edges.size(), false),
+                            .honest = {}};
   const std::vector<bool> all(drawn.graph.edges.size(), true);
   const PlacedTeam placed = solve_centrally(drawn.graph, all, start);
   CHECK(placed.decided);
@@ -309,69 +300,36 @@ TEST_CASE("The central solver finds the truth of exact edges from a wrong start"
   CHECK(judge(drawn, {start, placed.frame_of, all}).max_m > 0.05);
 }
 
-TEST_CASE("With honest noise the robots' error is close to the reference", "[scenario]") {
-  const Whole whole(90);
-  auto results = results_of(whole, two_robots());
-  CHECK(results["robots"].decided);
-  CHECK(results["robots"].true_lost == 0);
-  CHECK(results["reference"].rms_m > 1e-3);
-  CHECK(results["robots"].rms_m == Approx(results["reference"].rms_m).epsilon(0.01));
-  CHECK(results["trust-all"].rms_m == Approx(results["reference"].rms_m).epsilon(1e-6));
-}
-
 TEST_CASE("Kept false closures are counted by method", "[scenario]") {
-  const Whole whole(90);
   Scenario scenario = two_robots();
   scenario.random_percent = 20.0;
-  auto results = results_of(whole, scenario);
+  auto results = results_of(Whole(90), scenario, kRejections);
   for (const auto& [method, result] : results) {
     CAPTURE(method);
     const double due = 0.2 * static_cast<double>(result.true_closures);
     CHECK(result.false_closures == static_cast<std::size_t>(std::lround(due)));
     CHECK(result.false_kept == (method == "trust-all" ? result.false_closures : 0));
   }
+  CHECK(results["reference"].rms_m > 1e-3);
+  CHECK(results["newton"].rms_m == Approx(results["reference"].rms_m).epsilon(0.01));
   CHECK(results["gnc"].rms_m < 0.1);
   CHECK(results["trust-all"].rms_m > 10.0 * results["reference"].rms_m);
 }
 
 TEST_CASE("Robots without a true closure between them have a reference of two frames",
           "[scenario]") {
-  const Whole whole(90);
   Scenario scenario = two_robots();
   scenario.closures_per_pair = 0;
   scenario.clusters = {.places = 1, .size = 1};
-  auto results = results_of(whole, scenario);
+  auto results = results_of(Whole(90), scenario, {"reference", "trust-all"});
   CHECK(results["reference"].frames == 2);
   CHECK(results["reference"].max_m < 0.5);
   CHECK(results["trust-all"].frames == 1);
   CHECK(results["trust-all"].false_kept == 1);
 }
 
-TEST_CASE("A lower threshold keeps fewer closures, and methods without one run once",
-          "[scenario]") {
-  const Whole whole(90);
-  Scenario scenario = two_robots();
-  scenario.random_percent = 20.0;
-  const ScenarioStudy study = run_scenario_study(
-      whole.graph, {.scenario = scenario, .seeds = {1}, .thresholds = {1.0, 0.0, 1e5}}, {});
-  std::map<std::string, std::vector<ScenarioResult>> results;
-  for (const ScenarioResult& r : study.results) results[r.method].push_back(r);
-  CHECK(results["reference"].size() == 1);
-  CHECK(results["trust-all"].size() == 1);
-  for (const std::string method : {"robots", "pcm", "gnc"}) {
-    CAPTURE(method);
-    const auto& runs = results[method];
-    REQUIRE(runs.size() == 3);
-    CHECK(runs[0].true_lost > runs[0].true_closures / 10);
-    CHECK(runs[1].true_lost < runs[0].true_lost);
-    CHECK(runs[1].false_kept == 0);
-    CHECK(runs[2].true_lost == 0);
-  }
-  CHECK(results["gnc"][2].false_kept == results["gnc"][2].false_closures);
-}
-
 // Each scenario that a robust team must stand, on the graph that it is meant for.
-TEST_CASE("The robots' own code stands noise and places that are not as claimed", "[scenario]") {
+TEST_CASE("The robots' sessions stand noise and places that are not as claimed", "[scenario]") {
   struct Row {
     std::string scenario;
     std::string graph;
@@ -387,11 +345,11 @@ TEST_CASE("The robots' own code stands noise and places that are not as claimed"
   if (!file) return;
   const unsigned seed = GENERATE(2U, 4U);
   CAPTURE(row.scenario, seed);
-  const ScenarioStudy study = run_scenario_study(
+  const OutlierStudy study = run_outlier_study(
       partition_contiguously(read_g2o(*file), 1, row.graph),
-      {.scenario = scenario_of(row.scenario), .methods = {"robots", "reference"}, .seeds = {seed}},
+      {.scenario = scenario_of(row.scenario), .methods = {"newton", "reference"}, .seeds = {seed}},
       {});
-  const ScenarioResult& robots = study.results.at(0);
+  const OutlierResult& robots = study.results.at(0);
   CHECK(robots.decided);
   CHECK(robots.false_kept == 0);
   CHECK(static_cast<double>(robots.true_lost) <=
@@ -407,59 +365,11 @@ TEST_CASE("Odometry that is 20 times as noisy as it claims costs no true closure
   // With seed 10, robots whose closures inside are not weighed again lose 9 of 37 between robots.
   const unsigned seed = GENERATE(2U, 10U);
   CAPTURE(seed);
-  const ScenarioStudy study = run_scenario_study(
+  const OutlierStudy study = run_outlier_study(
       partition_contiguously(read_g2o(*file), 1, "sphere2500"),
-      {.scenario = scenario, .methods = {"robots", "reference"}, .seeds = {seed}}, {});
+      {.scenario = scenario, .methods = {"newton", "reference"}, .seeds = {seed}}, {});
   CHECK(study.results.at(0).true_lost == 0);
   CHECK(study.results.at(0).rms_m <= 1.1 * study.results.at(1).rms_m);
-}
-
-TEST_CASE("outliers runs a scenario that options have changed", "[scenario]") {
-  const TemporaryFolder folder;
-  std::string text;
-  for (int i = 0; i < 39; ++i)
-    text +=
-        "EDGE_SE3:QUAT " + std::to_string(i) + ' ' + std::to_string(i + 1) +
-        " 1 0 0 0 0 0.0871557 0.9961947 400 0 0 0 0 0 400 0 0 0 0 400 0 0 0 900 0 0 900 0 900\n";
-  for (int i = 0; i < 30; ++i)
-    text += "EDGE_SE3:QUAT " + std::to_string(i) + ' ' + std::to_string(i + 10) +
-            " 5.6712818 9.8229523 0 0 0 0.7660444 0.6427876 400 0 0 0 0 0 400 0 0 0 0 400 0 0 0 "
-            "900 0 0 900 "
-            "0 900\n";
-  const std::string graph = folder.write("laps.g2o", text).string();
-  const CommandResult result = run_command(
-      kScenarioTool + graph + " --scenario noisy-odometry --first 0 --robots 2 --seeds 4,5 " +
-      "--odometry-noise 1:2 --closure-share 1 --shares 10 --json " +
-      (folder.path() / "out.json").string() + " --csv " + (folder.path() / "out.csv").string() +
-      " --plot " + (folder.path() / "out.html").string());
-  CAPTURE(result.output);
-  REQUIRE(result.exit_code == 0);
-  CHECK_THAT(result.output, Contains("noisy-odometry: 40 poses, 2 robots") &&
-                                Contains("median / worst") && Contains("trust-all") &&
-                                Contains("of 30") && Contains("of 3 "));
-  const std::string csv = folder.read("out.csv");
-  CHECK(std::count(csv.begin(), csv.end(), '\n') == 11);
-  CHECK_THAT(csv, Contains("noisy-odometry,gnc,5,0,30,"));
-  CHECK_THAT(folder.read("out.json"), Contains("\"between_robots_lost\":"));
-}
-
-TEST_CASE("outliers refuses options that do not fit the kind of study", "[scenario]") {
-  const TemporaryFolder folder;
-  const std::string graph = folder.write("steps.g2o", "EDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\n").string();
-  const auto fails_with = [&](const std::string& arguments, const std::string& message) {
-    const CommandResult result = run_command(kScenarioTool + graph + arguments);
-    CAPTURE(arguments, result.output);
-    CHECK(result.exit_code == 1);
-    CHECK_THAT(result.output, Contains(message));
-  };
-  fails_with(" --scenario rain", "rain not in");
-  fails_with(" --scenario clusters --barc 3", "--barc is not for scenarios");
-  fails_with(" --scenario clusters --methods newton", "newton is not for scenarios");
-  fails_with(" --scenario clusters --shares 1,2", "one share");
-  fails_with(" --odometry-noise 1", "not two numbers");
-  fails_with(" --methods gnc --robots 1", "gnc is not for shares");
-  fails_with(" --csv out.csv --robots 1", "--csv is for scenarios only");
-  fails_with(" --robots 2", "--keep-steps");
 }
 
 }  // namespace

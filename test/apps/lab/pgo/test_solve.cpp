@@ -4,10 +4,8 @@
 #include <regex>
 #include <sstream>
 
-#include "apps/lab/pgo/solve_report.hpp"
 #include "modules/recorded_graph/g2o_io.hpp"
 #include "test/support/command.hpp"
-#include "test/support/page_text.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/temporary_folder.hpp"
 
@@ -28,6 +26,25 @@ std::string square_g2o() {
   for (int i = 0; i < 7; ++i) edge(i, i + 1, "1.02 0.01 1.58");
   for (int i = 0; i < 4; ++i) edge(i, i + 4, "0.01 -0.02 0.005");
   return text;
+}
+
+// A square in space, driven twice. Every pose except for the first has a vertical.
+std::string upright_square_g2o() {
+  G2oGraph graph;
+  const auto edge = [&](std::uint32_t i, std::uint32_t j, double angle, double x) {
+    const Eigen::AngleAxisd R(angle, Eigen::Vector3d::UnitZ());
+    graph.edges.push_back({{0, i},
+                           {0, j},
+                           make_pose(R.toRotationMatrix(), {x, 0.02, 0.01}),
+                           1e-2 * Matrix6::Identity()});
+  };
+  for (std::uint32_t i = 0; i < 7; ++i) edge(i, i + 1, 1.58, 1.02);
+  for (std::uint32_t i = 0; i < 4; ++i) edge(i, i + 4, 0.005, 0.01);
+  for (std::uint32_t i = 1; i < 8; ++i)
+    graph.verticals.push_back({{0, i}, {Eigen::Vector3d(0.02, -0.01 * i, 1.0).normalized(), 0.01}});
+  std::ostringstream text;
+  write_g2o(text, graph);
+  return text.str();
 }
 
 }  // namespace
@@ -52,15 +69,14 @@ TEST_CASE("Every method runs from the command line and prints its result", "[pgo
     CHECK_THAT(written, Contains(std::string("\"") + key + "\":"));
 }
 
-TEST_CASE("Poses and plot are written", "[pgo]") {
+TEST_CASE("Poses are written as TUM and g2o", "[pgo]") {
   const TemporaryFolder folder;
   const auto graph = folder.write("square.g2o", square_g2o());
   const auto tum = folder.path() / "poses.tum";
   const auto g2o = folder.path() / "poses.g2o";
-  const auto page = folder.path() / "gap.html";
   for (const auto& output : {tum, g2o})
     REQUIRE(run_command(kSolveTool + graph.string() + " --method centralized --output " +
-                        output.string() + " --plot " + page.string())
+                        output.string())
                 .exit_code == 0);
   const G2oGraph written = read_g2o(g2o);
   REQUIRE(written.vertices.size() == 8);
@@ -77,7 +93,6 @@ TEST_CASE("Poses and plot are written", "[pgo]") {
     CHECK((make_pose(q.toRotationMatrix(), t).matrix() - T.matrix()).norm() < 1e-12);
   }
   CHECK((rows >> std::ws).eof());
-  CHECK(data_of_page(folder.read("gap.html"), "plots")["charts"].size() == 3);
 }
 
 TEST_CASE("A graph without noise is certified and has no gap", "[pgo]") {
@@ -93,43 +108,12 @@ TEST_CASE("A graph without noise is certified and has no gap", "[pgo]") {
   CHECK_THAT(folder.read("out.json"), !Contains("nan") && Contains("\"certified\": true"));
 }
 
-TEST_CASE("The plot continues to the last round when no gap is left", "[pgo]") {
-  Solution solution;
-  solution.comparison = OptimumComparison{.optimum = 1.0};
-  for (const double gap : {0.02, 3e-5, 0.0, -1e-15}) {
-    const int round = 5 * static_cast<int>(solution.run.rounds.size());
-    solution.run.rounds.push_back({round, 1.0 + gap, 0.0, {}});
-  }
-  const std::vector<Plot> plots = gap_plots(solution);
-  REQUIRE(plots.size() == 3);
-  CHECK_THAT(plots[0].title, Contains("bottom"));
-  const std::vector<PlotPoint>& points = plots[0].series[0].points;
-  REQUIRE(points.size() == 4);
-  CHECK(points[1].y == Approx(3e-5));
-  for (const std::size_t k : {2, 3}) {  // decade below the least gap
-    CHECK(points[k].x == 5.0 * static_cast<double>(k));
-    CHECK(points[k].y == Approx(1e-5));
-  }
-  solution.run.rounds.resize(2);
-  CHECK_THAT(gap_plots(solution)[0].title, !Contains("bottom"));
-}
-
-TEST_CASE("A method without rounds still has a plot", "[pgo]") {
-  Solution solution;
-  solution.run.rounds.emplace_back().cost = 1.0;
-  solution.comparison = OptimumComparison{.optimum = 1.0};
-  const PlotSeries& series = gap_plots(solution)[0].series[0];
-  CHECK(series.points.size() == 1);
-  CHECK(series.style == PlotSeries::Style::kMarkedLine);
-}
-
 TEST_CASE("newton decides on closures and reports their noise", "[pgo]") {
   const TemporaryFolder folder;
   const std::string square = folder.write("square.g2o", square_g2o()).string();
   const std::string step = folder.write("step.g2o", "EDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\n").string();
   const auto json = folder.path() / "out.json";
-  for (const std::string& arguments : {step, square + " --robots 2", square + " --reject-odometry",
-                                       square + " --robots 2 --share-private"}) {
+  for (const std::string& arguments : {step, square + " --robots 2"}) {
     const CommandResult result = run_command(kSolveTool + arguments + " --json " + json.string());
     CAPTURE(arguments, result.output);
     CHECK(result.exit_code == 0);
@@ -146,8 +130,7 @@ TEST_CASE("solve refuses unusable input and options with the reason", "[pgo]") {
   const TemporaryFolder folder;
   const std::string graph = folder.write("square.g2o", square_g2o()).string();
   (void)folder.write("lone.g2o", "VERTEX_SE2 0 0 0 0\n");
-  (void)folder.write("others", "0 0\n1 0\n2 0\n3 0\n4 1\n5 1\n6 1\n7 1\n8 1\n");
-  (void)folder.write("halves", "0 0\n1 0\n2 0\n3 0\n4 1\n5 1\n6 1\n7 1\n");
+  (void)folder.write("upright.g2o", upright_square_g2o());
   const std::string unit = " 1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 1 0 0 1 0 1\n";
   (void)folder.write("far.g2o", "EDGE_SE3:QUAT 0 1 1 0 0 0 0 0 1" + unit +
                                     "EDGE_SE3:QUAT 1 2 1e308 0 0 0 0 0 1" + unit);
@@ -155,22 +138,18 @@ TEST_CASE("solve refuses unusable input and options with the reason", "[pgo]") {
   const auto [pattern, message] = GENERATE(table<std::string, std::string>(
       {{"FILE --robots 9", "8 poses, which cannot be divided among 9 robots"},
        {"FILE --method dgs --over-relaxation 1.5", "--over-relaxation is for"},
-       {"FILE --method newton --plot gap.html", "only, not for newton"},
        {"FILE --links ring", "ring not in {all,chain}"},
        {"FILE --method newton --trust-all --barc 5", "--barc is for --method newton only, not"},
        {"FILE --method rbcd --barc 5", "--barc is for --method newton only, not for rbcd"},
        {"FILE --method rbcd --trust-all", "--trust-all is for --method newton only"},
        {"FILE --json /nowhere/out.json", "there is no folder /nowhere"},
        {"FILE --json PLACE", "it is a folder"},
-       {"FILE --partition PLACE", "a folder, not a file"},
        {"PLACE/lone.g2o", "lone.g2o: no edge"},
        {"PLACE/far.g2o", "far.g2o:2: translation 1e+308 is outside -1e+06 .. 1e+06"},
        {"FILE --output poses.txt", "--output writes *.tum or *.g2o"},
-       {"FILE --partition FILE", "not two fields"},
-       {"FILE --robots 3 --partition PLACE/halves", "--robots 3: there are 2 robots"},
-       {"PLACE --partition FILE", "is a folder with one file per robot"},
        {"PLACE/none.g2o", "none.g2o"},
-       {"FILE --partition PLACE/others", "robot 1 is given pose 0:8, which the graph lacks"},
+       {"PLACE/upright.g2o --robots 2 --method dgs",
+        "method dgs does not know verticals, and the graph has 7: leave them out by --no-vertical"},
        {"FILE --method fastest", "fastest not in {local,dgs,rbcd"}}));
   const auto place = std::regex_replace(pattern, std::regex("PLACE"), folder.path().string());
   const auto arguments = std::regex_replace(place, std::regex("FILE"), graph);
@@ -194,29 +173,6 @@ TEST_CASE("The cost of a planar graph is that of the plane", "[pgo]") {
   CHECK_THAT(result.output, Contains("rank 2"));
   CHECK_THAT(result.output, Contains("\ncertified"));
 }
-
-namespace {
-
-// A square in space, driven twice. Every pose except for the first has a vertical.
-std::string upright_square_g2o() {
-  G2oGraph graph;
-  const auto edge = [&](std::uint32_t i, std::uint32_t j, double angle, double x) {
-    const Eigen::AngleAxisd R(angle, Eigen::Vector3d::UnitZ());
-    graph.edges.push_back({{0, i},
-                           {0, j},
-                           make_pose(R.toRotationMatrix(), {x, 0.02, 0.01}),
-                           1e-2 * Matrix6::Identity()});
-  };
-  for (std::uint32_t i = 0; i < 7; ++i) edge(i, i + 1, 1.58, 1.02);
-  for (std::uint32_t i = 0; i < 4; ++i) edge(i, i + 4, 0.005, 0.01);
-  for (std::uint32_t i = 1; i < 8; ++i)
-    graph.verticals.push_back({{0, i}, {Eigen::Vector3d(0.02, -0.01 * i, 1.0).normalized(), 0.01}});
-  std::ostringstream text;
-  write_g2o(text, graph);
-  return text.str();
-}
-
-}  // namespace
 
 TEST_CASE("Verticals of the file are used, reported and written", "[pgo][vertical]") {
   const TemporaryFolder folder;
@@ -248,18 +204,6 @@ TEST_CASE("Verticals of the file are used, reported and written", "[pgo][vertica
   CHECK(without.exit_code == 0);
   CHECK_THAT(without.output, Contains("8 poses, 10 edges, 2 robots"));
   CHECK_THAT(folder.read("out.json"), Contains("\"verticals\": 0"));
-}
-
-TEST_CASE("dgs refuses verticals and names the option that drops them", "[pgo][vertical]") {
-  const TemporaryFolder folder;
-  const auto graph = folder.write("square.g2o", upright_square_g2o());
-  const std::string command = kSolveTool + graph.string() + " --robots 2 --rounds 20 --method dgs";
-  const CommandResult refused = run_command(command);
-  CHECK(refused.exit_code == 1);
-  CHECK_THAT(refused.output,
-             Contains("method dgs does not know verticals, and the graph has 7: leave "
-                      "them out by --no-vertical"));
-  CHECK(run_command(command + " --no-vertical").exit_code == 0);
 }
 
 }  // namespace km

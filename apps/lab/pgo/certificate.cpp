@@ -1,0 +1,369 @@
+#include "apps/lab/pgo/certificate.hpp"
+
+#include <Spectra/SymEigsSolver.h>
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "modules/pose_graph/frontal_cholesky.hpp"
+
+namespace km {
+namespace {
+
+using Eigen::Index;
+
+constexpr double kCertifiedGap = 1e-4;
+constexpr double kTightGap = 1e-8;
+constexpr double kRounding = 1e-12;  // relative to the largest sum of kappa at a pose
+// Relative to the largest sum of kappa at a pose. With a smaller shift the Cholesky factorisation
+// of a singular S fails.
+constexpr double kLeastShift = 1e-14;
+constexpr double kShiftGrowth = 30.0;
+constexpr Index kKrylovSize = 60;
+constexpr Index kMaxRestarts = 1000;
+constexpr double kEigenTolerance = 1e-6;
+
+// 1 for the columns that have unit length in every solution: those of rotations, and the vertical.
+// 0 for translations and for the padding of the block of the vertical.
+Eigen::VectorXd unit_columns(const QuadraticProblem& problem) {
+  const Eigen::Index poses = problem.poses();
+  Eigen::VectorXd units = Eigen::Vector4d(1.0, 1.0, 1.0, 0.0).replicate(poses, 1);
+  if (problem.verticals().empty()) return units;
+  units.conservativeResize(4 * poses + 4);
+  units.tail<4>() = Eigen::Vector4d::Unit(2);
+  return units;
+}
+
+// `S` with `held` added to diagonal entries on which no cost depends: those of one translation and
+// of the padding of the block of the vertical.
+Eigen::SparseMatrix<double> hold(Eigen::SparseMatrix<double> S, const QuadraticProblem& problem,
+                                 double held) {
+  S.coeffRef(3, 3) += held;
+  if (!problem.verticals().empty())
+    for (const int filling : {0, 1, 3}) {
+      const Index k = 4 * problem.poses() + filling;
+      S.coeffRef(k, k) += held;
+    }
+  return S;
+}
+
+// Factorises S + shift * units for several shifts with one elimination plan.
+class ShiftedCholesky {
+ public:
+  explicit ShiftedCholesky(const Eigen::SparseMatrix<double>& S) : cholesky_(make_plan(S)) {
+    const std::vector<NodePair>& pairs = cholesky_.plan().pairs();
+    const auto nodes = static_cast<std::size_t>(cholesky_.plan().nodes());
+    S_ = BlockMatrix::zero(4, nodes, pairs.size());
+    int pair = 0;
+    for (int j = 0; j < cholesky_.plan().nodes(); ++j) {  // in the order of make_plan()
+      for (Index c = 0; c < 4; ++c)
+        for (Eigen::SparseMatrix<double>::InnerIterator s(S, 4 * j + c); s; ++s)
+          if (s.row() / 4 == j) S_.at(j)(s.row() % 4, c) = s.value();
+      const int first = pair;
+      while (pair < static_cast<int>(pairs.size()) && pairs[static_cast<std::size_t>(pair)][1] == j)
+        ++pair;
+      for (Index c = 0; c < 4; ++c) {
+        int here = first;
+        for (Eigen::SparseMatrix<double>::InnerIterator s(S, 4 * j + c); s && s.row() / 4 < j;
+             ++s) {
+          while (pairs[static_cast<std::size_t>(here)][0] != s.row() / 4) ++here;
+          S_.between(here)(s.row() % 4, c) = s.value();
+        }
+      }
+    }
+  }
+
+  // False: up to rounding, S + shift * units is not positive definite.
+  [[nodiscard]] bool factorise(const Eigen::VectorXd& units, double shift) {
+    A_ = S_;
+    for (Index i = 0; i < units.size(); ++i) A_.diagonal(i % 4, i) += shift * units(i);
+    return cholesky_.factorise(A_);
+  }
+
+  [[nodiscard]] Eigen::VectorXd solve(const Eigen::VectorXd& b) const {
+    Eigen::MatrixXd x = b;
+    cholesky_.forward(x);
+    cholesky_.backward(x);
+    return x;
+  }
+
+ private:
+  static std::shared_ptr<const EliminationPlan> make_plan(const Eigen::SparseMatrix<double>& S) {
+    const Index nodes = S.rows() / 4;
+    std::vector<NodePair> pairs;
+    std::vector<Index> seen(static_cast<std::size_t>(nodes), -1);
+    for (Index j = 0; j < nodes; ++j) {
+      const std::size_t first = pairs.size();
+      for (Index c = 0; c < 4; ++c)
+        for (Eigen::SparseMatrix<double>::InnerIterator s(S, 4 * j + c); s && s.row() / 4 < j;
+             ++s) {
+          Index& mark = seen[static_cast<std::size_t>(s.row() / 4)];
+          if (mark == j) continue;
+          mark = j;
+          pairs.push_back({static_cast<int>(s.row() / 4), static_cast<int>(j)});
+        }
+      std::sort(pairs.begin() + static_cast<std::ptrdiff_t>(first), pairs.end());
+    }
+    return std::make_shared<const EliminationPlan>(
+        std::vector<bool>(static_cast<std::size_t>(nodes), false), std::move(pairs));
+  }
+
+  FrontalCholesky cholesky_;
+  BlockMatrix S_;
+  BlockMatrix A_;
+};
+
+// X with the best translations for its rotations. Along long chains, translations can differ by
+// much from the best ones at nearly the same cost, and the bound would be loose.
+LiftedPoses with_best_translations(const QuadraticProblem& problem, LiftedPoses X, double held) {
+  const LiftedPoses XQ = 0.5 * problem.euclidean_gradient(X);
+  const Eigen::SparseMatrix<double>& Q = problem.data_matrix();
+  std::vector<Eigen::Triplet<double>> entries;
+  Eigen::MatrixXd residual(X.rows(), problem.poses());
+  for (Eigen::Index i = 0; i < problem.poses(); ++i) {
+    residual.col(i) = XQ.col(4 * i + 3);
+    for (Eigen::SparseMatrix<double>::InnerIterator q(Q, 4 * i + 3); q; ++q)
+      if (q.row() % 4 == 3)
+        entries.emplace_back(static_cast<int>(q.row() / 4), static_cast<int>(i), q.value());
+  }
+  entries.emplace_back(0, 0, held);
+  Eigen::SparseMatrix<double> L(problem.poses(), problem.poses());
+  L.setFromTriplets(entries.begin(), entries.end());
+  const Eigen::MatrixXd correction = BlockCholesky(L).solve_rows(residual);
+  for (Eigen::Index i = 0; i < problem.poses(); ++i) X.col(4 * i + 3) -= correction.col(i);
+  return X;
+}
+
+// X after the smallest common rotation that minimises the cost of the priors. The cost of a common
+// tilt is quadratic in its angle, but it loosens the bound linearly. Microradians of tilt can
+// loosen the bound by more than the cost.
+LiftedPoses with_best_tilt(const QuadraticProblem& problem, const LiftedPoses& X) {
+  Eigen::VectorXd up = Eigen::VectorXd::Zero(X.rows());
+  for (const VerticalPrior& v : problem.verticals())
+    up += v.weight * (X.middleCols<3>(4 * v.pose) * v.up);
+  const Eigen::VectorXd z = lifting_matrix(X.rows()).col(2);
+  constexpr double kOverhead = -0.5;  // cosine; at larger angles the smallest rotation is
+                                      // ill-conditioned
+  const double norm = up.norm();
+  if (!(up.dot(z) > kOverhead * norm)) return X;
+  up /= norm;
+  const Eigen::VectorXd middle = up + z;
+  return X - middle * (middle.transpose() * X) / (1.0 + up.dot(z)) + 2.0 * z * (up.transpose() * X);
+}
+
+// Appends the rows and columns of the vertical to S. On the rotations the priors are linear,
+// because |Y up| is 1. They contribute equally to Q and to Lambda there.
+void append_vertical(const QuadraticProblem& problem, const LiftedPoses& X,
+                     std::vector<Eigen::Triplet<double>>& entries) {
+  const Eigen::VectorXd z = lifting_matrix(X.rows()).col(2);
+  const int place = static_cast<int>(4 * problem.poses()) + 2;
+  for (const VerticalPrior& v : problem.verticals()) {
+    for (int c = 0; c < 3; ++c) {
+      const int row = static_cast<int>(4 * v.pose) + c;
+      entries.emplace_back(row, place, -v.weight * v.up(c));
+      entries.emplace_back(place, row, -v.weight * v.up(c));
+    }
+    entries.emplace_back(place, place, v.weight * z.dot(X.middleCols<3>(4 * v.pose) * v.up));
+  }
+}
+
+// Changes `direction` so that the vertical stays constant, by a multiple of the row of [X z] along
+// z. This row is in the kernel of S.
+Eigen::VectorXd with_vertical_held(const Eigen::VectorXd& direction, const LiftedPoses& X) {
+  const double moved = direction.size() > X.cols() ? direction(X.cols() + 2) : 0.0;
+  return direction.head(X.cols()) - moved * X.row(2).transpose();
+}
+
+// sym(Y_i^T (X Q)_Y,i) of every pose, side by side. The bound of certify() holds for every X,
+// because S and tr(Lambda) use the same multipliers.
+Eigen::Matrix3Xd multipliers(const QuadraticProblem& problem, const LiftedPoses& X) {
+  const LiftedPoses XQ = 0.5 * problem.euclidean_gradient(X);
+  Eigen::Matrix3Xd Lambda(3, 3 * problem.poses());
+  for (Index i = 0; i < problem.poses(); ++i) {
+    const Eigen::Matrix3d product = X.middleCols<3>(4 * i).transpose() * XQ.middleCols<3>(4 * i);
+    Lambda.middleCols<3>(3 * i) = 0.5 * (product + product.transpose());
+  }
+  return Lambda;
+}
+
+// tr(Lambda) plus the multiplier of the vertical and the constant terms of the priors.
+double dual_value(const QuadraticProblem& problem, const LiftedPoses& X,
+                  const Eigen::Matrix3Xd& Lambda) {
+  double sum = 0.0;
+  for (Index i = 0; i < problem.poses(); ++i) sum += Lambda.middleCols<3>(3 * i).trace();
+  const Eigen::VectorXd z = lifting_matrix(X.rows()).col(2);
+  for (const VerticalPrior& v : problem.verticals())
+    sum += v.weight * (1.0 + v.up.squaredNorm() - z.dot(X.middleCols<3>(4 * v.pose) * v.up));
+  return sum;
+}
+
+struct Eigenpair {
+  double value = 0.0;
+  Eigen::VectorXd vector;
+};
+
+// The block of the inverse on `units`, as an operator of Spectra.
+struct InverseOnUnits {
+  using Scalar = double;
+
+  const ShiftedCholesky& cholesky;
+  const Eigen::VectorXd& units;
+
+  [[nodiscard]] Index rows() const { return units.size(); }
+  [[nodiscard]] Index cols() const { return units.size(); }
+  void perform_op(const double* in, double* out) const {
+    const Eigen::Map<const Eigen::VectorXd> x(in, units.size());
+    Eigen::Map<Eigen::VectorXd>(out, units.size()) =
+        units.cwiseProduct(cholesky.solve(units.cwiseProduct(x)));
+  }
+};
+
+// Eigenvalue problem of certify(), with one pose held at the origin.
+class ProofOf {
+ public:
+  ProofOf(const QuadraticProblem& problem, const LiftedPoses& X) : units_(unit_columns(problem)) {
+    const double held = problem.largest_degrees().y();
+    best_ = with_best_tilt(problem, with_best_translations(problem, X, held));
+    cholesky_.emplace(hold(certificate_matrix(problem, best_), problem, held));
+    dual_ = dual_value(problem, best_, multipliers(problem, best_));
+  }
+
+  [[nodiscard]] bool definite(double shift) { return cholesky_->factorise(units_, shift); }
+
+  // Lower bound of the cost of all points that cost at most as much as X. Precondition:
+  // definite(shift) was called last and returned true.
+  [[nodiscard]] double bound(double shift) const {
+    return std::max(0.0, dual_ - shift * units_.sum());
+  }
+
+  // The smallest eigenvalue, from above, and its direction; nullopt if the iterations do not
+  // converge. Their operator is the block of (S + shift)^-1 on the rotations: the inverse of the
+  // shifted Schur complement. Precondition: definite(shift) was called last and returned true.
+  [[nodiscard]] std::optional<Eigenpair> smallest_eigenpair(double shift, unsigned seed) const {
+    std::mt19937 rng(seed);
+    std::normal_distribution<double> normal;
+    Eigen::VectorXd start(units_.size());
+    for (double& v : start) v = normal(rng);
+    InverseOnUnits inverse{*cholesky_, units_};
+    Spectra::SymEigsSolver<InverseOnUnits> lanczos(inverse, 1, std::min(kKrylovSize, start.size()));
+    lanczos.init(start.data());
+    if (lanczos.compute(Spectra::SortRule::LargestAlge, kMaxRestarts, kEigenTolerance) == 0)
+      return std::nullopt;
+    return Eigenpair{
+        1.0 / lanczos.eigenvalues()(0) - shift,
+        with_vertical_held(cholesky_->solve(lanczos.eigenvectors().col(0)), best_).normalized()};
+  }
+
+  [[nodiscard]] double trace() const { return units_.sum(); }
+
+ private:
+  Eigen::VectorXd units_;
+  LiftedPoses best_;
+  std::optional<ShiftedCholesky> cholesky_;
+  double dual_ = 0.0;
+};
+
+// If `refused` > 0, the factorisation with this shift was not definite, so the smallest eigenvalue
+// is below -refused. A larger Ritz value shows that the start was nearly orthogonal to the
+// eigenvector, and other starts are tried.
+std::optional<Eigenpair> eigenpair_below(const ProofOf& proof, double shift, double refused,
+                                         unsigned seed) {
+  constexpr unsigned kStarts = 4;
+  constexpr unsigned kBetweenSeeds = 1000;
+  std::optional<Eigenpair> least = proof.smallest_eigenpair(shift, seed);
+  for (unsigned k = 1; refused > 0.0 && k < kStarts && !(least && least->value <= -refused); ++k) {
+    std::optional<Eigenpair> other = proof.smallest_eigenpair(shift, seed + k * kBetweenSeeds);
+    if (other && !(least && least->value <= other->value)) least = std::move(other);
+  }
+  return least;
+}
+
+}  // namespace
+
+Eigen::SparseMatrix<double> certificate_matrix(const QuadraticProblem& problem,
+                                               const LiftedPoses& X) {
+  const Eigen::Matrix3Xd Lambda = multipliers(problem, X);
+  const Eigen::SparseMatrix<double>& Q = problem.data_matrix();
+  std::vector<Eigen::Triplet<double>> entries;
+  entries.reserve(static_cast<std::size_t>(Q.nonZeros() + 9 * problem.poses()) +
+                  7 * problem.verticals().size());
+  for (Eigen::Index j = 0; j < Q.cols(); ++j)
+    for (Eigen::SparseMatrix<double>::InnerIterator q(Q, j); q; ++q)
+      entries.emplace_back(static_cast<int>(q.row()), static_cast<int>(j), q.value());
+  for (Eigen::Index i = 0; i < problem.poses(); ++i) {
+    for (int r = 0; r < 3; ++r)
+      for (int c = 0; c < 3; ++c)
+        entries.emplace_back(static_cast<int>(4 * i) + r, static_cast<int>(4 * i) + c,
+                             -Lambda(r, 3 * i + c));
+  }
+  append_vertical(problem, X, entries);
+  const Eigen::Index size = Q.rows() + (problem.verticals().empty() ? 0 : 4);
+  Eigen::SparseMatrix<double> S(size, size);
+  S.setFromTriplets(entries.begin(), entries.end());
+  return S;
+}
+
+Certificate certify(const QuadraticProblem& problem, const LiftedPoses& X) {
+  ProofOf proof(problem, X);
+  const double degree = problem.largest_degrees().x();
+  const double cost = problem.cost(X);
+  const double scale = std::max(cost, kRounding * degree * proof.trace());
+  const double allowed = std::max(0.5 * kCertifiedGap * cost / proof.trace(), kLeastShift * degree);
+  const double tight = std::max(kTightGap * cost / proof.trace(), kLeastShift * degree);
+  Certificate certificate;
+  double shift = tight;
+  double refused = 0.0;  // largest shift that was too small
+  for (const double tried : {tight, allowed}) {
+    if (proof.definite(shift = tried)) break;
+    refused = shift;
+  }
+  if (refused == allowed) {
+    shift = std::max(kShiftGrowth * refused, kRounding * degree);
+    while (!proof.definite(shift)) {
+      refused = shift;
+      shift *= kShiftGrowth;
+    }
+  }
+  const auto prove = [&] {
+    certificate.lambda_bound = -shift;
+    certificate.relative_gap = std::max(0.0, (cost - proof.bound(shift)) / scale);
+    certificate.certified = certificate.relative_gap <= kCertifiedGap;
+  };
+  prove();
+  if (certificate.certified) return certificate;
+  // The start differs between ranks. The Krylov space of a start contains only one eigenvector of a
+  // multiple eigenvalue, and the last escape has already used that one.
+  if (auto least = eigenpair_below(proof, shift, refused, static_cast<unsigned>(X.rows()))) {
+    certificate.lambda_min = least->value;
+    certificate.direction = std::move(least->vector);
+  }
+  return certificate;
+}
+
+LiftedPoses escape(const QuadraticProblem& problem, const LiftedPoses& X,
+                   const Eigen::VectorXd& direction) {
+  LiftedPoses lifted = LiftedPoses::Zero(X.rows() + 1, X.cols());
+  lifted.topRows(X.rows()) = X;
+  LiftedPoses step = LiftedPoses::Zero(lifted.rows(), lifted.cols());
+  step.bottomRows(1) = direction.transpose();
+  const double cost = problem.cost(lifted);
+  // In the first trial the pose that rotates most rotates by half a radian.
+  double largest = 0.0;
+  for (Eigen::Index i = 0; i < problem.poses(); ++i)
+    largest = std::max(largest, direction.segment<3>(4 * i).norm());
+  constexpr int kMaxHalvings = 40;
+  double length = 0.5 / std::max(largest, 1e-300);
+  LiftedPoses best = lifted;
+  double best_cost = cost;
+  for (int k = 0; k < kMaxHalvings; ++k, length *= 0.5) {
+    LiftedPoses candidate = retract(lifted, length * step);
+    const double candidate_cost = problem.cost(candidate);
+    if (candidate_cost >= best_cost && best_cost < cost) break;
+    if (candidate_cost >= best_cost) continue;
+    best = std::move(candidate);
+    best_cost = candidate_cost;
+  }
+  return best;
+}
+
+}  // namespace km

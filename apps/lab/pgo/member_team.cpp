@@ -1,0 +1,230 @@
+#include "apps/lab/pgo/member_team.hpp"
+
+#include <algorithm>
+#include <set>
+#include <stdexcept>
+#include <utility>
+
+#include "apps/lab/pgo/odometry_start.hpp"
+#include "modules/pose_graph/lone_solution.hpp"
+#include "modules/pose_graph/odometry_judgement.hpp"
+#include "modules/pose_graph/pose_edge.hpp"
+#include "modules/pose_graph/precision_limits.hpp"
+#include "modules/pose_graph/team_plan.hpp"
+
+namespace km {
+
+using Eigen::Index;
+
+namespace {
+
+// Corrects weights as robots do when a session begins. All robots know the weights of each other.
+void weigh_as_robots(std::vector<SessionGraph>& parts) {
+  std::map<RobotId, OdometryNoise> noise;
+  for (SessionGraph& part : parts) {
+    const std::span<PoseEdge> own(part.own);
+    const OdometryJudgement judgement =
+        judge_odometry(own.first(part.odometry), own.subspan(part.odometry));
+    judgement.correct(own.first(part.odometry));
+    noise[part.self] = judgement.noise;
+  }
+  for (SessionGraph& part : parts) {
+    for (auto& [robot, step] : part.step_precision) step = noise.at(robot).corrected(step);
+    limit_precisions(part);
+  }
+}
+
+}  // namespace
+
+MemberTeam::MemberTeam(const TeamGraph& graph, Index rank, std::vector<SE3> start, Factory make,
+                       TeamShape shape, bool as_robots)
+    : graph_(graph),
+      rank_(rank),
+      make_(std::move(make)),
+      parts_(graph.robots()),
+      sent_(graph.robots(), 0),
+      received_(graph.robots(), 0) {
+  if (static_cast<Index>(start.size()) != graph.poses())
+    throw std::invalid_argument("MemberTeam: " + std::to_string(start.size()) +
+                                " start poses for " + std::to_string(graph.poses()));
+  for (std::size_t k = 0; k < parts_.size(); ++k) parts_[k] = part_of(graph, k);
+  if (as_robots) {
+    weigh_as_robots(parts_);
+    solve_alone_first(start);
+  }
+  places_ = places(shape);
+  announce_starts(std::move(start));
+  open_session();
+  take_poses();
+}
+
+// Places in the tree that the robots' own plan_tree() computes.
+std::map<std::size_t, TreePlace> MemberTeam::places(TeamShape shape) const {
+  std::map<RobotId, TeamStatus> statuses;
+  TeamLinks links;
+  for (const SessionGraph& part : parts_) {
+    TeamStatus& status = statuses[part.self];
+    status.sender = {part.self, 1};
+    std::map<RobotId, std::uint32_t> edges;
+    for (const PoseEdge& e : part.between) ++edges[e.other(part.self).robot];
+    for (const auto& [peer, count] : edges) status.offers.push_back({peer, count, {1, count}});
+    std::set<RobotId> received;
+    for (const SessionGraph& other : parts_) {
+      const bool beside = other.self + 1 == part.self || part.self + 1 == other.self;
+      if (other.self != part.self && (shape == TeamShape::kAll || beside))
+        received.insert(other.self);
+    }
+    links.report(part.self, received);
+  }
+  SessionPlan plan = plan_session(statuses, 0);
+  plan_tree(plan, statuses, links);
+  if (plan.members.size() != parts_.size())
+    throw std::invalid_argument("MemberTeam: the graph does not join all robots");
+  std::map<std::size_t, TreePlace> places;
+  for (std::size_t k = 0; k < parts_.size(); ++k)
+    places[k] = place_in(plan, static_cast<RobotId>(k)).value();
+  return places;
+}
+
+void MemberTeam::solve_alone_first(std::vector<SE3>& start) {
+  for (std::size_t k = 0; k < parts_.size(); ++k) {
+    SessionGraph alone = parts_[k];
+    const auto begin = start.begin() + graph_.first[k];
+    alone.start.assign(begin, start.begin() + graph_.first[k + 1]);
+    std::ranges::copy(relaxed_start(std::move(alone), {}, {.dimension = graph_.dimension}), begin);
+  }
+  start = placed_by_closures(graph_, std::move(start));
+}
+
+// Sends all public poses to all robots in single precision, as MemberPoses does.
+void MemberTeam::announce_starts(std::vector<SE3> start) {
+  std::set<KeyframeId> ends;
+  for (const SessionGraph& part : parts_)
+    for (const PoseEdge& e : part.between) ends.insert({e.from, e.to});
+  std::map<KeyframeId, SE3> public_poses;
+  for (const KeyframeId& id : ends) {
+    SE3& T = start[static_cast<std::size_t>(graph_.first[id.robot] + id.index)];
+    T = SinglePose::of(T).pose();
+    public_poses[id] = T;
+  }
+  constexpr std::size_t kBytes = sizeof(float) * 7 + 2;
+  to_announce_ = kBytes * ends.size();
+  for (const KeyframeId& id : ends)
+    for (std::size_t k = 0; k < parts_.size(); ++k) {
+      if (k == id.robot) continue;
+      sent_[id.robot] += kBytes;
+      received_[k] += kBytes;
+    }
+  for (std::size_t k = 0; k < parts_.size(); ++k) {
+    parts_[k].start.assign(start.begin() + graph_.first[k], start.begin() + graph_.first[k + 1]);
+    parts_[k].public_poses.clear();
+    for (const PoseEdge& e : parts_[k].between) {
+      const KeyframeId& other = e.other(parts_[k].self);
+      parts_[k].public_poses[other] = public_poses.at(other);
+    }
+  }
+}
+
+void MemberTeam::open_session() {
+  const auto before = std::exchange(members_, {});
+  in_flight_.clear();
+  for (std::size_t k = 0; k < parts_.size(); ++k) {
+    parts_[k].decided = decisions_.decided();
+    if (k < before.size()) parts_[k].noise = before[k]->noise();
+    members_.push_back(make_(parts_[k], places_.at(k)));
+  }
+  rounds_before_ = rounds_;
+}
+
+void MemberTeam::take_poses() {
+  blocks_.clear();
+  for (const auto& member : members_) blocks_.push_back(lift(member->poses(), rank_));
+  for (std::size_t k = 0; k < members_.size(); ++k)
+    if (!places_.at(k).parent) state_ = members_[k]->state();
+}
+
+int MemberTeam::step(RoundMeter& meter) {
+  if (done() && !reconsider()) return 0;
+  meter.sent(std::exchange(to_announce_, 0));
+  const std::uint32_t before = rounds_;
+  const std::uint32_t round = rounds_ - rounds_before_ + 1;
+  const auto arrived = [&] {
+    return std::all_of(members_.begin(), members_.end(),
+                       [&](const auto& m) { return m->done() || m->state().round >= round; });
+  };
+  while (!arrived())
+    if (!pass_on(round, meter))
+      throw std::runtime_error("MemberTeam: the members wait for each other");
+  take_poses();
+  // A solver may publish its state every few rounds only.
+  rounds_ = rounds_before_ + std::max(round, state_.round);
+  return static_cast<int>(rounds_ - before);
+}
+
+bool MemberTeam::done() const {
+  return std::all_of(members_.begin(), members_.end(), [](const auto& m) { return m->done(); });
+}
+
+// Every member that is ready advances, except for members that have completed `round` already.
+bool MemberTeam::pass_on(std::uint32_t round, RoundMeter& meter) {
+  bool worked = !in_flight_.empty();
+  for (const Delivery& delivery : std::exchange(in_flight_, {})) {
+    received_[delivery.message.to] += delivery.message.bytes->size();
+    const bool taken = meter.run(delivery.message.to, [&] {
+      return members_[delivery.message.to]->receive(delivery.from, *delivery.message.bytes);
+    });
+    if (!taken)
+      throw std::runtime_error("MemberTeam: robot " + std::to_string(delivery.message.to) +
+                               " refuses a message of robot " + std::to_string(delivery.from));
+  }
+  for (std::size_t k = 0; k < members_.size(); ++k) {
+    if (members_[k]->state().round >= round || !members_[k]->ready()) continue;
+    worked = true;
+    for (SolverMessage& message : meter.run(k, [&] { return members_[k]->advance(); })) {
+      meter.sent(message.bytes->size());
+      sent_[k] += message.bytes->size();
+      in_flight_.push_back({static_cast<RobotId>(k), std::move(message)});
+    }
+  }
+  meter.finish_exchange();
+  return worked;
+}
+
+bool MemberTeam::reconsider() {
+  for (const auto& member : members_) decisions_.decide(member->verdicts().closures, false);
+  if (!state_.deferred) return false;
+  std::vector<SE3> poses;
+  for (const auto& member : members_)
+    poses.insert(poses.end(), member->poses().begin(), member->poses().end());
+  const auto pose = [&](const KeyframeId& id) {
+    return poses[static_cast<std::size_t>(graph_.first[id.robot] + id.index)];
+  };
+  bool any = false;
+  for (const SessionGraph& part : parts_) {
+    std::vector<PoseEdge> closures(part.own.begin() + static_cast<std::ptrdiff_t>(part.odometry),
+                                   part.own.end());
+    for (const PoseEdge& e : part.between)
+      if (part.self < e.other(part.self).robot) closures.push_back(e);
+    any |= decisions_.reconsider(closures, pose, state_.barc);
+  }
+  if (!any) return false;
+  announce_starts(std::move(poses));
+  open_session();
+  return true;
+}
+
+std::vector<bool> MemberTeam::kept() const {
+  std::map<ClosureId, bool> verdict;
+  for (const auto& member : members_)
+    for (const WeighedClosure& closure : member->verdicts().closures)
+      verdict[closure.id] = closure.kept;
+  std::vector<bool> kept = odometry_edges(graph_);
+  for (std::size_t k = 0; k < kept.size(); ++k) {
+    const BlockEdge& e = graph_.edges[k];
+    const auto found = verdict.find(closure_id(graph_.keyframe_of(e.i), graph_.keyframe_of(e.j)));
+    kept[k] = kept[k] || found == verdict.end() || found->second;
+  }
+  return kept;
+}
+
+}  // namespace km

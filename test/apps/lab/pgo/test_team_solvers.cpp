@@ -1,0 +1,148 @@
+#include <catch2/catch.hpp>
+
+#include "apps/lab/pgo/gauss_seidel_team.hpp"
+#include "apps/lab/pgo/local_team.hpp"
+#include "apps/lab/pgo/member_team.hpp"
+#include "apps/lab/pgo/staircase.hpp"
+#include "modules/pose_graph/chordal.hpp"
+#include "modules/rbcd/member_rbcd.hpp"
+#include "test/support/pose_graph_problems.hpp"
+#include "test/support/shared_data.hpp"
+#include "test/support/team_graphs.hpp"
+
+namespace km {
+namespace {
+
+// Relative effect of single precision on a cost. A rounded pose has a relative error of 6e-8, and
+// squared residuals have twice that, times their weights.
+constexpr double kSinglePrecision = 1e-6;
+constexpr double kSmallGridOptimum = 1025.398056;  // SE-Sync, unit quaternions
+
+std::vector<SE3> chordal(const TeamGraph& graph) {
+  return chordal_initialisation(graph.poses(), graph.edges);
+}
+
+double certified_optimum_of(const TeamGraph& graph) {
+  Staircase staircase(graph.edges, lift(chordal(graph), 3));
+  while (staircase.step()) {
+  }
+  REQUIRE(staircase.certificate()->certified);
+  return staircase.cost();
+}
+
+// Clock that advances by one unit at every use.
+TeamMeter counting_meter(double& clock) {
+  return {.cpu_s = [&clock] { return clock += 1.0; }};
+}
+
+MemberTeam rbcd_team(const TeamGraph& graph, std::vector<SE3> start, const RbcdOptions& options) {
+  return {graph, 3, std::move(start), [options](SessionGraph part, const TreePlace& place) {
+            return std::make_unique<MemberRbcd>(std::move(part), place, options);
+          }};
+}
+
+}  // namespace
+
+TEST_CASE("The work of a round has the times of its slowest robot and of all robots", "[pgo]") {
+  double clock = 0.0;
+  RoundMeter meter(3, counting_meter(clock));
+  meter.run(0, [] {});
+  meter.run(0, [] {});
+  CHECK(meter.run(2, [] { return 7; }) == 7);
+  meter.sent(3);
+  meter.sent(4);
+  const TeamWork work = meter.finish_round();
+  CHECK(work.critical_path_s == 2.0);
+  CHECK(work.total_cpu_s == 3.0);
+  CHECK(work.bytes == 7);
+  CHECK(meter.finish_round().total_cpu_s == 0.0);
+}
+
+TEST_CASE("The critical path of a round is the sum over its exchanges", "[pgo]") {
+  double clock = 0.0;
+  RoundMeter meter(2, counting_meter(clock));
+  meter.run(0, [] {});
+  meter.run(0, [] {});
+  meter.run(1, [] {});
+  meter.finish_exchange();
+  meter.run(1, [] {});
+  const TeamWork work = meter.finish_round();
+  CHECK(work.critical_path_s == 3.0);
+  CHECK(work.total_cpu_s == 4.0);
+}
+
+TEST_CASE("A round of block descent counts the bytes of its messages", "[pgo][rbcd]") {
+  const WoundRing ring(24, 3);  // each robot's first and last pose are public
+  const Eigen::Index rank = GENERATE(3, 5);
+  MemberTeam team = rbcd_team(ring.graph, ring.wound, {.rank = rank, .max_rounds = 1});
+  const auto rounds = run_team(ring.graph, team, {}, {});
+  REQUIRE(rounds.size() == 2);
+  CHECK(rounds[1].round == 1);
+  constexpr std::size_t kHeader = 2;                        // kind and round
+  const auto numbers = static_cast<std::size_t>(4 * rank);  // numbers per pose
+  const std::size_t starts = 6 * (7 * sizeof(float) + 2);
+  const std::size_t poses = 6 * (kHeader + numbers * sizeof(float));
+  const std::size_t shares = 2 * 2 * (kHeader + 2 * sizeof(double) + 1);  // before and after the
+                                                                          // round
+  const std::size_t progress = 2 * (kHeader + 2 + (2 + numbers) * sizeof(double));
+  CHECK(rounds[1].work.bytes == starts + poses + shares + progress);
+}
+
+TEST_CASE("Robots of one colour share no edges, and all have a colour", "[pgo]") {
+  const TeamGraph graph = WoundRing(24, 12).graph;
+  const TeamNeighbours neighbours = neighbours_in(graph);
+  std::size_t coloured = 0;
+  for (const auto& members : colours_of(neighbours)) {
+    coloured += members.size();
+    for (const std::size_t a : members)
+      for (const std::size_t b : members)
+        CHECK_FALSE(std::binary_search(neighbours[a].begin(), neighbours[a].end(), b));
+  }
+  CHECK(coloured == 12);
+  CHECK(colours_of(neighbours).size() == 2);  // a ring with an even number of robots
+  const TeamTree tree = breadth_first_tree(neighbours);
+  CHECK(tree.order.size() == 12);
+}
+
+TEST_CASE("Gauss-Seidel sweeps of a team reach the result of one robot", "[pgo]") {
+  const std::size_t robots = GENERATE(2U, 4U);
+  CAPTURE(robots);
+  std::mt19937 rng(2);
+  const TeamGraph graph = noisy_chain(40, robots, 0.05, rng);
+  TeamGraph alone = graph;
+  alone.first = {0, 40};
+  const GaussSeidelOptions exact{.max_sweeps = 2000, .tolerance = 1e-7};
+  const auto cost_of = [&](const TeamGraph& partitioned) {
+    GaussSeidelTeam team(partitioned, chordal(graph), exact);
+    return run_team(partitioned, team, {.max_rounds = 20000}, {}).back().cost;
+  };
+  const double team_cost = cost_of(graph);
+  // Positions of some 100 m are sent in single precision, and slow modes accumulate the rounding
+  // errors.
+  CHECK(team_cost == Approx(cost_of(alone)).epsilon(1e-2));
+  // One Gauss-Newton step from the chordal rotations improves on them, and cannot be better than
+  // the optimum.
+  const QuadraticProblem problem(3, 40, graph.edges, {});
+  CHECK(team_cost < problem.cost(lift(chordal(graph), 3)));
+  CHECK(team_cost >= certified_optimum_of(graph) * (1.0 - 1e-9));
+}
+
+TEST_CASE("Without noise, robots that solve alone and are joined have no cost", "[pgo]") {
+  std::mt19937 rng(4);
+  const TeamGraph graph = noisy_chain(30, 3, 0.0, rng);
+  LocalTeam team(graph);
+  const auto rounds = run_team(graph, team, {}, {});
+  CHECK(rounds.size() == 3);  // the start, solving alone, joining robot 0
+  CHECK(rounds.back().cost < 1e-9);
+}
+
+TEST_CASE("A robot whose own edges do not connect its poses cannot solve alone", "[pgo]") {
+  std::mt19937 rng(4);
+  TeamGraph graph = noisy_chain(30, 3, 0.0, rng);
+  std::erase_if(graph.edges, [&](const BlockEdge& e) {
+    return (e.i == 15 || e.j == 15) && graph.robot_of(e.i) == graph.robot_of(e.j);
+  });
+  CHECK_THROWS_WITH(LocalTeam(graph), Catch::Contains("robot 1 cannot solve alone"));
+}
+
+}  // namespace km
