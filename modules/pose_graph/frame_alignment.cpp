@@ -13,27 +13,16 @@ namespace {
 constexpr int kMaxRefinements = 20;
 
 // Squared distance in units of the tolerance.
-class Distance {
- public:
-  explicit Distance(const AlignmentTolerance& tolerance)
-      // ||R_1 - R_2||_F = 2 sqrt(2) sin(angle / 2).
-      : max_chordal_(2.0 * std::sqrt(2.0) * std::sin(0.5 * tolerance.rotation_rad)),
-        max_translation_(tolerance.translation_m) {}
+double distance(const SE3& a, const SE3& b) {
+  // ||R_1 - R_2||_F = 2 sqrt(2) sin(angle / 2).
+  static const double kLargestChordal = 2.0 * std::sqrt(2.0) * std::sin(0.5 * kAlignedRotation_rad);
+  const double rotation = (a.linear() - b.linear()).norm() / kLargestChordal;
+  const double translation = (a.translation() - b.translation()).norm() / kAlignedTranslation_m;
+  const double d = std::max(rotation, translation);
+  return d * d;
+}
 
-  double operator()(const SE3& a, const SE3& b) const {
-    const double rotation = (a.linear() - b.linear()).norm() / max_chordal_;
-    const double translation = (a.translation() - b.translation()).norm() / max_translation_;
-    const double d = std::max(rotation, translation);
-    return d * d;
-  }
-
- private:
-  double max_chordal_;
-  double max_translation_;
-};
-
-std::vector<std::size_t> inliers_of(const SE3& T, std::span<const SE3> candidates,
-                                    const Distance& distance) {
+std::vector<std::size_t> inliers_of(const SE3& T, std::span<const SE3> candidates) {
   std::vector<std::size_t> inliers;
   for (std::size_t k = 0; k < candidates.size(); ++k)
     if (distance(T, candidates[k]) <= 1.0) inliers.push_back(k);
@@ -50,17 +39,13 @@ SE3 average(std::span<const SE3> candidates, const std::vector<std::size_t>& inl
 }  // namespace
 
 std::optional<FrameAlignment> align_frames(std::span<const SE3> candidates,
-                                           const AlignmentTolerance& tolerance,
                                            const std::vector<double>& given_weights) {
-  if (!(tolerance.rotation_rad > 0.0 && tolerance.translation_m > 0.0))
-    throw std::invalid_argument("align_frames: a tolerance is not positive");
   if (candidates.empty()) return std::nullopt;
   std::vector<double> weights = given_weights;
   if (weights.empty()) weights.resize(candidates.size(), 1.0);
   if (weights.size() != candidates.size() ||
       !std::ranges::all_of(weights, [](double w) { return w > 0.0; }))
     throw std::invalid_argument("align_frames: not a positive weight for each candidate");
-  const Distance distance(tolerance);
   std::size_t best = 0;
   double best_cost = std::numeric_limits<double>::infinity();
   for (std::size_t k = 0; k < candidates.size(); ++k) {
@@ -72,10 +57,10 @@ std::optional<FrameAlignment> align_frames(std::span<const SE3> candidates,
       best = k;
     }
   }
-  FrameAlignment result{candidates[best], inliers_of(candidates[best], candidates, distance)};
+  FrameAlignment result{candidates[best], inliers_of(candidates[best], candidates)};
   for (int i = 0; i < kMaxRefinements; ++i) {
     const SE3 T = average(candidates, result.inliers);
-    auto inliers = inliers_of(T, candidates, distance);
+    auto inliers = inliers_of(T, candidates);
     if (inliers.empty()) break;  // candidates on a ring are far from their average
     const bool settled = inliers == result.inliers;
     result = {T, std::move(inliers)};

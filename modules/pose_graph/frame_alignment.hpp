@@ -9,11 +9,10 @@
 
 namespace km {
 
-/// Largest distance of two candidates for one transform that agree.
-struct AlignmentTolerance {
-  double rotation_rad = 0.3;
-  double translation_m = 10.0;
-};
+// Largest distance of two candidates for one transform that agree. It allows for the drift of
+// odometry between them.
+inline constexpr double kAlignedRotation_rad = 0.3;
+inline constexpr double kAlignedTranslation_m = 10.0;
 
 struct [[nodiscard]] FrameAlignment {
   SE3 T = SE3::Identity();
@@ -29,9 +28,8 @@ struct [[nodiscard]] FrameAlignment {
 /// Translations are compared at the origin of the frames. This origin should be near the
 /// measurements, because otherwise rotation errors count a second time through the lever arm.
 /// nullopt if there is no candidate. O(n^2). `weights` w: one per candidate; empty: all are 1.
-/// Throws std::invalid_argument if a tolerance or a weight is not positive.
+/// Throws std::invalid_argument if a weight is not positive.
 [[nodiscard]] std::optional<FrameAlignment> align_frames(std::span<const SE3> candidates,
-                                                         const AlignmentTolerance& tolerance,
                                                          const std::vector<double>& weights = {});
 
 }  // namespace km

@@ -18,7 +18,7 @@ namespace km {
 /// nullopt if no closure ends on a received pose.
 [[nodiscard]] std::optional<std::vector<SE3>> moved_into_frame(
     const std::vector<SE3>& poses, RobotId self, std::span<const PoseEdge> closures,
-    const std::map<KeyframeId, SE3>& received, const AlignmentTolerance& tolerance);
+    const std::map<KeyframeId, SE3>& received);
 
 /// Deforms `poses`, in the frame of the `received` poses, by solve_alone() on the own edges
 /// and on the closures to received poses, which stay fixed. A long odometry drifts so far that no

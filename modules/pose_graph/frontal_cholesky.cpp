@@ -289,22 +289,4 @@ void FrontalCholesky::place_kept(const BlockMatrix& kept, BlockMatrix& inverse) 
   }
 }
 
-double FrontalCholesky::magnitude(const Eigen::VectorXd& b) const {
-  double sum = 0.0;
-  for (std::size_t f = 0; f < factors_.size(); ++f) {
-    const EliminationPlan::Front& front = plan_->fronts()[f];
-    Eigen::VectorXd rows(factors_[f].rows());
-    for (std::size_t k = 0; k < front.nodes.size(); ++k)
-      rows.segment(block_ * static_cast<Index>(k), block_) =
-          b.segment(block_ * front.nodes[k], block_);
-    // The upper triangle of the pivot block is not part of the factor.
-    for (Index c = 0; c < factors_[f].cols(); ++c) {
-      const Index below = factors_[f].rows() - c;
-      const double column = factors_[f].col(c).tail(below).cwiseAbs().dot(rows.tail(below));
-      sum += column * column;
-    }
-  }
-  return sum;
-}
-
 }  // namespace km

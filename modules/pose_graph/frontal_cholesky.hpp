@@ -37,11 +37,6 @@ class FrontalCholesky {
   /// In single precision.
   [[nodiscard]] BlockMatrix selected_inverse(const BlockMatrix& kept) const;
 
-  /// | |L|^T b |^2 for a vector b >= 0 of (B nodes) entries. L has the columns of the eliminated
-  /// nodes. Times the rounding unit, it bounds the error of b^T A b by the rounding of the
-  /// factorisation, up to a constant.
-  [[nodiscard]] double magnitude(const Eigen::VectorXd& b) const;
-
   [[nodiscard]] const EliminationPlan& plan() const { return *plan_; }
 
  private:

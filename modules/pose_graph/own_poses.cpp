@@ -34,16 +34,15 @@ std::vector<PoseEdge> weighed_to_start(std::vector<PoseEdge> edges) {
 
 // True if more than half of the places of `closures` agree with the poses. O(n log n), unlike the
 // search for the transform on which most of them agree.
-bool fits(std::span<const PoseEdge> closures, const std::vector<SE3>& poses,
-          const AlignmentTolerance& tolerance) {
+bool fits(std::span<const PoseEdge> closures, const std::vector<SE3>& poses) {
   const ClosurePlaces places = find_places(closures);
   const std::vector<double> weights = places.weights();
   double agreeing = 0.0;
   for (std::size_t k = 0; k < closures.size(); ++k) {
     const PoseEdge& e = closures[k];
     const SE3 error = poses[e.to.index].inverse() * poses[e.from.index] * e.T_from_to;
-    if (angle_of(error.linear()) <= tolerance.rotation_rad &&
-        error.translation().norm() <= tolerance.translation_m)
+    if (angle_of(error.linear()) <= kAlignedRotation_rad &&
+        error.translation().norm() <= kAlignedTranslation_m)
       agreeing += weights[k];
   }
   return 2.0 * agreeing > static_cast<double>(places.sizes.size());
@@ -83,14 +82,13 @@ void OwnPoses::correct(std::span<const OdometryBreak> breaks) {
   }
 }
 
-void OwnPoses::place_runs(const OwnGraph& graph, RobotId self,
-                          const AlignmentTolerance& tolerance) {
+void OwnPoses::place_runs(const OwnGraph& graph, RobotId self) {
   const std::vector<KeyframeIndex>& runs = graph.later_runs();
   for (std::size_t k = 0; k < runs.size(); ++k) {
     const KeyframeIndex begin = runs[k];
     const KeyframeIndex end = k + 1 < runs.size() ? runs[k + 1] : graph.keyframes();
     std::vector<PoseEdge> across = graph.closures_across(begin, end);
-    if (fits(across, T_frame_kf_, tolerance)) continue;
+    if (fits(across, T_frame_kf_)) continue;
     // The runs before count as another robot, into whose frame this run moves.
     const RobotId before = self + 1;
     std::map<KeyframeId, SE3> received;
@@ -100,7 +98,7 @@ void OwnPoses::place_runs(const OwnGraph& graph, RobotId self,
         received[{before, id->index}] = T_frame_kf_[id->index];
         id->robot = before;
       }
-    const auto moved = moved_into_frame(T_frame_kf_, self, across, received, tolerance);
+    const auto moved = moved_into_frame(T_frame_kf_, self, across, received);
     if (!moved) continue;
     const SE3 T_new_old = (*moved)[begin] * T_frame_kf_[begin].inverse();
     for (std::size_t i = begin; i < T_frame_kf_.size(); ++i)

@@ -32,9 +32,9 @@ class OwnPoses {
   void correct(std::span<const OdometryBreak> breaks);
 
   /// Moves every later run (OwnGraph::later_runs()) as a whole to where most of its closures to the
-  /// runs before it agree. A run stays if most of them agree with its place already, up to
-  /// `tolerance`. Precondition: extend().
-  void place_runs(const OwnGraph& graph, RobotId self, const AlignmentTolerance& tolerance);
+  /// runs before it agree. A run stays if most of them agree with its place already.
+  /// Precondition: extend().
+  void place_runs(const OwnGraph& graph, RobotId self);
 
   /// Moves keyframe 0, the origin of an absolute frame.
   void place_first(const SE3& T_frame_first) { T_frame_kf_.front() = T_frame_first; }

@@ -156,7 +156,7 @@ std::optional<PairMotion> motion_of_pair(std::span<const PoseEdge> closures, Rob
     result.radius_m += (placed.translation() - result.centre).squaredNorm();
   }
   result.radius_m = std::sqrt(result.radius_m / static_cast<double>(ends.size()));
-  const auto alignment = align_frames(candidates, {}, weights);
+  const auto alignment = align_frames(candidates, weights);
   const SE3 T = alignment->T * to_centre.inverse();
   result.T = SinglePose::of(T);
   for (const PoseEdge& e : closures) {

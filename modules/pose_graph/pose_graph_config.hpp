@@ -1,7 +1,5 @@
 #pragma once
 
-#include <numbers>
-
 #include "modules/core/config.hpp"
 #include "modules/pose_graph/pgo_method.hpp"
 
@@ -14,23 +12,12 @@ struct PoseGraphConfig {
   PgoMethod method = PgoMethod::kNewton;
   bool robust = true;
   double barc = 0.0;
-  bool share_private = false;
-  bool covariances = true;
   double scale_sigma = 0.003;
-  int rank = 5;
   int max_rounds = 0;
   double exchange_budget_kb_s = 20.0;
   double session_growth = 3.0;
   double session_wait_s = 240.0;
   double refinement_period_s = 5.0;
-  double min_relative_decrease = 1e-7;
-  int max_newton_steps = 3;
-  int max_cg_iterations = 50;
-  double max_over_relaxation = 1.95;
-  double alignment_rotation_rad = 0.3;
-  double alignment_translation_m = 10.0;
-  double publish_period_s = 1.0;
-  double status_period_s = 1.0;
 
   void visit_fields(auto& visitor) {
     visitor.field("method", method, kPgoMethods,
@@ -40,17 +27,11 @@ struct PoseGraphConfig {
     visitor.field("barc", barc, {0.0, 1e6},
                   "[sigma] newton: largest residual (square root of the cost) of a closure that is "
                   "kept; equal on all robots; 0: the team estimates it from the closures");
-    visitor.field("share_private", share_private,
-                  "newton: send relative poses between private poses if that saves bytes; other "
-                  "robots can then derive parts of the trajectory of this robot");
-    visitor.field("covariances", covariances,
-                  "newton: compute the covariances of the optimised poses at the end of a session");
     visitor.field(
         "scale_sigma", scale_sigma, {0.0, 1.0},
         "standard deviation of the scale of the map, which calibration limits: published "
         "covariances contain this share of the distance from the origin of the frame; not "
         "with fixes or a finished map, which determine the scale");
-    visitor.field("rank", rank, {3, 10}, "rbcd: rank r of the relaxation; equal on all robots");
     visitor.field("max_rounds", max_rounds, {0, 1000000},
                   "rounds after which a session ends even if it has not converged; the paper stops "
                   "early after 50; 0: no limit");
@@ -71,27 +52,6 @@ struct PoseGraphConfig {
                   "[s] newton: shortest time between refinements of the own poses between "
                   "sessions, by new closures and without a message, in at most a twentieth of the "
                   "time; 0: no refinements");
-    visitor.field("min_relative_decrease", min_relative_decrease, {0.0, 0.1},
-                  "rbcd: relative decrease of the team cost in a round below which the session has "
-                  "converged");
-    visitor.field("max_newton_steps", max_newton_steps, {1, 100},
-                  "rbcd: Newton steps in one block update");
-    visitor.field("max_cg_iterations", max_cg_iterations, {1, 10000},
-                  "rbcd: products with the Hessian in one Newton step");
-    visitor.field("max_over_relaxation", max_over_relaxation, {1.0, 1.99},
-                  "rbcd: largest relaxation of a block update, where 1 ends at the minimum of the "
-                  "block; it grows from 1.5 to this over the rounds of a session");
-    visitor.field("alignment_rotation_rad", alignment_rotation_rad, {1e-3, std::numbers::pi},
-                  "[rad] largest difference of two closures that agree on the frame of a new "
-                  "robot; it allows for the drift of odometry between them");
-    visitor.field("alignment_translation_m", alignment_translation_m, {1e-3, 1e4},
-                  "[m] largest difference of two closures that agree on the frame of a new robot");
-    visitor.field("publish_period_s", publish_period_s, {0.01, 60.0},
-                  "[s] shortest time between published trajectories during a session");
-    visitor.field("status_period_s", status_period_s, {0.01, 60.0},
-                  "[s] period of the messages of a coordinator; a status is sent when it has "
-                  "changed, at most twice per period, and once if only the robot's own graph has "
-                  "grown");
   }
 };
 

@@ -54,11 +54,9 @@ double default_threshold(int dimension) {
                                   : chi_squared_6_quantile(kInlierProbability));
 }
 
-void RobustSchedule::start(float largest_residual, std::uint32_t open_edges, double barc,
-                           int unweighed_steps) {
+void RobustSchedule::start(float largest_residual, std::uint32_t open_edges, double barc) {
   decided_ = open_edges == 0;
   open_ = open_edges;
-  unweighed_steps_ = decided_ ? 0 : unweighed_steps;
   mu_ = first_mu(static_cast<double>(largest_residual) * largest_residual, barc * barc);
   updates_ = 1;
   hard_updates_ = mu_ >= kHardMu ? 1 : 0;
@@ -66,10 +64,6 @@ void RobustSchedule::start(float largest_residual, std::uint32_t open_edges, dou
 
 void RobustSchedule::next(const Tally& tally) {
   if (decided_) return;
-  if (unweighed_steps_ > 0) {
-    --unweighed_steps_;
-    return;
-  }
   const bool same = tally.changed == 0;
   const bool hard = mu_ >= kHardMu;
   decided_ = (same && (tally.fractional == 0 || hard)) || (hard && hard_updates_ >= kHardUpdates) ||

@@ -34,11 +34,10 @@ class RobustSchedule {
     std::uint32_t fractional = 0;  ///< Number of weights strictly between 0 and 1.
   };
 
-  /// Begins with the edges that may be rejected: their number is `open_edges`, and their largest
+  /// Begins with the closures that may be rejected: their number is `open_edges`, and their largest
   /// residual is `largest_residual` [sigma]. If `open_edges` is zero, all weights are final.
-  /// `barc`: largest residual of an inlier [sigma]. All weights are 1 during the first
-  /// `unweighed_steps` steps of the poses.
-  void start(float largest_residual, std::uint32_t open_edges, double barc, int unweighed_steps);
+  /// `barc`: largest residual of an inlier [sigma].
+  void start(float largest_residual, std::uint32_t open_edges, double barc);
   /// To be called once per accepted step of the poses, with the sums of the last weighing.
   /// Increases mu or ends the schedule.
   void next(const Tally& tally);
@@ -46,14 +45,12 @@ class RobustSchedule {
   /// which they became 0 or 1. False if the limit of repetitions is reached.
   [[nodiscard]] bool reopen();
 
-  [[nodiscard]] bool unweighed() const { return unweighed_steps_ > 0; }
   [[nodiscard]] bool decided() const { return decided_; }
   [[nodiscard]] double mu() const { return mu_; }
 
  private:
   double mu_ = 0.0;
   std::uint32_t open_ = 0;  // closures that may be rejected
-  int unweighed_steps_ = 0;
   int updates_ = 0;
   int hard_updates_ = 0;  // updates since mu exceeded kHardMu
   int reopened_ = 0;

@@ -6,6 +6,7 @@
 
 #include "modules/pose_graph/frame_entry.hpp"
 #include "modules/pose_graph/precision_limits.hpp"
+#include "modules/pose_graph/status_schedule.hpp"
 
 namespace km {
 namespace {
@@ -25,8 +26,7 @@ void add_public_poses(const MemberPoses& poses, std::map<KeyframeId, SE3>& publi
 }  // namespace
 
 SessionPart::SessionPart(Session session, TeamPeer self, FrozenPart part,
-                         MemberSolverFactory factory, const AlignmentTolerance& tolerance,
-                         double period_s, double now_s)
+                         MemberSolverFactory factory, double now_s)
     : session_(std::move(session)),
       self_(self),
       graph_(std::move(part.graph)),
@@ -35,8 +35,7 @@ SessionPart::SessionPart(Session session, TeamPeer self, FrozenPart part,
       closures_may_be_false_(part.closures_may_be_false),
       public_(std::move(part.public_keyframes)),
       factory_(std::move(factory)),
-      tolerance_(tolerance),
-      channel_(self, session_.id, period_s),
+      channel_(self, session_.id, kTeamStatusPeriod_s),
       started_s_(now_s),
       last_activity_s_(now_s) {
   for (const SessionMember& member : session_.plan.members)
@@ -129,7 +128,7 @@ bool SessionPart::align(const PublicPoses& published) {
   // A datum tie alone is enough, because several fixes agree on it; closures may all be false.
   std::optional<std::vector<SE3>> moved;
   for (const auto* edges : {&graph_.datum_ties, &kept, &closures})
-    if (!moved) moved = moved_into_frame(graph_.start, self_.robot, *edges, poses, tolerance_);
+    if (!moved) moved = moved_into_frame(graph_.start, self_.robot, *edges, poses);
   if (!moved) return false;
   closures.insert(closures.end(), graph_.datum_ties.begin(), graph_.datum_ties.end());
   graph_.start = closures_may_be_false_

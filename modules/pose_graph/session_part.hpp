@@ -11,7 +11,6 @@
 #include <utility>
 #include <vector>
 
-#include "modules/pose_graph/frame_alignment.hpp"
 #include "modules/pose_graph/frozen_part.hpp"
 #include "modules/pose_graph/member_solver.hpp"
 #include "modules/pose_graph/reliable_channel.hpp"
@@ -38,7 +37,7 @@ using MemberSolverFactory = std::function<std::unique_ptr<MemberSolver>(
 class SessionPart {
  public:
   SessionPart(Session session, TeamPeer self, FrozenPart part, MemberSolverFactory factory,
-              const AlignmentTolerance& tolerance, double period_s, double now_s);
+              double now_s);
 
   /// Does one piece of work, if there is any, and returns the messages to send.
   [[nodiscard]] std::vector<ReliableMessage> advance(const PublicPoses& published, double now_s);
@@ -133,7 +132,6 @@ class SessionPart {
   std::vector<SinglePose> entered_;  // poses of public_, when the robot entered the frame
   std::vector<ClosureId> between_;   // to other members, ascending
   MemberSolverFactory factory_;
-  AlignmentTolerance tolerance_;
   std::map<RobotId, std::uint64_t> boot_of_;  // members
   ReliableChannel channel_;
   std::map<std::pair<RobotId, std::uint32_t>, ReliableMessage> early_;  // before there is a solver

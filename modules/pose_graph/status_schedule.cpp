@@ -22,12 +22,12 @@ bool same_rest(const TeamStatus& a, const TeamStatus& b) {
 }  // namespace
 
 bool StatusSchedule::may_be_due(double now_s) const {
-  return now_s - last_s_ >= kEarly * period_s_;
+  return now_s - last_s_ >= kEarly * kTeamStatusPeriod_s;
 }
 
 StatusSchedule::Due StatusSchedule::due(const TeamStatus& status, double now_s) {
   const bool urgent = !sent_ || !same_rest(status, *sent_);
-  if (!urgent && now_s - last_s_ < period_s_) return Due::kNo;
+  if (!urgent && now_s - last_s_ < kTeamStatusPeriod_s) return Due::kNo;
   last_s_ = now_s;
   if (!urgent && same_graph_size(status, *sent_)) return Due::kProgress;
   sent_ = status;

@@ -6,13 +6,14 @@
 
 namespace km {
 
+/// Period of the messages of a coordinator, and of statuses [s].
+inline constexpr double kTeamStatusPeriod_s = 1.0;
+
 /// When a robot sends its status: when it has changed, but at most twice per period. It is sent
 /// only once per period if nothing but keyframes and closures inside the robot are new, because
 /// these open no session before the team is at rest. Not thread-safe.
 class StatusSchedule {
  public:
-  explicit StatusSchedule(double period_s) : period_s_(period_s) {}
-
   /// False if the last status is so recent that none is due.
   [[nodiscard]] bool may_be_due(double now_s) const;
   enum class Due { kNo, kProgress, kStatus };
@@ -21,7 +22,6 @@ class StatusSchedule {
   [[nodiscard]] Due due(const TeamStatus& status, double now_s);
 
  private:
-  double period_s_;
   std::optional<TeamStatus> sent_;
   double last_s_ = -1e9;  // time of the last status or progress
 };

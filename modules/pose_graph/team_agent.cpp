@@ -11,6 +11,11 @@
 // team_agent_session.cpp.
 
 namespace km {
+namespace {
+
+constexpr double kPublishPeriod_s = 1.0;  // shortest, during a session
+
+}  // namespace
 
 TeamAgent::TeamAgent(const PoseGraphConfig& config, TeamPeer self, MemberSolverFactory factory)
     : config_(checked(config)),
@@ -18,7 +23,6 @@ TeamAgent::TeamAgent(const PoseGraphConfig& config, TeamPeer self, MemberSolverF
       factory_(std::move(factory)),
       graph_(self.robot),
       roster_(self, config_.method),
-      status_schedule_(config_.status_period_s),
       notices_(self.robot),
       schedule_(config_),
       frame_(self),
@@ -316,7 +320,7 @@ const std::vector<SE3>& TeamAgent::poses() const {
 }
 
 void TeamAgent::publish(TeamOutput& output) {
-  const bool early = now_s_ - published_s_ < config_.publish_period_s;
+  const bool early = now_s_ - published_s_ < kPublishPeriod_s;
   if (!frame_.world() || (in_session() && early)) return;
   const auto world = tied_world();
   if (!world || (!publish_due_ && published_anchor_ == world->anchor)) return;

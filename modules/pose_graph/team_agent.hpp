@@ -185,9 +185,6 @@ class TeamAgent {
   [[nodiscard]] std::optional<FrozenPart> freeze(const Session& session) const;
   void extend_poses();
   void set_start(SessionGraph& graph) const;
-  [[nodiscard]] AlignmentTolerance tolerance() const {
-    return {config_.alignment_rotation_rad, config_.alignment_translation_m};
-  }
   [[nodiscard]] bool expects_false() const {
     return config_.robust && config_.method == PgoMethod::kNewton;
   }

@@ -51,7 +51,7 @@ void TeamAgent::coordinate(TeamOutput& output) {
   }
   if (coordinator_of(plan_) != self_.robot) return;
   if (should_open()) open_session(output);
-  const bool due = now_s_ - session_sent_s_ >= config_.status_period_s;
+  const bool due = now_s_ - session_sent_s_ >= kTeamStatusPeriod_s;
   if (in_session() && part_->session().id.coordinator == self_ && due) announce(output);
 }
 
@@ -103,8 +103,7 @@ bool TeamAgent::has_moved_on() const {
 bool TeamAgent::should_open() const {
   if (!part_) return true;
   const Session& session = part_->session();
-  const bool hopeless =
-      now_s_ - part_->last_activity_s() > kHopelessPeriods * config_.status_period_s;
+  const bool hopeless = now_s_ - part_->last_activity_s() > kHopelessPeriods * kTeamStatusPeriod_s;
   const bool stalled = in_session() && (state_ == SessionState::kDeserted || hopeless);
   if (same_graph(session.plan, plan_))
     return session.finished ? has_moved_on() : !in_session() || stalled;
@@ -226,8 +225,7 @@ bool TeamAgent::join(const Session& session) {
   if (!alone && expects_false())
     part->graph.start =
         relaxed_start(part->graph, known_poses(session.plan.frame), {.barc = config_.barc});
-  part_.emplace(session, self_, std::move(*part), factory_, tolerance(), config_.status_period_s,
-                now_s_);
+  part_.emplace(session, self_, std::move(*part), factory_, now_s_);
   if (roster_.find(session.id.coordinator.robot) != nullptr)
     roster_.at(session.id.coordinator.robot).joined = session.id.number;
   state_ = SessionState::kRunning;
@@ -238,7 +236,7 @@ bool TeamAgent::join(const Session& session) {
 void TeamAgent::extend_poses() {
   poses_.extend(graph_);
   poses_.correct(graph_.odometry_breaks());
-  poses_.place_runs(graph_, self_.robot, tolerance());
+  poses_.place_runs(graph_, self_.robot);
 }
 
 void TeamAgent::set_start(SessionGraph& graph) const {

@@ -411,6 +411,7 @@ std::optional<DownMessage> decode_down(std::span<const std::uint8_t> bytes) {
   v.round = r.varint_as<std::uint32_t>();
   const std::uint8_t next = r.u8(), weighing = r.u8(), flags = r.u8();
   if (next > static_cast<std::uint8_t>(TreeVerdict::Next::kStop) ||
+      weighing < static_cast<std::uint8_t>(TreeVerdict::Weighing::kWeigh) ||
       weighing > static_cast<std::uint8_t>(TreeVerdict::Weighing::kDecided) || flags > 31)
     return std::nullopt;
   v.next = static_cast<TreeVerdict::Next>(next);

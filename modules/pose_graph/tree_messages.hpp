@@ -120,9 +120,8 @@ struct TreeVerdict {
     kDone,     ///< The new poses are accepted; this was the last round.
     kStop,     ///< The new poses are not accepted; the accepted ones are the result.
   };
-  /// Weights of this round. kUnweighed: all are 1. kWeigh: new ones. kHold: unchanged. kDecided:
-  /// final.
-  enum class Weighing : std::uint8_t { kUnweighed, kWeigh, kHold, kDecided };
+  /// Weights of this round. kWeigh: new ones. kHold: unchanged. kDecided: final.
+  enum class Weighing : std::uint8_t { kWeigh = 1, kHold, kDecided };
 
   std::uint32_t round = 0;  ///< Round to which this is the answer.
   Next next = Next::kStep;

@@ -103,9 +103,6 @@ void TreeNewton::classify() {
         known_[k].trust = Trust::kOpen;
     }
   }
-  if (options_.reject_odometry)
-    for (Known& k : known_)
-      if (k.odometry) k.trust = Trust::kOpen;
 }
 
 // Indices in known_ of closures, by the other robot of the pair; closures inside this robot by its
@@ -233,8 +230,6 @@ void TreeNewton::build_front() {
     front.held[e.other(graph_.self)] = start_of(e.other(graph_.self));
   }
   for (const PoseEdge& e : graph_.between) front.open.insert(e.end_on(graph_.self).index);
-  if (options_.share_private)
-    for (KeyframeIndex k = 0; k < graph_.start.size(); ++k) front.open.insert(k);
   front_.emplace(std::move(front));
   return_to_start();
   present_ = base_;

@@ -12,8 +12,6 @@ namespace {
 
 using Weighing = TreeVerdict::Weighing;
 
-// Weight of a rejected step of odometry, so that the trajectory stays connected.
-constexpr double kRejectedStepWeight = 1e-6;
 // kStrongest: largest strength of a pair while closures are weighed, relative to the usual pair, so
 // that no pair overrules the others. At the end, kept closures have their own weight, except for
 // pairs that the other edges contradict. The mean error of the closures of such a pair exceeds
@@ -121,9 +119,7 @@ void TreeNewton::weigh_candidates(TreeSums& sums) {
     }
     const double r = residual_of(known.edge, pose_at(known.edge.from, present_),
                                  pose_at(known.edge.to, present_));
-    const double least = known.odometry ? kRejectedStepWeight : 0.0;
-    const double weight =
-        std::max(least, robust_weight(r * r, c2, decided ? kLargestMu : verdict_.mu));
+    const double weight = robust_weight(r * r, c2, decided ? kLargestMu : verdict_.mu);
     const bool weighs = verdict_.weighing == Weighing::kWeigh;
     if (weighs && known.contradicted) known.settled = false;
     known.contradicted = known.settled && decided && weight != known.weight;
@@ -136,8 +132,8 @@ void TreeNewton::weigh_candidates(TreeSums& sums) {
     ++sums.open;
     sums.largest = std::max(sums.largest, static_cast<float>(r));
     if ((decided ? weight : known.candidate) != known.weight) ++sums.changed;
-    if (known.candidate != least && known.candidate != 1.0) ++sums.fractional;
-    sums.kept += !known.odometry && known.candidate > 0.5 ? 1 : 0;
+    if (known.candidate != 0.0 && known.candidate != 1.0) ++sums.fractional;
+    sums.kept += known.candidate > 0.5 ? 1 : 0;
     sums.rejected += k >= inside_ && known.candidate <= 0.5 ? 1 : 0;
   }
   limit_candidates(decided);

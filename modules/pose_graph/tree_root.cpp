@@ -23,9 +23,6 @@ constexpr double kMaxRise = 1.5;
 constexpr double kCostRounding = 1e-13;  // relative to the cost: smaller increases are rounding
 constexpr int kMaxBacktracks = 12;
 constexpr int kMaxBacktracksUndecided = 8;
-// At a start from odometry, no residual contradicts odometry. If its steps may be rejected, the
-// first steps therefore use all edges with full weight.
-constexpr int kUnweighedSteps = 8;
 // Margin on barc if noise is smaller than stated, because its tails are then longer: the largest
 // residual of parking-garage is 31 times the scale.
 constexpr double kMargin = 8.0;
@@ -172,12 +169,9 @@ DownMessage TreeRoot::decide_start(const TreeSums& sums, std::uint32_t round) {
 }
 
 DownMessage TreeRoot::start(bool deferred, const TreeSums& sums) {
-  schedule_.start(sums.largest, options_.robust ? sums.open : 0, barc_,
-                  options_.reject_odometry ? kUnweighedSteps : 0);
+  schedule_.start(sums.largest, options_.robust ? sums.open : 0, barc_);
   if (options_.robust) usual_pair_ = usual_strength(motions_of(sums.votes));
-  weighing_ = schedule_.decided()     ? Weighing::kDecided
-              : schedule_.unweighed() ? Weighing::kUnweighed
-                                      : Weighing::kWeigh;
+  weighing_ = schedule_.decided() ? Weighing::kDecided : Weighing::kWeigh;
   DownMessage message = answer(Next::kStart);
   message.verdict.deferred = deferred;
   message.verdict.weigh_all = !alone_;
@@ -226,9 +220,7 @@ DownMessage TreeRoot::step(const TreeSums& sums, const TreeFront& front,
   // were still limited.
   const bool decided = schedule_.decided();
   const bool unlimited = weighing_ == Weighing::kDecided || usual_pair_.tau >= kUnlimited.tau;
-  weighing_ = decided                 ? Weighing::kDecided
-              : schedule_.unweighed() ? Weighing::kUnweighed
-                                      : Weighing::kWeigh;
+  weighing_ = decided ? Weighing::kDecided : Weighing::kWeigh;
   if ((decided && small && unlimited) || round_ + 1 >= options_.max_rounds) {
     noise_scale_ =
         noise_allowed(noise_scale_, cost_, sums.kept, members_.size(), options_.dimension);
@@ -255,7 +247,7 @@ DownMessage TreeRoot::step(const TreeSums& sums, const TreeFront& front,
 // the start. If some are rejected, this may be why. All are then weighed together, from the start.
 DownMessage TreeRoot::weigh_all() {
   alone_ = false;
-  schedule_.start(first_->largest, first_->open, barc_, 0);
+  schedule_.start(first_->largest, first_->open, barc_);
   rises_ = backtracks_ = 0;
   DownMessage message = refresh(false, Weighing::kWeigh);
   message.verdict.weigh_all = true;

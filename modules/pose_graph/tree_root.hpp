@@ -19,11 +19,7 @@ struct TreeNewtonOptions {
   double patience_rounds = 30.0;
   std::uint32_t max_rounds = 1000;  ///< Largest number of rounds.
   bool robust = true;               ///< Closures are weighed; otherwise all are trusted.
-  double barc = 0.0;  ///< Largest residual of an inlier [sigma]; 0: the team estimates it.
-  bool reject_odometry = false;  ///< Steps of odometry are weighed as well.
-  /// A member may leave private poses to its parent instead of eliminating them, if it then sends
-  /// fewer bytes.
-  bool share_private = false;
+  double barc = 0.0;        ///< Largest residual of an inlier [sigma]; 0: the team estimates it.
   bool covariances = true;  ///< The members compute covariances at the end.
 };
 

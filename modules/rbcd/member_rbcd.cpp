@@ -17,6 +17,8 @@ namespace {
 
 enum class RbcdMessageKind : std::uint8_t { kPoses, kShare, kProgress };
 
+constexpr int kNewtonSteps = 3;    // in one block update
+constexpr int kCgIterations = 50;  // in one Newton step
 // Perturbation of the start, see perturb_rotations(): small relative to any measurement, large
 // relative to round-off errors.
 constexpr double kPerturbation = 1e-3;
@@ -155,11 +157,9 @@ void MemberRbcd::update(std::vector<SolverMessage>& messages) {
   const auto& [round, X] = *history_.rbegin();
   problem_.set_fixed(fixed_);
   const bool alone = place_.members.size() == 1;
-  TruncatedNewtonResult result =
-      minimise_over_relaxed(problem_, X,
-                            {.max_iterations = options_.max_newton_steps,
-                             .max_cg_iterations = options_.max_cg_iterations},
-                            alone ? 1.0 : relaxation_after(round, options_.max_over_relaxation));
+  TruncatedNewtonResult result = minimise_over_relaxed(
+      problem_, X, {.max_iterations = kNewtonSteps, .max_cg_iterations = kCgIterations},
+      alone ? 1.0 : relaxation_after(round, options_.max_over_relaxation));
   if (!std::isfinite(result.cost)) throw std::runtime_error("MemberRbcd: the cost is not finite");
   history_.emplace_hint(history_.end(), round + 1, std::move(result.X));
   const auto rounded = round_public_poses();

@@ -19,8 +19,6 @@ struct RbcdOptions {
   std::uint32_t max_rounds = 0;  ///< 0: no limit.
   /// The session ends when a round decreases the team cost by less, relative to the cost.
   double min_relative_decrease = 1e-7;
-  int max_newton_steps = 3;           ///< Newton steps per block update.
-  int max_cg_iterations = 50;         ///< CG iterations per Newton step.
   double max_over_relaxation = 1.95;  ///< 1: no over-relaxation, see minimise_over_relaxed().
 };
 

@@ -10,8 +10,6 @@ TreeNewtonOptions newton_options(const PoseGraphConfig& config) {
   TreeNewtonOptions options;
   options.robust = config.robust;
   options.barc = config.barc;
-  options.share_private = config.share_private;
-  options.covariances = config.covariances;
   // Below the default of 30, so that new second derivatives are sent earlier and a session has
   // fewer rounds. In a team, the latency of a round costs more than the bytes of second
   // derivatives.
@@ -19,21 +17,12 @@ TreeNewtonOptions newton_options(const PoseGraphConfig& config) {
   return options;
 }
 
-RbcdOptions rbcd_options(const PoseGraphConfig& config) {
-  return {.rank = config.rank,
-          .min_relative_decrease = config.min_relative_decrease,
-          .max_newton_steps = config.max_newton_steps,
-          .max_cg_iterations = config.max_cg_iterations,
-          .max_over_relaxation = config.max_over_relaxation};
-}
-
 MemberSolverFactory solver_choice(const PoseGraphConfig& config) {
   return [config](const Session& session, SessionGraph graph,
                   TreePlace place) -> std::unique_ptr<MemberSolver> {
     if (session.method == PgoMethod::kRbcd) {
-      RbcdOptions options = rbcd_options(config);
-      options.max_rounds = session.max_rounds;
-      return std::make_unique<MemberRbcd>(std::move(graph), place, options);
+      return std::make_unique<MemberRbcd>(std::move(graph), place,
+                                          RbcdOptions{.max_rounds = session.max_rounds});
     }
     TreeNewtonOptions options = newton_options(config);
     if (session.max_rounds > 0) options.max_rounds = session.max_rounds;

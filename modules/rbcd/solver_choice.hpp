@@ -7,9 +7,8 @@
 
 namespace km {
 
-/// Parameters of the methods in a session without a limit of rounds.
+/// Parameters of Newton's method in a session without a limit of rounds.
 [[nodiscard]] TreeNewtonOptions newton_options(const PoseGraphConfig& config);
-[[nodiscard]] RbcdOptions rbcd_options(const PoseGraphConfig& config);
 
 /// Creates the solver for the method of a session, with the parameters of `config`.
 [[nodiscard]] MemberSolverFactory solver_choice(const PoseGraphConfig& config);

@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "apps/lab/pgo_study/member_team.hpp"
-#include "apps/lab/pgo_study/odometry_start.hpp"
+#include "apps/lab/pgo/member_team.hpp"
+#include "apps/lab/pgo/odometry_start.hpp"
 #include "modules/pose_graph/member_solver.hpp"
 #include "modules/pose_graph/tree_messages.hpp"
 #include "modules/pose_graph/tree_newton.hpp"
@@ -165,9 +165,9 @@ class Eavesdropper {
 };
 
 // Runs the default solver for at most `max_rounds` rounds.
-inline Eavesdropper listen_to(const TeamGraph& graph, bool share_private, int max_rounds) {
+inline Eavesdropper listen_to(const TeamGraph& graph, int max_rounds) {
   Eavesdropper ear(graph);
-  const TreeNewtonOptions options{.dimension = graph.dimension, .share_private = share_private};
+  const TreeNewtonOptions options{.dimension = graph.dimension};
   REQUIRE(options.robust);
   MemberTeam team(graph, 3, odometry_start(graph), [&](SessionGraph part, TreePlace place) {
     const RobotId self = part.self;

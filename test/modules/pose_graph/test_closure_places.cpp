@@ -108,17 +108,5 @@ TEST_CASE("Closures that err a little, or all differently, are no rivals", "[clo
   CHECK(count_rival_places(different, {}) == 0);
 }
 
-TEST_CASE("Places of thousands of closures are counted, too", "[closure_places]") {
-  std::vector<AlignedOdometry> many;
-  for (KeyframeIndex k = 0; k < 8000; ++k)
-    many.push_back(aligned(k % 89, k / 89, translation({0.0, 9.0, 0.0})));
-  CHECK(count_rival_places(many, {}) > 40);  // 81 without selection
-}
-
-TEST_CASE("Without closures there is no place", "[closure_places]") {
-  CHECK(find_places({}).sizes.empty());
-  CHECK(find_places({}).weights().empty());
-}
-
 }  // namespace
 }  // namespace km

@@ -205,12 +205,6 @@ TEST_CASE("a cover contains an end of every closure, for any order of closures",
   CHECK(cover_closures(closures) == cover);
 }
 
-TEST_CASE("the centre of a star is its cover", "[newton]") {
-  std::vector<ClosureId> closures;
-  for (KeyframeIndex k = 0; k < 5; ++k) closures.push_back({{0, k}, {1, 7}});
-  CHECK(cover_closures(closures) == std::vector<KeyframeId>{{1, 7}});
-}
-
 TEST_CASE("a pose is kept if eliminating it would couple many others", "[newton]") {
   // Node 0 has six neighbours without couplings: its elimination would replace 6 couplings by 15.
   // Node 7 is between two nodes: its elimination replaces two couplings by one.

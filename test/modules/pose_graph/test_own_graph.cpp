@@ -186,13 +186,4 @@ TEST_CASE("closures inside the robot are among its own edges", "[own_graph]") {
   CHECK(graph.offers().empty());
 }
 
-TEST_CASE("the mean precision of a step depends only on odometry", "[own_graph]") {
-  OwnGraph graph = graph_of(5, 2);
-  KeyframeOdometry next = keyframe(5, 2);
-  next.covariance *= 0.5;
-  REQUIRE(graph.add(next));
-  CHECK(graph.mean_step_precision().tau == Approx(1.5));
-  CHECK(graph.mean_step_precision().kappa == Approx(0.75));
-}
-
 }  // namespace km

@@ -54,8 +54,6 @@ struct Correspondence {
                    [this](const Session&, SessionGraph, const TreePlace&) {
                      return std::make_unique<OrderlySolver>(taken);
                    },
-                   {},
-                   1.0,
                    0.0};
   ReliableChannel others{kOther, session.id, 1.0};
   PublicPoses published = {};
@@ -132,7 +130,7 @@ TEST_CASE("a robot computes with the public poses that the other robots receive,
       [](const Session&, const SessionGraph&, const TreePlace&) {
         return std::unique_ptr<MemberSolver>();
       },
-      {}, 1.0, 0.0);
+      0.0);
   (void)part.advance({}, 0.0);
   REQUIRE(part.stage() == MemberStage::kEntered);
   const std::vector<SinglePose> received = part.public_poses();

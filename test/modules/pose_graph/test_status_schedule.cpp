@@ -8,7 +8,7 @@ namespace {
 using Due = StatusSchedule::Due;
 
 TEST_CASE("A status that has not changed is not sent", "[status_schedule]") {
-  StatusSchedule schedule(1.0);
+  StatusSchedule schedule;
   TeamStatus status;
   status.keyframes = 5;
   CHECK(schedule.due(status, 0.0) == Due::kStatus);
@@ -20,7 +20,7 @@ TEST_CASE("A status that has not changed is not sent", "[status_schedule]") {
 
 TEST_CASE("A changed status is sent twice per period, one with a grown graph once",
           "[status_schedule]") {
-  StatusSchedule schedule(1.0);
+  StatusSchedule schedule;
   TeamStatus status;
   status.keyframes = 5;
   REQUIRE(schedule.due(status, 0.0) == Due::kStatus);

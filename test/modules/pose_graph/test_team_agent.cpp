@@ -75,23 +75,6 @@ TEST_CASE("the frame at the end is the odometry frame of the lowest robot", "[po
   CHECK(network.robots.at(7).trajectory->T_world_kf[0].isApprox(T_odom_first, 1e-6));
 }
 
-TEST_CASE("inputs may come in any order and at any time", "[pose_graph][agent]") {
-  const unsigned seed = GENERATE(1U, 2U, 3U);
-  CAPTURE(seed);
-  const TeamProblem problem = ring(seed);
-  TeamNetwork network(seed);
-  network.usual.max_delay_s = 0.05;
-  for (const RobotId id : kIds) {
-    TeamAgent& agent = network.add({id, 1}, {}, gather());
-    feed_closures(agent, id, problem);
-    (void)network.run(0.3);
-    feed_odometry(agent, id, problem);
-    (void)network.run(0.7);
-  }
-  REQUIRE(settle(network));
-  check_optimum(network, problem);
-}
-
 TEST_CASE("a resumed robot takes part again with its known closures", "[pose_graph][agent]") {
   const RobotId resumed = GENERATE(RobotId{7}, RobotId{50});
   const bool chain = GENERATE(true, false);
@@ -165,23 +148,6 @@ TEST_CASE("the data of a restarted robot is discarded, and it takes part again",
   check_optimum(network, problem);
 }
 
-TEST_CASE("measurements of a robot before its restart are not optimised", "[pose_graph][agent]") {
-  const TeamProblem problem = ring(9);
-  TeamNetwork network;
-  for (const RobotId id : kIds) feed(network.add({id, 1}, {}, gather()), id, problem);
-  REQUIRE(settle(network));
-  TeamAgent& agent = network.agent(33);
-  const auto with_7 = [&] {
-    return std::ranges::count_if(
-        agent.decided(), [](const auto& decision) { return touches(decision.first, RobotId{7}); });
-  };
-  REQUIRE(with_7() > 0);
-  agent.peer_restarted({7, 1});  // measurements after peer_alive() are also from before the restart
-  CHECK(with_7() == 0);
-  REQUIRE(settle(network));
-  CHECK(with_7() == 0);
-}
-
 TEST_CASE("decisions on closures are valid for both robots and carry over", "[pose_graph][agent]") {
   TeamProblem problem = ring(4);
   PoseEdge wrong = problem.edges.back();
@@ -230,33 +196,6 @@ TEST_CASE("a graph that cannot be solved ends the session for all, with a notice
     CHECK(network.robots.at(id).trajectory);
   }
   CHECK(network.agent(7).part()->session().id.number < 5);  // without endless repetition
-}
-
-TEST_CASE("sessions wait until their bytes are paid for", "[pose_graph][agent]") {
-  const double budget_kb_s = GENERATE(1e6, 1.0);
-  CAPTURE(budget_kb_s);
-  const TeamProblem problem = ring(15);
-  PoseGraphConfig config;
-  config.exchange_budget_kb_s = budget_kb_s;
-  config.session_wait_s = 30.0;
-  TeamNetwork network;
-  for (const RobotId id : kIds)
-    feed(network.add({id, 1}, config, gather()), id, without_33_50(problem));
-  REQUIRE(settle(network));
-  const double first_s = network.now_s();
-  for (const RobotId id : {RobotId{33}, RobotId{50}}) {
-    for (const PoseEdge& e : problem.edges)
-      if (!is_step(e)) (void)network.agent(id).add(closure_of(e));
-    (void)network.agent(id).add(inlier_set(problem, 33, 50));
-  }
-  (void)network.run(1.0);
-  REQUIRE(settle(network));
-  const double waited_s = network.now_s() - first_s;
-  CAPTURE(waited_s);
-  if (budget_kb_s > 1.0) CHECK(waited_s < 5.0);  // two seconds at rest, and the session
-  if (budget_kb_s <= 1.0) CHECK(waited_s > 5.0);
-  CHECK(waited_s < 35.0);
-  check_optimum(network, problem);
 }
 
 TEST_CASE("the member that has sent most determines the wait for the next session",
@@ -343,24 +282,6 @@ TEST_CASE("refused inputs are counted, with a notice", "[pose_graph][agent]") {
   CHECK(agent.step(0.1, 0).notices.size() == 1);
   CHECK_FALSE(agent.add(keyframe));
   CHECK(agent.step(0.2, 0).notices.empty());  // third refusal
-}
-
-TEST_CASE("closures beyond the limit for one robot cause a notice, repeated ones do not",
-          "[pose_graph][agent]") {
-  TeamAgent agent({}, {7, 1}, gather());
-  Closure closure;
-  closure.to.id = {7, 0};
-  const auto add = [&](std::size_t number) {
-    closure.from.id = {33, static_cast<KeyframeIndex>(number)};
-    return agent.add(closure);
-  };
-  for (std::size_t i = 0; i < OwnGraph::kMaxClosures; ++i) REQUIRE(add(i));
-  CHECK_FALSE(add(0));
-  CHECK(agent.step(0.0, 0).notices.empty());
-  CHECK_FALSE(add(OwnGraph::kMaxClosures));
-  const TeamOutput output = agent.step(0.1, 0);
-  REQUIRE(output.notices.size() == 1);
-  CHECK_THAT(output.notices.front(), Catch::Contains("closures of robots 7 and 33 beyond"));
 }
 
 TEST_CASE("false messages are refused or do no lasting harm", "[pose_graph][agent]") {
@@ -466,38 +387,6 @@ TEST_CASE("a session with unknown closures is refused", "[pose_graph][agent]") {
   network.inject({7, 1}, 33, made_up);
   CHECK(agent.refused().size() == 1);
   CHECK(agent.part()->session().id == running.id);
-}
-
-TEST_CASE("decisions of a session hold in the next one, even for a robot that missed its end",
-          "[pose_graph][agent]") {
-  const TeamProblem problem = ring(11);
-  PoseGraphConfig config;
-  config.exchange_budget_kb_s = 1e6;
-  TeamNetwork network;
-  network.loses = [](RobotId, const LinkPacket& packet) {
-    const auto* session = std::get_if<Session>(packet.message.get());
-    return session != nullptr && session->finished && packet.next == 33;
-  };
-  std::size_t known = 0;  // decisions known to 33 at the beginning of its last session of four
-  const MemberSolverFactory factory = [&](const Session& session, SessionGraph graph,
-                                          TreePlace place) {
-    if (graph.self == 33 && place.members.size() == 4) known = graph.decided.size();
-    return gather()(session, std::move(graph), std::move(place));
-  };
-  for (const RobotId id : kIds) feed(network.add({id, 1}, config, factory), id, problem);
-  const TeamAgent& agent = network.agent(33);
-  const auto solved = [&] {
-    return agent.part() != nullptr && agent.part()->members().size() == 4 &&
-           agent.part()->stage() == MemberStage::kSolved && !network.agent(7).in_session();
-  };
-  REQUIRE(network.run(60.0, solved));
-  CHECK(agent.in_session());
-  CHECK(known == 0);
-  for (const RobotId id : {RobotId{7}, RobotId{33}})
-    (void)network.agent(id).add(inlier_set(problem, 7, 33, 2));
-  REQUIRE(network.run(60.0, [&] { return agent.part()->stage() != MemberStage::kSolved; }));
-  REQUIRE(network.run(60.0, solved));
-  CHECK(known > 0);
 }
 
 TEST_CASE("every message may arrive late, twice and in any order", "[pose_graph][agent]") {

@@ -97,23 +97,6 @@ TEST_CASE("the solution of a team with verticals is level", "[pose_graph][agent]
   CHECK(std::abs(so3_log(first.linear()).z()) < 1e-6);
 }
 
-TEST_CASE("block descent and Newton's method with verticals have one optimum",
-          "[pose_graph][agent][vertical]") {
-  const Drive drive = level_drive(0.01);
-  PoseGraphConfig config;
-  config.max_rounds = 2000;
-  const TeamPoses newton = drive_to_the_end(drive, config);
-  config.method = PgoMethod::kRbcd;
-  const TeamPoses rbcd = drive_to_the_end(drive, config);
-  for (const auto& [robot, poses] : newton)
-    for (std::size_t k = 0; k < poses.size(); ++k) {
-      CAPTURE(robot, k);
-      const SE3& other = rbcd.at(robot)[k];
-      CHECK((poses[k].translation() - other.translation()).norm() < 2e-2);
-      CHECK(tilt_between(poses[k], other) < 2e-3);
-    }
-}
-
 TEST_CASE("one robot without verticals disables them for the team",
           "[pose_graph][agent][vertical]") {
   Drive one = level_drive(0.0), none = level_drive(0.0);

@@ -123,108 +123,37 @@ UpMessage up_again(const UpMessage& message) {
   return std::move(*received);
 }
 
-void check_same(const TreeSums& a, const TreeSums& b) {
-  CHECK(a.base_cost == b.base_cost);
-  CHECK(a.cost == b.cost);
-  CHECK(a.decrement == b.decrement);
-  CHECK(a.largest == b.largest);
-  CHECK(a.open == b.open);
-  CHECK(a.changed == b.changed);
-  CHECK(a.fractional == b.fractional);
-  CHECK(a.kept == b.kept);
-  CHECK(a.rejected == b.rejected);
-  CHECK(a.isolated == b.isolated);
-  CHECK(a.fixed == b.fixed);
-  CHECK(a.poses == b.poses);
-  CHECK(a.lengths == b.lengths);
-  REQUIRE(a.votes.size() == b.votes.size());
-  for (std::size_t k = 0; k < a.votes.size(); ++k) {
-    CHECK(a.votes[k].a == b.votes[k].a);
-    CHECK(a.votes[k].b == b.votes[k].b);
-    CHECK(a.votes[k].used == b.votes[k].used);
-    CHECK(a.votes[k].motion.T.t == b.votes[k].motion.T.t);
-    CHECK(a.votes[k].motion.T.q.coeffs() == b.votes[k].motion.T.q.coeffs());
-    CHECK(a.votes[k].motion.centre == b.votes[k].motion.centre);
-    CHECK(a.votes[k].motion.radius_m == b.votes[k].motion.radius_m);
-    CHECK(a.votes[k].motion.spread_m == b.votes[k].motion.spread_m);
-    CHECK(a.votes[k].motion.strength.kappa == b.votes[k].motion.strength.kappa);
-    CHECK(a.votes[k].motion.strength.tau == b.votes[k].motion.strength.tau);
-    CHECK(a.votes[k].noise == b.votes[k].noise);
-  }
-}
-
-void check_same(const SinglePose& a, const SinglePose& b) {
-  CHECK(a.q.coeffs() == b.q.coeffs());
-  CHECK(a.t == b.t);
-}
-
-void check_same(const TreeSystem& a, const TreeSystem& b) {
-  REQUIRE(a.variables.size() == b.variables.size());
-  for (std::size_t k = 0; k < a.variables.size(); ++k) {
-    CHECK(a.variables[k].id == b.variables[k].id);
-    CHECK(a.variables[k].touched == b.variables[k].touched);
-    CHECK(a.variables[k].of == b.variables[k].of);
-  }
-  CHECK(a.pairs == b.pairs);
-  CHECK(a.schur.diagonal == b.schur.diagonal);
-  // Rounded to 2^-26 of the geometric mean of the diagonal entries.
-  for (std::size_t p = 0; p < a.pairs.size(); ++p) {
-    const auto [i, j] = a.pairs[p];
-    const auto received = a.schur.between(static_cast<int>(p));
-    const auto sent = b.schur.between(static_cast<int>(p));
-    for (Index row = 0; row < received.rows(); ++row)
-      for (Index c = 0; c < received.cols(); ++c)
-        CHECK(std::abs(received(row, c) - sent(row, c)) <=
-              0x1p-27 * std::sqrt(a.schur.at(i)(row, row) * a.schur.at(j)(c, c)) * (1.0 + 1e-9));
-  }
-  REQUIRE(a.edges.size() == b.edges.size());
-  for (std::size_t k = 0; k < a.edges.size(); ++k) {
-    CHECK(a.edges[k].pair == b.edges[k].pair);
-    CHECK(a.edges[k].transposed == b.edges[k].transposed);
-    CHECK(a.edges[k].curvature == b.edges[k].curvature);
-    CHECK(a.edges[k].kappa == b.edges[k].kappa);
-    CHECK(a.edges[k].tau == b.edges[k].tau);
-    CHECK(a.edges[k].weight == b.edges[k].weight);
-    check_same(a.edges[k].present, b.edges[k].present);
-    if (a.edges[k].curvature == Curvature::kFull)
-      check_same(a.edges[k].measured, b.edges[k].measured);
-  }
-}
-
+// Every field of these messages has a value of its own. Equal bytes after decoding and encoding
+// therefore mean that decoding restores every field.
 TEST_CASE("Decoding restores a message up the tree", "[pose_graph]") {
-  const Index block = GENERATE(3, 6);
-  const bool with_system = GENERATE(true, false);
-  const UpMessage sent = some_up_message(block, with_system);
-  const UpMessage received = up_again(sent);
-  CHECK(received.round == sent.round);
-  CHECK(received.failed == sent.failed);
-  check_same(received.sums, sent.sums);
-  CHECK(received.reduced == sent.reduced);
-  REQUIRE(received.system.has_value() == with_system);
-  if (with_system) check_same(*received.system, *sent.system);
-  REQUIRE(received.weights.size() == sent.weights.size());
-  for (std::size_t k = 0; k < sent.weights.size(); ++k) {
-    CHECK(received.weights[k].edge == sent.weights[k].edge);
-    CHECK(received.weights[k].weight == sent.weights[k].weight);
+  UpMessage empty_system{.round = 1, .sums = {}};
+  empty_system.system.emplace().schur = BlockMatrix::zero(6, 0, 0);
+  for (const UpMessage& sent :
+       {some_up_message(3, true), some_up_message(6, true), some_up_message(6, false), empty_system,
+        UpMessage{.round = 3, .sums = {}, .failed = true}}) {
+    const UpMessage received = up_again(sent);
+    CHECK(encode(received) == encode(sent));
+    CHECK(received.system.has_value() == sent.system.has_value());
+    CHECK(is_up_message(encode(sent)));
+    CHECK_FALSE(decode_down(encode(sent)));
   }
-  CHECK(encode(received) == encode(sent));
-  CHECK(is_up_message(encode(sent)));
-  CHECK_FALSE(decode_down(encode(sent)));
 }
 
-TEST_CASE("Decoding restores a message of a robot that cannot continue", "[pose_graph]") {
-  const UpMessage received = up_again({.round = 3, .sums = {}, .failed = true});
-  CHECK(received.failed);
-  CHECK_FALSE(received.system);
-  CHECK(received.reduced.size() == 0);
-}
-
-TEST_CASE("A subtree that leaves no pose to other robots sends an empty system", "[pose_graph]") {
-  UpMessage sent{.round = 1, .sums = {}};
-  sent.system.emplace().schur = BlockMatrix::zero(6, 0, 0);
-  const UpMessage received = up_again(sent);
-  REQUIRE(received.system);
-  CHECK(received.system->variables.empty());
+TEST_CASE("Couplings are rounded to 2^-26 of the geometric mean of their diagonal entries",
+          "[pose_graph]") {
+  const TreeSystem sent = *some_up_message(GENERATE(3, 6), true).system;
+  const TreeSystem received = *up_again({.sums = {}, .system = sent}).system;
+  CHECK(received.schur.diagonal == sent.schur.diagonal);
+  for (std::size_t p = 0; p < sent.pairs.size(); ++p) {
+    const auto [i, j] = sent.pairs[p];
+    const Eigen::MatrixXd a = received.schur.between(static_cast<int>(p));
+    const Eigen::MatrixXd b = sent.schur.between(static_cast<int>(p));
+    for (Index row = 0; row < a.rows(); ++row)
+      for (Index c = 0; c < a.cols(); ++c)
+        CHECK(std::abs(a(row, c) - b(row, c)) <=
+              0x1p-27 * std::sqrt(sent.schur.at(i)(row, row) * sent.schur.at(j)(c, c)) *
+                  (1.0 + 1e-9));
+  }
 }
 
 TEST_CASE("A zero block costs one bit", "[pose_graph]") {
@@ -260,37 +189,12 @@ TEST_CASE("Decoding restores a message down the tree", "[pose_graph]") {
   using Weighing = TreeVerdict::Weighing;
   const Next next = GENERATE(Next::kStep, Next::kShorten, Next::kRefresh, Next::kStart,
                              Next::kCount, Next::kDone, Next::kStop);
-  const Weighing weighing =
-      GENERATE(Weighing::kUnweighed, Weighing::kWeigh, Weighing::kHold, Weighing::kDecided);
+  const Weighing weighing = GENERATE(Weighing::kWeigh, Weighing::kHold, Weighing::kDecided);
   const DownMessage sent = some_down_message(next, weighing);
   const auto received = decode_down(encode(sent));
   REQUIRE(received);
-  const TreeVerdict& v = received->verdict;
-  CHECK(v.round == sent.verdict.round);
-  CHECK(v.next == next);
-  CHECK(v.weighing == weighing);
-  CHECK(v.accept == sent.verdict.accept);
-  CHECK(v.full == sent.verdict.full);
-  CHECK(v.deferred == sent.verdict.deferred);
-  CHECK(v.free == sent.verdict.free);
-  CHECK(v.weigh_all == sent.verdict.weigh_all);
-  CHECK(v.scale == sent.verdict.scale);
-  CHECK(v.mu == sent.verdict.mu);
-  CHECK(v.barc == sent.verdict.barc);
-  CHECK(v.noise_scale == sent.verdict.noise_scale);
-  CHECK(v.usual_noise == sent.verdict.usual_noise);
-  CHECK(v.usual_pair.kappa == sent.verdict.usual_pair.kappa);
-  CHECK(v.usual_pair.tau == sent.verdict.usual_pair.tau);
-  REQUIRE(v.moves.size() == 2);
-  CHECK(v.moves[0].first == 7);
-  CHECK(v.moves[0].second.t == sent.verdict.moves[0].second.t);
-  CHECK(v.moves[1].first == 9);
-  CHECK(v.cost == sent.verdict.cost);
-  CHECK(v.gradient == sent.verdict.gradient);
-  CHECK(v.drift == sent.verdict.drift);
-  CHECK(received->step == sent.step);
-  CHECK(received->inverse.diagonal == sent.inverse.diagonal);
-  CHECK(received->inverse.correlations == sent.inverse.correlations);
+  CHECK(received->verdict.next == next);
+  CHECK(received->verdict.weighing == weighing);
   CHECK(encode(*received) == encode(sent));
   CHECK_FALSE(is_up_message(encode(sent)));
   CHECK_FALSE(decode_up(encode(sent)));

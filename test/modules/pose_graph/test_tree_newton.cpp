@@ -1,7 +1,6 @@
 #include <catch2/catch.hpp>
 
 #include "modules/pose_graph/tree_newton.hpp"
-#include "test/support/shared_data.hpp"
 #include "test/support/solver_team.hpp"
 
 namespace km {
@@ -95,30 +94,6 @@ TEST_CASE("Held poses of absent robots fix the frame of the others", "[pose_grap
   REQUIRE(team.run());
   for (const RobotId robot : problem.members()) CHECK(team.member(robot).state().held);
   CHECK(central.cost(team.poses()) == Approx(central.optimum(problem.start)).epsilon(kRelativeGap));
-}
-
-TEST_CASE("A recorded graph is solved to its certified optimum", "[pose_graph]") {
-  const auto [file, optimum] =
-      GENERATE(table<const char*, double>({{"pose_graphs/3d/smallGrid3D.g2o", 1025.398056},
-                                           {"pose_graphs/3d/sphere2500.g2o", 1687.005815},
-                                           {"pose_graphs/3d/parking-garage.g2o", 1.26252443},
-                                           {"pose_graphs/3d/torus3D.g2o", 24227.045560}}));
-  CAPTURE(file);
-  const auto path = shared_data(file);
-  if (!path) return;
-  const bool robust = GENERATE(false, true);
-  const std::size_t robots = GENERATE(3, 5);
-  const TeamProblem problem = deal_file(*path, robots);
-  SolverTeam team =
-      solver_team(problem, chain(problem.members()), {},
-                  newton({.absolute_tolerance = 0.0, .patience_rounds = 8.0, .robust = robust}));
-  REQUIRE(team.run());
-  const SolverState state = team.member(1).state();
-  CHECK(CentralProblem(problem).cost(team.poses()) == Approx(optimum).epsilon(1e-6));
-  std::size_t bytes = 0;
-  for (const RobotId robot : problem.members()) bytes += team.bytes_of(robot);
-  WARN(file << " robots " << robots << " robust " << robust << ": rounds " << state.round << ", MB "
-            << 1e-6 * static_cast<double>(bytes) << ", scale " << state.noise_scale);
 }
 
 TEST_CASE("Impossible verdicts are refused, and the true one is accepted afterwards",

@@ -71,31 +71,6 @@ TEST_CASE("The result depends neither on the order of messages nor on the tree",
       CHECK(calm.member(robot).poses()[i].matrix() == rough.member(robot).poses()[i].matrix());
 }
 
-TEST_CASE("Cost falls from one state of the team to the next", "[rbcd]") {
-  const TeamProblem problem = three_robots();
-  const CentralProblem central(problem);
-  SolverTeam team = rbcd_team(problem, star(problem.members()), {}, kRoughTransport);
-  std::map<std::uint32_t, TeamPoses> states;
-  std::map<std::uint32_t, double> reported;
-  team.after_advance = [&](RobotId robot, const MemberSolver& member) {
-    states[member.state().round][robot] = member.poses();
-    reported[member.state().round] = member.state().cost;
-  };
-  REQUIRE(team.run());
-  double last = central.cost(problem.start);
-  int complete = 0;
-  for (const auto& [round, poses] : states) {
-    if (round == 0 || poses.size() < 3) continue;
-    ++complete;
-    CAPTURE(round);
-    const double cost = central.cost(poses);
-    CHECK(cost < last);
-    CHECK(cost == Approx(reported.at(round)).epsilon(1e-3));
-    last = cost;
-  }
-  CHECK(complete >= 2);
-}
-
 TEST_CASE("Block descent ends upright if the robots have verticals", "[rbcd]") {
   const TeamProblem problem = three_robots(0.01);
   SolverTeam team = rbcd_team(problem, star(problem.members()));
@@ -128,15 +103,6 @@ TEST_CASE("A rejected closure has no influence", "[rbcd]") {
   CHECK(CentralProblem(problem).cost(team.poses()) < optimum + 40.0);
 }
 
-TEST_CASE("A team of one solves its graph alone", "[rbcd]") {
-  const TeamProblem problem =
-      random_team_problem({.robots = {9}, .keyframes = 30, .closures = 20}, 1);
-  SolverTeam team = rbcd_team(problem, star({9}));
-  REQUIRE(team.run());
-  CHECK(gap_of(problem, team.poses()) < kGap);
-  CHECK(team.bytes_of(9) == 0);
-}
-
 TEST_CASE("Descent stops after the rounds it is given, with a better state", "[rbcd]") {
   const TeamProblem problem = three_robots();
   const CentralProblem central(problem);
@@ -144,30 +110,6 @@ TEST_CASE("Descent stops after the rounds it is given, with a better state", "[r
   REQUIRE(team.run());
   for (const RobotId robot : problem.members()) CHECK(team.member(robot).state().round == 3);
   CHECK(central.cost(team.poses()) < 0.1 * central.cost(problem.start));
-}
-
-TEST_CASE("A team that starts at the optimum ends no worse", "[rbcd]") {
-  TeamProblem problem = three_robots();
-  SolverTeam first = rbcd_team(problem, star(problem.members()));
-  REQUIRE(first.run());
-  problem.start = with_public_poses_rounded(first.poses(), problem.edges);
-  const CentralProblem central(problem);
-  SolverTeam again = rbcd_team(problem, star(problem.members()));
-  REQUIRE(again.run());
-  CHECK(central.cost(again.poses()) <= central.cost(problem.start) * (1.0 + 1e-9));
-}
-
-TEST_CASE("When a member disappears, the others keep the last common state", "[rbcd]") {
-  const TeamProblem problem = three_robots();
-  SolverTeam team = rbcd_team(problem, star(problem.members()), {.min_relative_decrease = 0.0});
-  TeamPoses held = problem.start;
-  for (int n = 0; n < 60; ++n) REQUIRE(team.step());
-  held = team.poses();
-  team.remove(7);
-  CHECK_FALSE(team.run(1000));  // no robot has work left
-  for (const RobotId robot : {RobotId{2}, RobotId{5}}) held[robot] = team.member(robot).poses();
-  const CentralProblem central(problem);
-  CHECK(central.cost(held) < 0.1 * central.cost(problem.start));
 }
 
 TEST_CASE("Every member passes through every state that the root reports, in order", "[rbcd]") {

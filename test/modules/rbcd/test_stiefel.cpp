@@ -64,14 +64,4 @@ TEST_CASE("the retraction is feasible and of second order", "[rbcd]") {
   CHECK(project_tangent(X, (plus - 2.0 * X + minus) / (h * h)).norm() < 1e-6);
 }
 
-TEST_CASE("lifting a chain of poses gives a chain", "[rbcd]") {
-  std::mt19937 rng(6);
-  const SE3 T_a_b = random_pose(rng);
-  const SE3 T_b_c = random_pose(rng);
-  const Eigen::MatrixXd L = lifted_identity(5);
-  CHECK(stiefel_error(L) == 0.0);
-  CHECK((lift(lift(L, T_a_b), T_b_c) - lift(L, T_a_b * T_b_c)).norm() < kRounding * 100);
-  CHECK((L.leftCols<3>() - lifting_matrix(5)).norm() == 0.0);
-}
-
 }  // namespace km

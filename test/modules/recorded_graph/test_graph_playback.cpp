@@ -195,24 +195,5 @@ TEST_CASE("A playback rate that is not positive is refused", "[playback]") {
                     std::invalid_argument);
 }
 
-TEST_CASE("The eight tunnels robots together play every closure once", "[playback]") {
-  if (!shared_data("multi_robot/tunnels_8robots/robot0.csv")) return;
-  std::set<ClosureId> ids;
-  std::size_t played_closures = 0;
-  for (int robot = 0; robot < 8; ++robot) {
-    const auto file =
-        shared_data("multi_robot/tunnels_8robots/robot" + std::to_string(robot) + ".csv");
-    REQUIRE(file);
-    const RecordedGraph graph = read_recorded_graph(*file);
-    Played played;
-    GraphPlaybackNode node(GraphPlaybackConfig{}, kMax, graph, played.topics());
-    play_all(node, graph);
-    played_closures += played.closures.size();
-    for (const RelativePose& closure : played.closures) ids.insert({closure.from, closure.to});
-  }
-  CHECK(played_closures == 96 + 3548);
-  CHECK(ids.size() == 96 + 3548);
-}
-
 }  // namespace
 }  // namespace km
