@@ -3,7 +3,6 @@
 #include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
 #include <stdexcept>
-#include <string>
 
 #include "modules/core/lie.hpp"
 
@@ -88,20 +87,6 @@ std::vector<SE3> chordal_initialisation(Eigen::Index poses, std::span<const Bloc
   const Eigen::MatrixXd translations = solve_translations(poses, edges, rotations);
   for (std::size_t i = 1; i < result.size(); ++i)
     result[i] = make_pose(rotations[i], translations.row(static_cast<Eigen::Index>(i) - 1));
-  return result;
-}
-
-std::vector<SE3> odometry_initialisation(Eigen::Index poses, std::span<const BlockEdge> edges) {
-  std::vector<const BlockEdge*> step_to(static_cast<std::size_t>(poses), nullptr);
-  for (const BlockEdge& e : edges)
-    if (e.j == e.i + 1) step_to[static_cast<std::size_t>(e.j)] = &e;
-  std::vector<SE3> result(static_cast<std::size_t>(poses), SE3::Identity());
-  for (std::size_t i = 1; i < result.size(); ++i) {
-    if (step_to[i] == nullptr)
-      throw std::invalid_argument("odometry_initialisation: no edge to pose " + std::to_string(i) +
-                                  " from the one before");
-    result[i] = result[i - 1] * step_to[i]->T_i_j;
-  }
   return result;
 }
 

@@ -15,9 +15,4 @@ namespace km {
 [[nodiscard]] std::vector<SE3> chordal_initialisation(Eigen::Index poses,
                                                       std::span<const BlockEdge> edges);
 
-/// Poses chained along the edges i -> i + 1, from pose 0, the identity. Throws
-/// std::invalid_argument if one of these edges is missing.
-[[nodiscard]] std::vector<SE3> odometry_initialisation(Eigen::Index poses,
-                                                       std::span<const BlockEdge> edges);
-
 }  // namespace km

@@ -15,9 +15,6 @@ inline constexpr std::size_t kMaxPublicPoses = 1U << 20U;
 /// Largest message [bytes].
 inline constexpr std::size_t kMaxTeamMessageBytes = 1U << 24U;
 
-/// Most bytes with which the network states kind, number and receiver of a message of its sender.
-inline constexpr std::size_t kTeamMessageHeadBytes = 8;
-
 /// Kinds of messages, in the order of TeamMessage.
 enum class TeamMessageKind : std::uint8_t { kStatus, kSession, kMemberPoses, kReliable };
 [[nodiscard]] inline TeamMessageKind kind_of(const TeamMessage& message) {

@@ -182,18 +182,4 @@ using TeamMessage = std::variant<TeamStatus, Session, MemberPoses, ReliableMessa
       message);
 }
 
-/// The session of the message; nullopt for statuses.
-[[nodiscard]] inline std::optional<SessionId> session_of(const TeamMessage& message) {
-  return std::visit(
-      [](const auto& m) -> std::optional<SessionId> {
-        if constexpr (requires { m.session; })
-          return m.session;
-        else if constexpr (requires { m.id; })
-          return m.id;
-        else
-          return std::nullopt;
-      },
-      message);
-}
-
 }  // namespace km

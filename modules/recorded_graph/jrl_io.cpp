@@ -180,14 +180,12 @@ struct FactorPlace {
 class JrlReader {
  public:
   JrlGraph read(const JsonPlace& document) {
-    if (const auto name = document.find("name")) graph_.name = name->string();
     read_robots(document["robots"]);
     const JsonPlace measurements = document["measurements"];
     for (const auto& [robot, entries] : by_robot(measurements)) read_entries(robot, entries);
     find_chains(measurements);
     check_keys();
     if (const auto values = document.find("groundtruth")) read_values(*values, graph_.truth);
-    if (const auto values = document.find("initialization")) read_values(*values, graph_.initial);
     read_labels(document);
     return std::move(graph_);
   }
@@ -367,8 +365,6 @@ class JrlReader {
   }
 
   void read_labels(const JsonPlace& document) {
-    if (const auto labels = document.find("potential_outlier_factors"))
-      for (const std::size_t k : labelled(*labels)) graph_.measurements[k].may_be_false = true;
     if (const auto labels = document.find("outlier_factors")) {
       graph_.has_labels = true;
       for (const std::size_t k : labelled(*labels)) graph_.measurements[k].is_false = true;

@@ -15,19 +15,16 @@ namespace km {
 /// A relative pose of a JRL file, with its unchanged covariance.
 struct JrlMeasurement {
   RelativePose edge;
-  Stamp stamp = 0;            ///< Time of the earliest entry with this measurement.
-  bool may_be_false = false;  ///< Listed in "potential_outlier_factors".
-  bool is_false = false;      ///< Listed in "outlier_factors".
+  Stamp stamp = 0;        ///< Time of the earliest entry with this measurement.
+  bool is_false = false;  ///< Listed in "outlier_factors".
 };
 
 /// The pose graph of a team with its truth, from a JRL file (JSON Robot Log).
 struct JrlGraph {
-  std::string name;
-  std::vector<RobotId> robots;               ///< Ascending.
-  std::vector<JrlMeasurement> measurements;  ///< Robot by robot, in the order of the file.
-  bool has_labels = false;                   ///< The file has "outlier_factors".
-  std::map<KeyframeId, SE3> truth;           ///< T_world_kf; empty if the file has none.
-  std::map<KeyframeId, SE3> initial;  ///< T_world_kf of "initialization"; empty if there is none.
+  std::vector<RobotId> robots;                   ///< Ascending.
+  std::vector<JrlMeasurement> measurements;      ///< Robot by robot, in the order of the file.
+  bool has_labels = false;                       ///< The file has "outlier_factors".
+  std::map<KeyframeId, SE3> truth;               ///< T_world_kf; empty if the file has none.
   std::map<RobotId, std::vector<Stamp>> stamps;  ///< [i]: when keyframe i became known.
   std::size_t priors = 0;    ///< Number of priors that were read, checked and not used.
   std::size_t repeated = 0;  ///< Number of exact copies of measurements, left out.

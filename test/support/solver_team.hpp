@@ -73,9 +73,8 @@ struct TeamProblem {
 }
 
 /// A g2o file of one robot split among robots 1, 3, 5, ... in blocks of equal length. It starts
-/// from chordal initialisation, or from odometry if `chained`.
-[[nodiscard]] inline TeamProblem deal_file(const std::filesystem::path& file, std::size_t robots,
-                                           bool chained = false) {
+/// from chordal initialisation.
+[[nodiscard]] inline TeamProblem deal_file(const std::filesystem::path& file, std::size_t robots) {
   const G2oGraph graph = read_g2o(file);
   std::vector<BlockEdge> whole;
   Eigen::Index poses = 0;
@@ -91,8 +90,7 @@ struct TeamProblem {
     return KeyframeId{static_cast<RobotId>(2 * k + 1), index - k * length};
   };
   TeamProblem problem;
-  const std::vector<SE3> start =
-      chained ? odometry_initialisation(poses, whole) : chordal_initialisation(poses, whole);
+  const std::vector<SE3> start = chordal_initialisation(poses, whole);
   for (Eigen::Index i = 0; i < poses; ++i)
     problem.start[dealt(i).robot].push_back(start[static_cast<std::size_t>(i)]);
   for (const BlockEdge& e : whole)

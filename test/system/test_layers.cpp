@@ -98,7 +98,9 @@ std::string violation(const fs::path& file, const std::string& header) {
   if ((header.starts_with("apps/") && !is_own_lab) || header.starts_with("test/"))
     return "a lower layer";
   if (in_runtime)
-    return used.empty() || used == "core" || used == "security" ? "" : "runtime uses only core and security";
+    return used.empty() || used == "core" || used == "security"
+               ? ""
+               : "runtime uses only core and security";
   if (header.starts_with("runtime/"))
     return joins_runtime(file) ? "" : "only folders node use runtime";
   if (is_process_level(header))

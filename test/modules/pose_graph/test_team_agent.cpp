@@ -198,6 +198,20 @@ TEST_CASE("a graph that cannot be solved ends the session for all, with a notice
   CHECK(network.agent(7).part()->session().id.number < 5);  // without endless repetition
 }
 
+// The session of the message; nullopt for statuses.
+std::optional<SessionId> session_of(const TeamMessage& message) {
+  return std::visit(
+      [](const auto& m) -> std::optional<SessionId> {
+        if constexpr (requires { m.session; })
+          return m.session;
+        else if constexpr (requires { m.id; })
+          return m.id;
+        else
+          return std::nullopt;
+      },
+      message);
+}
+
 TEST_CASE("the member that has sent most determines the wait for the next session",
           "[pose_graph][agent]") {
   const std::vector<RobotId> ids{7, 33, 50};
