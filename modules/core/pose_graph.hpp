@@ -92,8 +92,9 @@ struct Trajectory {
   RobotId robot = 0;
   RobotId anchor = 0;  ///< Robot whose odometry frame is `world`; `robot` itself if it is alone.
   std::vector<SE3> T_world_kf;
-  /// Covariances of T_world_kf relative to the first keyframe of the anchor, see covariance.hpp;
-  /// empty while they are unknown, and without the keyframes after the last session.
+  /// Covariances of T_world_kf relative to the first keyframe of the anchor, see covariance.hpp,
+  /// without the keyframes after the last session. Empty while they are unknown, also after a
+  /// refinement of the poses between sessions.
   std::vector<Matrix6> covariances = {};
   /// Standard deviation of the factor by which all distances in `world` may be wrong, not contained
   /// in `covariances`: see with_scale_error().

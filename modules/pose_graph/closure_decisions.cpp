@@ -47,7 +47,7 @@ bool ClosureDecisions::reconsider(std::span<const PoseEdge> closures, const Pose
     const ClosureId id = e.id();
     if (!is_rejected(id)) continue;
     const auto from = pose(e.from), to = pose(e.to);
-    if (!from || !to || residual_of(e, *from, *to) > kReconsiderLimit * barc) continue;
+    if (!from || !to || !(residual_of(e, *from, *to) <= kReconsiderLimit * barc)) continue;
     if (++times_reconsidered_[id] > kChances) continue;
     decided_.erase(id);
     any = true;

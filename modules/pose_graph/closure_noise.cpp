@@ -101,6 +101,7 @@ Estimate estimate(std::span<const NoiseCycle> cycles, double observations, doubl
                   double odometry, double distinct) {
   const std::vector<double> weights = weights_of(cycles, observations);
   const double log_usual = posterior_of(cycles, weights, usual, usual, odometry).log_density;
+  if (!std::isfinite(log_usual)) return {usual, 0.0};
   std::vector<std::pair<double, double>> densities{{usual, log_usual}};  // by factor
   double most = log_usual;
   const double largest = std::max(1.0, kLargestFactor * usual);

@@ -65,7 +65,7 @@ double Corroboration::cycle_length(const Upward& one, const Upward& other) const
   const TwoClosureCycle cycle{measured(one), chain(one.upper, other.upper),
                               inverse(measured(other)), chain(other.lower, one.lower)};
   const SE3 T = cycle.T();
-  if (angle_of(T.linear()) > kLargestTurn) return std::numeric_limits<double>::infinity();
+  if (!(angle_of(T.linear()) <= kLargestTurn)) return std::numeric_limits<double>::infinity();
   const Vector6 xi = se3_log(T);
   const Matrix6 covariance = cycle.covariance();
   if (dimension_ == 3) return std::sqrt(xi.dot(covariance.ldlt().solve(xi)));

@@ -92,7 +92,7 @@ SE3 best_hypothesis(const Fixes& f, bool upright) {
     const SE3 T = aligned(f, w, upright);
     for (const std::size_t k : sample) w[k] = 0.0;
     const double cost = cost_of(f, T, sample);
-    if (cost >= least) continue;
+    if (!(cost < least)) continue;
     least = cost;
     best = T;
   }

@@ -83,7 +83,7 @@ std::optional<NoiseScale> fit_noise(const NoiseHistogram& histogram, int dimensi
   // lengths make most scales about equally likely, so the stated noise then stays in use.
   double farthest = std::numeric_limits<double>::infinity();
   for (const auto& [scale, found] : fits) {
-    if (found.log_likelihood < best - kDoubt || std::abs(std::log(scale)) >= farthest) continue;
+    if (!(found.log_likelihood >= best - kDoubt) || std::abs(std::log(scale)) >= farthest) continue;
     farthest = std::abs(std::log(scale));
     result.scale = scale;
     result.consistent = found.share;

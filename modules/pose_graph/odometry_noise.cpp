@@ -148,7 +148,7 @@ double log_posterior_of_claims(const std::vector<Cycle>& cycles,
       next[kTwoClosures] = v;
       if (both) next[kClosure] = v;
       const double found = log_posterior(cycles, if_false, next);
-      if (found <= most) continue;
+      if (!(found > most)) continue;
       most = found;
       best = next;
     }
@@ -171,7 +171,7 @@ Fit fit_factors(const std::vector<Cycle>& cycles, double volume) {
   double most = log_posterior(cycles, if_false, fit.factors);
   const auto try_factors = [&](const Factors& v) {
     const double found = log_posterior(cycles, if_false, v);
-    if (found <= most) return false;
+    if (!(found > most)) return false;
     most = found;
     fit.factors = v;
     return true;
@@ -230,7 +230,7 @@ OdometryNoise estimate_odometry_noise(std::span<const PoseEdge> steps,
   if (cycles.empty()) return noise;
   const double volume = volume_m3(chain, closures);
   Fit fit = fit_factors(cycles, volume);
-  if (fit.log_odds < kLeastLogOdds) return noise;
+  if (!(fit.log_odds >= kLeastLogOdds)) return noise;
   const std::vector<Cycle> near = short_cycles(chain, closures);
   std::vector<Cycle> normal = with_normal_errors(cycles, fit.factors);
   // If most cycles of one closure are left out, noise of closures alone may explain the cycles of

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <utility>
 
@@ -75,6 +76,7 @@ void OwnPoses::extend(const OwnGraph& graph) {
 void OwnPoses::correct(std::span<const OdometryBreak> breaks) {
   for (const OdometryBreak& found : breaks) {
     if (!corrected_.insert(found.step).second) continue;
+    covariances_.clear();
     const SE3 T_new_old =
         T_frame_kf_[found.step] * found.T_from_to * T_frame_kf_[found.step + 1].inverse();
     for (std::size_t k = found.step + 1; k < T_frame_kf_.size(); ++k)
@@ -90,7 +92,8 @@ void OwnPoses::place_runs(const OwnGraph& graph, RobotId self) {
     std::vector<PoseEdge> across = graph.closures_across(begin, end);
     if (fits(across, T_frame_kf_)) continue;
     // The runs before count as another robot, into whose frame this run moves.
-    const RobotId before = self + 1;
+    constexpr RobotId kLast = std::numeric_limits<RobotId>::max();
+    const RobotId before = self == kLast ? self - 1 : self + 1;
     std::map<KeyframeId, SE3> received;
     for (PoseEdge& e : across)
       for (KeyframeId* const id : {&e.from, &e.to}) {
@@ -100,6 +103,7 @@ void OwnPoses::place_runs(const OwnGraph& graph, RobotId self) {
       }
     const auto moved = moved_into_frame(T_frame_kf_, self, across, received);
     if (!moved) continue;
+    covariances_.clear();
     const SE3 T_new_old = (*moved)[begin] * T_frame_kf_[begin].inverse();
     for (std::size_t i = begin; i < T_frame_kf_.size(); ++i)
       T_frame_kf_[i] = T_new_old * T_frame_kf_[i];
@@ -127,6 +131,7 @@ void OwnPoses::improve_alone(const OwnGraph& graph, RobotId self, bool trusted) 
   const std::vector<PoseEdge>* inside = graph.newest_edges(self);
   if (inside == nullptr || inside->size() == improved_with_) return;
   improved_with_ = inside->size();
+  covariances_.clear();
   const std::vector<PoseEdge> all = graph.own_edges();
   if (trusted) {
     T_frame_kf_ = better_of_chordal(std::move(T_frame_kf_), weighed_to_start(all));

@@ -19,7 +19,12 @@ class OwnPoses {
  public:
   /// In the frame of the last session.
   [[nodiscard]] const std::vector<SE3>& T_frame_kf() const { return T_frame_kf_; }
-  void set(std::vector<SE3> T_frame_kf) { T_frame_kf_ = std::move(T_frame_kf); }
+  /// Covariances of the first keyframes, by the solution that set the poses; empty: unknown.
+  [[nodiscard]] const std::vector<Matrix6>& covariances() const { return covariances_; }
+  void set(std::vector<SE3> T_frame_kf, std::vector<Matrix6> covariances = {}) {
+    T_frame_kf_ = std::move(T_frame_kf);
+    covariances_ = std::move(covariances);
+  }
   /// Poses of a former process for the first keyframes.
   void restore(std::vector<SE3> T_frame_kf) { restored_ = std::move(T_frame_kf); }
 
@@ -37,7 +42,10 @@ class OwnPoses {
   void place_runs(const OwnGraph& graph, RobotId self);
 
   /// Moves keyframe 0, the origin of an absolute frame.
-  void place_first(const SE3& T_frame_first) { T_frame_kf_.front() = T_frame_first; }
+  void place_first(const SE3& T_frame_first) {
+    T_frame_kf_.front() = T_frame_first;
+    covariances_.clear();
+  }
 
   /// Improves the start of a session of this robot alone: the chordal initialisation replaces the
   /// poses if its cost is lower. If closures are `trusted`, all of them count. Otherwise, the
@@ -50,6 +58,7 @@ class OwnPoses {
                                                       std::span<const PoseEdge> inside) const;
 
   std::vector<SE3> T_frame_kf_, restored_;
+  std::vector<Matrix6> covariances_;
   std::set<std::size_t> corrected_;  // steps
   std::size_t improved_with_ = 0;    // number of closures
 };

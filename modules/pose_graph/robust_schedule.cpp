@@ -40,7 +40,7 @@ double chi_squared_3_quantile(double probability) {
 double robust_weight(double squared_residual, double squared_barc, double mu) {
   if (mu >= kHardMu) return squared_residual <= squared_barc ? 1.0 : 0.0;
   if (squared_residual * (mu + 1.0) <= mu * squared_barc) return 1.0;
-  if (squared_residual * mu >= (mu + 1.0) * squared_barc) return 0.0;
+  if (!(squared_residual * mu < (mu + 1.0) * squared_barc)) return 0.0;  // also if not a number
   return std::clamp(std::sqrt(mu * (mu + 1.0) * squared_barc / squared_residual) - mu, 0.0, 1.0);
 }
 

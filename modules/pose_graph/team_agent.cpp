@@ -333,7 +333,7 @@ void TeamAgent::publish(TeamOutput& output) {
   const SE3 T_world_frame = world->T_frame_world.inverse();
   for (const SE3& T_frame_kf : poses()) trajectory.T_world_kf.push_back(T_world_frame * T_frame_kf);
   if (state_ == SessionState::kSolved && world->anchor == part_->session().anchor)
-    trajectory.covariances = part_->covariances();
+    trajectory.covariances = poses_.covariances();
   trajectory.scale_sigma = robot_in_datum() ? 0.0 : config_.scale_sigma;
   trajectory.public_poses = held_poses(T_world_frame);
   output.trajectory = std::move(trajectory);

@@ -438,7 +438,12 @@ void TeamAgent::conclude(TeamOutput& output) {
 }
 
 void TeamAgent::leave(bool with_solution) {
-  if (part_->stage()) poses_.set(with_solution ? part_->poses() : part_->committed_poses());
+  if (part_->stage()) {
+    if (with_solution)
+      poses_.set(part_->poses(), part_->covariances());
+    else
+      poses_.set(part_->committed_poses());
+  }
   state_ = with_solution ? SessionState::kSolved : SessionState::kAbandoned;
   const Session& session = part_->session();
   if (with_solution && session.finished && session.T_frame_world)

@@ -43,7 +43,7 @@ bool TeamNotices::refuse(const std::string& reason) {
 
 void TeamNotices::odometry(const OdometryNoise& noise) {
   const double worst = std::max(noise.rotation, noise.translation);
-  if (worst < kNoisyOdometry || worst < kNoticedAgain * odometry_noise_) return;
+  if (!(worst >= kNoisyOdometry && worst >= kNoticedAgain * odometry_noise_)) return;
   odometry_noise_ = worst;
   add("odometry is " + fixed(noise.rotation, 1) + " times noisier in rotation and " +
       fixed(noise.translation, 1) + " times in translation than it claims, by " +
@@ -75,7 +75,7 @@ void TeamNotices::breaks(std::span<const OdometryBreak> breaks) {
 void TeamNotices::closures(const ClosureNoiseRecord& noise) {
   for (const auto& [peer, cycles] : noise.pairs) {
     double& last = closure_factors_.try_emplace(peer, 1.0).first->second;
-    if (cycles.factor < kNoticedAgain * last) continue;
+    if (!(cycles.factor >= kNoticedAgain * last)) continue;
     last = cycles.factor;
     add((peer == self_ ? "closures inside this robot"
                        : "closures with robot " + std::to_string(peer)) +

@@ -47,10 +47,10 @@ void TreeNewton::weigh_by_noise() {
 // A pair whose cycles do not show how noisy its closures are is assumed to have the noise of the
 // usual pair.
 void TreeNewton::weigh_by_usual_noise() {
-  if (verdict_.usual_noise <= 1.0) return;
+  if (!(verdict_.usual_noise > 1.0)) return;
   for (const auto& [peer, indices] : by_peer()) {
     PairCycles& cycles = graph_.noise.pairs[peer];
-    if (cycles.factor >= verdict_.usual_noise) continue;
+    if (!(cycles.factor < verdict_.usual_noise)) continue;
     const double usual = verdict_.usual_noise * verdict_.noise_scale;
     if (excludes_noise(cycles, usual, cycles.factor * verdict_.noise_scale)) continue;
     weaken(indices, verdict_.usual_noise / cycles.factor);

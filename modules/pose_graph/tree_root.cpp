@@ -87,7 +87,8 @@ double noise_allowed(double scale, double cost, std::uint32_t kept, std::size_t 
   const double freedom = (dimension == 2 ? 3.0 : 6.0) * cycles;
   const double v = 2.0 / (9.0 * freedom);
   const double quantile = freedom * std::pow(1.0 - v + kQuantile * std::sqrt(v), 3.0);
-  return std::clamp(std::sqrt(cost / quantile), 1.0, scale);
+  const double allowed = std::sqrt(cost / quantile);
+  return allowed < scale ? std::max(1.0, allowed) : scale;
 }
 
 std::vector<std::pair<RobotId, SinglePose>> moves_of(const std::vector<PairVote>& votes) {

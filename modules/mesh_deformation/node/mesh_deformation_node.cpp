@@ -82,6 +82,7 @@ void MeshDeformationNode::step(const Input& input, double now_s) {
   if (const auto* map = std::get_if<Topic<MapMesh>::Message>(&input)) return take(*map);
   if (const auto* trajectory = std::get_if<Topic<Trajectory>::Message>(&input)) {
     trajectory_ = *trajectory;
+    if (!trajectory_->covariances.empty()) solved_ = trajectory_;
     return;
   }
   ended_ = std::holds_alternative<End>(input);
@@ -109,10 +110,11 @@ bool MeshDeformationNode::can_correct() const {
 
 CorrectionInput MeshDeformationNode::input() const {
   const auto& T_world_kf = trajectory_->T_world_kf;
-  const auto& covariances = trajectory_->covariances;
+  const std::span<const Matrix6> covariances =
+      solved_ ? std::span(solved_->covariances) : std::span<const Matrix6>();
   return {*map_, map_version_, T_odom_kf_,
           std::span(T_world_kf).first(std::min(T_world_kf.size(), T_odom_kf_.size())),
-          std::span(covariances).first(std::min(covariances.size(), T_odom_kf_.size()))};
+          covariances.first(std::min({covariances.size(), T_world_kf.size(), T_odom_kf_.size()}))};
 }
 
 void MeshDeformationNode::correct() {

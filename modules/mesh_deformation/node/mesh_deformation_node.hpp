@@ -90,6 +90,7 @@ class MeshDeformationNode final : public Node {
   std::size_t keyframes_of_map_ = 0;
   std::vector<SE3> T_odom_kf_;
   Topic<Trajectory>::Message trajectory_;
+  Topic<Trajectory>::Message solved_;  // the last trajectory that has covariances
   double next_s_ = 0.0;
   bool ended_ = false;
   // Numbers of maps and trajectories: that have arrived, of which the newest are handled, and with

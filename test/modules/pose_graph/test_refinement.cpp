@@ -78,6 +78,9 @@ TEST_CASE("between sessions a robot follows its new closures, without a message"
   const std::vector<SE3> refined = team.network.robots.at(1).trajectory->T_world_kf;
   REQUIRE(refined.size() == kAll);
   CHECK(team.network.robots.at(2).trajectory->T_world_kf.size() == kFirst);
+  // Covariances are those of the published poses: the session has some, the refinement has none.
+  CHECK(team.network.robots.at(2).trajectory->covariances.size() == kFirst);
+  CHECK(team.network.robots.at(1).trajectory->covariances.empty());
 
   // The poses by odometry from the same keyframe.
   std::vector<SE3> extended(refined.begin(), refined.begin() + kFirst);

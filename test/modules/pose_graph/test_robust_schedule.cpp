@@ -25,8 +25,7 @@ struct Weighed {
   void run() {
     const double largest = *std::max_element(residuals.begin(), residuals.end());
     weights.assign(residuals.size(), 1.0);
-    schedule.start(static_cast<float>(largest), static_cast<std::uint32_t>(residuals.size()), barc,
-                   0);
+    schedule.start(static_cast<float>(largest), static_cast<std::uint32_t>(residuals.size()), barc);
     while (!schedule.decided()) {
       RobustSchedule::Tally tally;
       for (std::size_t k = 0; k < residuals.size(); ++k) {
@@ -42,6 +41,11 @@ struct Weighed {
     }
   }
 };
+
+TEST_CASE("A residual that is not a number has no weight", "[pose_graph]") {
+  const double mu = GENERATE(1e-3, 1.0, 2.0 * kHardMu);
+  CHECK(robust_weight(std::numeric_limits<double>::quiet_NaN(), 9.0, mu) == 0.0);
+}
 
 TEST_CASE("The weight of a closure minimises the surrogate of the truncated cost", "[pose_graph]") {
   const double c2 = 9.0;
@@ -85,12 +89,6 @@ TEST_CASE(
     CHECK(cost > before);
     before = cost;
   }
-}
-
-TEST_CASE("Nothing is truncated if all residuals are small", "[pose_graph]") {
-  CHECK(first_mu(9.99, 20.0) == kLargestMu);
-  CHECK(first_mu(0.0, 20.0) == kLargestMu);
-  CHECK(robust_weight(9.99, 20.0, kLargestMu) == 1.0);
 }
 
 TEST_CASE("The default threshold is a chi-squared quantile", "[pose_graph]") {
@@ -143,7 +141,7 @@ TEST_CASE("Weights that never settle are decided nevertheless", "[pose_graph]") 
   const RobustSchedule::Tally restless =
       GENERATE(RobustSchedule::Tally{.changed = 1}, RobustSchedule::Tally{.fractional = 1},
                RobustSchedule::Tally{1, 1});
-  schedule.start(1e6F, 10, 3.0, 0);
+  schedule.start(1e6F, 10, 3.0);
   int steps = 0;
   while (!schedule.decided() && steps <= 100) {
     schedule.next(restless);
@@ -152,48 +150,13 @@ TEST_CASE("Weights that never settle are decided nevertheless", "[pose_graph]") 
   CHECK(schedule.decided());
 }
 
-TEST_CASE("A schedule decides at once if all residuals are small", "[pose_graph]") {
-  RobustSchedule schedule;
-  schedule.start(2.0F, 3, 3.0, 0);
-  CHECK_FALSE(schedule.decided());
-  CHECK(schedule.mu() == kLargestMu);
-  schedule.next({});
-  CHECK(schedule.decided());
-}
-
 TEST_CASE("Without closures that may be rejected all weights are final", "[pose_graph]") {
   RobustSchedule schedule;
   CHECK(schedule.decided());
-  schedule.start(1e3F, 0, 3.0, 4);
+  schedule.start(1e3F, 0, 3.0);
   CHECK(schedule.decided());
-  CHECK_FALSE(schedule.unweighed());
   schedule.next({1, 1});
   CHECK(schedule.decided());
-}
-
-TEST_CASE("The first steps use all closures with full weight", "[pose_graph]") {
-  RobustSchedule schedule;
-  schedule.start(50.0F, 3, 3.0, 2);
-  const double mu = schedule.mu();
-  for (int step = 0; step < 2; ++step) {
-    CHECK(schedule.unweighed());
-    schedule.next({});
-    CHECK_FALSE(schedule.decided());
-    CHECK(schedule.mu() == mu);
-  }
-  CHECK_FALSE(schedule.unweighed());
-  schedule.next({1, 1});
-  CHECK(schedule.mu() > mu);
-}
-
-TEST_CASE("A schedule can be started again", "[pose_graph]") {
-  RobustSchedule schedule;
-  schedule.start(2.0F, 3, 3.0, 0);
-  schedule.next({});
-  REQUIRE(schedule.decided());
-  schedule.start(50.0F, 3, 3.0, 0);
-  CHECK_FALSE(schedule.decided());
-  CHECK(schedule.mu() == Approx(first_mu(2500.0, 9.0)));
 }
 
 }  // namespace
