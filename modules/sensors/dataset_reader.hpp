@@ -61,13 +61,12 @@ struct DatasetError : std::runtime_error {
 struct RecordingPart {
   double from_s = 0.0;                                    ///< First instant of the part.
   double to_s = std::numeric_limits<double>::infinity();  ///< First instant after the part.
-  std::optional<Stamp> not_before = {
-      /// Throws std::invalid_argument for a part that is empty or not a number. `recording`: path
-      /// for
-      /// the message.
-      void check(const std::string& recording) const;
-};  ///< No frame before this instant.
-};  // namespace km
+  std::optional<Stamp> not_before = {};                   ///< No frame before this instant.
+
+  /// Throws std::invalid_argument for a part that is empty or not a number. `recording`: path for
+  /// the message.
+  void check(const std::string& recording) const;
+};
 
 /// A source of sensor packets in order of time. Not thread-safe.
 class DatasetReader {
