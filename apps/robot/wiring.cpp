@@ -33,8 +33,8 @@ namespace km {
 namespace {
 
 constexpr std::string_view kRecordNode = "record";
-constexpr int kMeshPoints = 200000, kMeshFaces = 50000;  // of a mesh that viewers receive
-constexpr double kMeshBytesPerS = 2e6;  // average rate of the faces that viewers of ROS receive
+constexpr int kMeshPoints = 200000, kMeshFaces = 50000;  // largest mesh for viewers
+constexpr double kMeshBytesPerS = 2e6;  // average rate of its faces
 
 template <typename T>
 void forward(In<T> from, Out<T> to) {

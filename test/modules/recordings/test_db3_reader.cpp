@@ -87,7 +87,7 @@ TEST_CASE("Images and inertial samples in a bag of ROS 2 are decoded", "[recordi
   const auto folder = shared_data("ros_recordings/rosbag2/s3e_playground_2");
   if (!folder) return;
   const auto reader = open_bag(*folder);
-  std::vector<Stamp> stamps;  // of the left camera
+  std::vector<Stamp> stamps;  // left camera
   std::size_t samples = 0;
   while (const auto message = reader->next()) {
     const BagChannel& channel = reader->channels()[message->channel];

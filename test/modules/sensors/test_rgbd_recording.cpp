@@ -111,7 +111,7 @@ TEST_CASE("A recording without requested depth or labels is refused", "[sensors]
   refusal_with({.labels = true}, "label0/data.csv: no such file");
   folder.add_depth();
   fs::remove_all(folder.mav0() / "depth0/data");
-  CHECK(read(folder, {.depth = true}).packets.size() == EurocFolder::kPairs);  // stereo goes on
+  CHECK(read(folder, {.depth = true}).packets.size() == EurocFolder::kPairs);  // stereo only
   fs::remove_all(folder.mav0() / "cam1");
   refusal_with({}, "mav0: no depth image for any of 8 images, first: ");
   folder.write("depth0/data.csv", "55,55.png\n");
