@@ -125,5 +125,5 @@ for (const [type, make] of messages) {
   const plain = (value) =>
     JSON.parse(JSON.stringify(value, (_, v) => (ArrayBuffer.isView(v) ? Array.from(v) : v)));
   assert.deepStrictEqual(plain(new MessageReader(definition).readMessage(bytes)), plain(message));
-  console.log(`${type} ${Buffer.from(bytes).toString("hex")}`);
+  console.log(`${type} cdr ${Buffer.from(bytes).toString("hex")}`);
 }
