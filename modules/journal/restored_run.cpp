@@ -54,8 +54,8 @@ void RunRestorer::take(StoredEntry stored) {
 
 void RunRestorer::add(JournalStart start) {
   if (started_ && start.robot != run_.robot)
-    throw std::invalid_argument("begun by robot " + std::to_string(run_.robot) +
-                                ", taken up by robot " + std::to_string(start.robot));
+    throw std::invalid_argument("started by robot " + std::to_string(run_.robot) +
+                                ", continued by robot " + std::to_string(start.robot));
   cut_to_full_keyframes();
   started_ = first_state_ = true;
   run_.robot = start.robot;

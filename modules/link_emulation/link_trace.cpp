@@ -15,7 +15,7 @@ constexpr std::size_t kColumns = 3;
 
 // Index and problem of the first unusable row; an empty problem if `rows` are a trace.
 std::pair<std::size_t, std::string> problem_of(const std::vector<LinkTraceRow>& rows) {
-  if (rows.empty()) return {0, "holds no row"};
+  if (rows.empty()) return {0, "has no row"};
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const LinkTraceRow& row = rows[i];
     if (!(row.bytes_per_s >= 0.0)) return {i, "bytes_per_s is below zero"};

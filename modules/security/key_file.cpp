@@ -31,7 +31,7 @@ void check_access(const fs::path& file, const fs::file_status& status) {
   char text[8];
   std::snprintf(text, sizeof text, "%04o", static_cast<unsigned>(mode & fs::perms::mask));
   throw std::runtime_error(file.string() + ": has mode " + text +
-                           ", so others than its owner can reach a secret; if nobody has read it, "
+                           ", so other users can read a secret; if nobody has read it, "
                            "run: chmod 600 " +
                            file.string() + "; otherwise revoke its certificate");
 }

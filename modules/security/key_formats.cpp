@@ -75,8 +75,8 @@ void write_secret_key(const std::filesystem::path& file, const SigningKey& key,
                       const std::string& owner) {
   const Secret<32> seed = seed_of(key);
   write_key_file(file,
-                 "# The secret of " + owner + ". Whoever has it can pass for it: mode 0600,\n" +
-                     "# one copy, none on paper, in mail or in git.\nformat: " + kSecretKeyFormat +
+                 "# Secret key of " + owner + ". Its holder can act as this robot or authority:\n" +
+                     "# mode 0600, one copy, never in mail or git.\nformat: " + kSecretKeyFormat +
                      "\nsecret_key: " + to_hex({seed.data(), seed.size()}) + '\n',
                  KeyFileAccess::kOwner);
 }
@@ -96,8 +96,7 @@ void write_certificate(const std::filesystem::path& file, const Certificate& cer
 void write_authority(const std::filesystem::path& file, const Authority& authority) {
   write_key_file(file,
                  "# Key of the authority that the robots of this team trust. Everyone may read it, "
-                 "only the authority "
-                 "may change it.\nformat: " +
+                 "only the authority may change it.\nformat: " +
                      std::string(kAuthorityFormat) + "\nteam: " + authority.team +
                      "\npublic_key: " + to_hex(authority.key) + '\n',
                  KeyFileAccess::kEveryone);
@@ -105,7 +104,7 @@ void write_authority(const std::filesystem::path& file, const Authority& authori
 
 void write_revocations(const std::filesystem::path& file, const Revocations& revocations) {
   std::ostringstream out;
-  out << "# Certificates that no longer hold: public key, id and name of the robot. Everyone may "
+  out << "# Revoked certificates: public key, id and name of the robot. Everyone may "
          "read it.\nformat: "
       << kRevocationsFormat << "\nnumber: " << revocations.number << '\n';
   for (const RevokedCertificate& one : revocations.revoked)

@@ -115,7 +115,7 @@ TeamSeal::TeamSeal(RobotKeys keys, const RobotIdentity& own, std::int64_t now_s)
   if (!is_signed_by(authority_, revocations_))
     throw std::invalid_argument("the list of revocations is not the authority's");
   if (const char* why = why_refused(certificate, authority_, revocations_, now_s))
-    throw std::invalid_argument("the keys of " + own.name + " are of no use: " + why +
+    throw std::invalid_argument("the keys of " + own.name + " cannot be used: " + why +
                                 "; `kimera_multi_keys add` makes new ones");
   start_sodium();
   crypto_kx_keypair(exchange_.data(), exchange_secret_.data());
@@ -216,7 +216,7 @@ const char* TeamSeal::accept_key_message(const TeamPeer& from, OctetView message
   AdmittedPeer* sender = peers_.find(from);
   if (sender == nullptr) return "key message of a process that is not admitted";
   auto content = decrypt(sender->from_peer, key_message_data(from, self_), message);
-  if (!content) return "key message is not its sender's to this process";
+  if (!content) return "key message is not from its sender, or not for this process";
   std::vector<TeamKey> keys = team_keys_from(*content);
   sodium_memzero(content->data(), content->size());
   if (keys.empty()) return "key message does not hold keys";
@@ -268,7 +268,7 @@ Opened TeamSeal::open_for_self(const SealContext& context, OctetView sealed) {
   const AdmittedPeer* sender = peers_.find(context.sender);
   if (sender == nullptr) return not_yet("its sender is not admitted");
   auto content = decrypt(sender->from_peer, associated_data(context), sealed);
-  if (!content) return refused("message is not its sender's, or was changed on its way");
+  if (!content) return refused("message is not from its sender, or was changed");
   peers_.received(context.sender);
   return opened(std::move(*content));
 }
@@ -286,15 +286,15 @@ Opened TeamSeal::open_to_all(const SealContext& context, OctetView sealed) {
   if (sender == nullptr) return not_yet("its sender is not admitted");
   const std::vector<TeamKey>& keys = sender->team_keys;
   if (keys.empty() || number > keys.back().number)
-    return not_yet("its sender's key for messages to all is not here");
+    return not_yet("the key of its sender for messages to all is unknown");
   const auto key = std::ranges::find(keys, number, &TeamKey::number);
-  if (key == keys.end()) return refused("message under a key that its sender gave up");
+  if (key == keys.end()) return refused("message under a former key of its sender");
   Octets associated = associated_data(context);
   associated.insert(associated.end(), number_octets.begin(), number_octets.end());
   // The tag comes first: it is much cheaper to check than a signature, and refuses all senders
   // outside the team.
   auto content = decrypt(key->key, associated, encrypted);
-  if (!content) return refused("message is not its sender's, or was changed on its way");
+  if (!content) return refused("message is not from its sender, or was changed");
   if (!verify(signed_statement(key->key, associated, encrypted), signature,
               sender->certificate.key))
     return refused("message is not signed by its sender");

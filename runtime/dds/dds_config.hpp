@@ -39,9 +39,9 @@ struct DdsConfig {
     visitor.field("domain", domain, {0, 230},
                   "only robots of one DDS domain meet; ports start at 7400 + 250 * domain: above "
                   "100 they may be in use by other programs");
-    visitor.field("team", team, "robots of other teams are not seen");
+    visitor.field("team", team, "robots of other teams are ignored");
     visitor.field("interface", interface,
-                  "network interface; empty: chosen, see log and select_interface()");
+                  "network interface; empty: chosen automatically, see the log");
     visitor.field(
         "discovery", discovery,
         {{"multicast", Discovery::kMulticast}, {"peers", Discovery::kPeers}},

@@ -118,7 +118,7 @@ void IncomingTopic::arrive(const ddsi_serdata& serialized, dds_instance_handle_t
   if (ddsi_serdata_size(&serialized) > envelope_bytes(spec_.max_bytes + seal_bytes))
     return refuse("larger than its topic allows");
   const auto guid = writers_.participant_of(writer);
-  if (!guid) return refuse("from no known writer");
+  if (!guid) return refuse("its writer is unknown");
   Received envelope(static_cast<km_wire_Envelope*>(dds_alloc(sizeof(km_wire_Envelope))));
   *envelope = {};
   if (!ddsi_serdata_to_sample(&serialized, envelope.get(), nullptr, nullptr))
@@ -130,7 +130,7 @@ void IncomingTopic::arrive(const ddsi_serdata& serialized, dds_instance_handle_t
   receive_claim(*envelope, *guid, claim, now_s);
   const std::size_t bytes = kept_bytes(*envelope);
   if (!waiting_.push(*guid, std::move(envelope), bytes, now_s))
-    refuse("one too many from a robot that is not known yet");
+    refuse("too many messages from a robot that is not known yet");
 }
 
 void IncomingTopic::recall(double now_s) {
@@ -142,7 +142,7 @@ void IncomingTopic::recall(double now_s) {
     }
     if (claim.standing == Standing::kArriving || waited_s < kPatience_s) return false;
     refuse(claim.standing == Standing::kRival ? "claims another robot's id"
-                                              : "from no known robot");
+                                              : "its sender is not a known robot");
     return true;
   };
   while (waiting_.serve(now_s, take) > 0) {
@@ -159,7 +159,7 @@ bool IncomingTopic::is_settled(Standing standing) const {
 
 void IncomingTopic::admit(Received envelope, const Guid& writer, const Peers::Claim& claim,
                           double now_s) {
-  if (claim.standing == Standing::kOutsider) return refuse("from no known robot");
+  if (claim.standing == Standing::kOutsider) return refuse("its sender is not a known robot");
   if (claim.standing == Standing::kTwin && !spec_.carries_keys) {
     receive_claim(*envelope, writer, claim, now_s);
     return refuse("claims this robot's id");
@@ -176,7 +176,7 @@ void IncomingTopic::file(Received envelope, const TeamPeer& sender, const Guid& 
     fits = filed_.push(sender.robot, {std::move(envelope), sender, writer}, bytes, now_s);
     filed_changed_.notify_one();
   }
-  if (!fits) refuse("for want of room");
+  if (!fits) refuse("no room for it");
 }
 
 // Handles a status of a participant that is not (yet) the robot it claims to be. The status of a
@@ -251,7 +251,7 @@ void IncomingTopic::await_key(Filed filed, double now_s) {
   const RobotId sender = filed.sender.robot;
   const std::size_t bytes = kept_bytes(*filed.envelope);
   if (!sealed_.push(sender, std::move(filed), bytes, now_s))
-    refuse("one too many under a key that is not known yet");
+    refuse("too many messages under a key that is not known yet");
 }
 
 // For each robot, delivers the oldest message that could not be opened because its key is missing.

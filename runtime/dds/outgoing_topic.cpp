@@ -257,7 +257,7 @@ const char* OutgoingTopic::seal(const Writer& writer, const km_wire_Envelope& he
   const SealedEnvelope envelope(spec_.name, participant_.guid(), head, writer.receiver);
   auto sealed = participant_.seal()->with(
       [&](const TeamSeal& team) { return team.seal(envelope.context(), content); });
-  if (!sealed) return "the robot that it is for has shown no keys";
+  if (!sealed) return "the keys of its addressee are unknown";
   content = std::move(*sealed);
   return nullptr;
 }

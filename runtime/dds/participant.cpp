@@ -205,14 +205,14 @@ DdsDomain::DdsDomain(const DdsConfig& config, NetworkInterface interface)
     : config_(checked(config)), interface_(std::move(interface)) {
   dds_set_log_mask(DDS_LC_FATAL | DDS_LC_ERROR | DDS_LC_WARNING);
   dds_set_log_sink(&log_line, nullptr);
-  domain_ = DdsEntity(
-      dds_create_domain(static_cast<dds_domainid_t>(config_.domain),
-                        cyclone_xml(config_, interface_).c_str()),
-      "DDS domain " + std::to_string(config_.domain) + " on interface " + interface_.name +
-          (config_.domain > static_cast<int>(kLastQuietDomain)
-               ? " (its ports may be in use: up to " + std::to_string(kLastQuietDomain) +
-                     " they are not given to other programs)"
-               : ""));
+  domain_ = DdsEntity(dds_create_domain(static_cast<dds_domainid_t>(config_.domain),
+                                        cyclone_xml(config_, interface_).c_str()),
+                      "DDS domain " + std::to_string(config_.domain) + " on interface " +
+                          interface_.name +
+                          (config_.domain > static_cast<int>(kLastQuietDomain)
+                               ? " (other programs may use its ports, but not those up to domain " +
+                                     std::to_string(kLastQuietDomain) + ")"
+                               : ""));
 }
 
 DdsDomain::~DdsDomain() {
@@ -222,7 +222,7 @@ DdsDomain::~DdsDomain() {
   start_without_signals(std::move(remove)).detach();
   if (removed.wait_for(kLongest) != std::future_status::ready)
     log::warn("dds") << "DDS does not end on interface " << interface_.name << " ("
-                     << interface_.address << "): it is left as it is";
+                     << interface_.address << "): it is abandoned";
 }
 
 DdsParticipant::DdsParticipant(const DdsConfig& config, const RobotIdentity& identity,
@@ -232,7 +232,7 @@ DdsParticipant::DdsParticipant(const DdsConfig& config, const RobotIdentity& ide
   if (choice_->waits())
     log::warn("dds") << (config.interface.empty() ? "no network interface is up"
                                                   : "interface " + config.interface + " is not up")
-                     << ": waiting for it, until then only robots on this host are met";
+                     << ": waiting for it; until then this robot meets only robots on this host";
 }
 
 DdsParticipant::DdsParticipant(std::shared_ptr<const DdsDomain> domain,

@@ -103,7 +103,7 @@ void PeerTable::expel(const std::vector<TeamPeer>& processes) {
   }
   for (const Guid& guid : expelled) {
     give_way(guid, PeerState::kLost, PeerEventKind::kLost,
-             "lost: it is no member of the team any more");
+             "lost: it is no longer a member of the team");
     if (const auto found = participants_.find(guid); found != participants_.end())
       found->second.identity.reset();
   }
@@ -158,13 +158,13 @@ void PeerTable::twin_received(const Guid& guid, double its_uptime_s, double own_
         yields ? PeerEventKind::kConflict : PeerEventKind::kRefused, *twin.identity,
         claim + (yields               ? "; it had the id first, and this robot ends"
                  : twin.twin->decided ? "; this robot had the id first, and keeps it"
-                                      : "; both began at about one time, and one will end"));
+                                      : "; both started at about the same time, and one will end"));
   }
   if (twin.twin->decided || own_uptime_s - twin.twin->met_s < kDecided_s) return;
   twin.twin->decided = true;
   if (twin.identity->boot < self_.boot)
     emit(PeerEventKind::kConflict, *twin.identity,
-         claim + "; both began at about one time, and this robot ends");
+         claim + "; both started at about the same time, and this robot ends");
 }
 
 std::vector<Peer> PeerTable::peers() const {
@@ -224,7 +224,7 @@ void PeerTable::appear(const Guid& guid, Participant& participant) {
     if (peers_.size() >= kMaxRobots && !make_place(identity)) {
       if (!std::exchange(participant.warned, true))
         emit(PeerEventKind::kRefused, identity,
-             "waits: there are " + std::to_string(kMaxRobots) + " robots, until one is lost");
+             "waits until one of " + std::to_string(kMaxRobots) + " known robots is lost");
       return;
     }
     peers_.emplace(identity.robot,
@@ -238,8 +238,8 @@ void PeerTable::appear(const Guid& guid, Participant& participant) {
   if (!std::exchange(participant.warned, true))
     emit(PeerEventKind::kRefused, identity,
          "at " + participant.addresses + " ignored: another process, at " + known.peer.addresses +
-             (former ? ", has taken over that id: if this one is the robot, start it again"
-                     : ", has that id, until it falls silent"));
+             (former ? ", has taken over this id: to use the id again, start it again"
+                     : ", has this id until it is lost"));
 }
 
 // Gives the place of the robot that has been lost for longest. False if all are present.
@@ -255,7 +255,7 @@ bool PeerTable::make_place(const RobotIdentity& newcomer) {
   identity.boot = 0;
   peers_.erase(longest_lost);
   emit(PeerEventKind::kRestarted, identity,
-       "was lost for longest: its place is taken by " + to_string(newcomer), false);
+       "was lost for longest: its place goes to " + to_string(newcomer), false);
   return true;
 }
 

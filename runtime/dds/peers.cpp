@@ -58,8 +58,6 @@ std::optional<Guid> participant_of_subscription(dds_entity_t writer, dds_instanc
   return take_participant(dds_get_matched_subscription_data(writer, reader));
 }
 
-WriterBook::WriterBook() = default;
-
 void WriterBook::listen(dds_listener_t* listener) {
   dds_lset_subscription_matched_arg(listener, &WriterBook::on_matched, this, true);
 }
@@ -136,7 +134,7 @@ void Peers::open() {
 
 // PeerTable calls this function, while the calling member function of Peers holds the mutex.
 const char* Peers::admit(const RobotIdentity& identity, std::string_view credentials) {
-  if (credentials.empty()) return "shows no keys";
+  if (credentials.empty()) return "announces no keys";
   const auto now_s = static_cast<std::int64_t>(wall_now_s());
   if (const char* reason =
           seal_->with([&](TeamSeal& seal) { return seal.admit(identity, credentials, now_s); }))
@@ -170,8 +168,6 @@ std::optional<TeamPeer> Peers::current(RobotId robot) const {
   const std::lock_guard lock(mutex_);
   return table_.current(robot);
 }
-
-Peers::~Peers() = default;
 
 void Peers::listen(dds_listener_t* listener) {
   dds_lset_liveliness_changed_arg(listener, &Peers::on_liveliness_changed, this, true);

@@ -20,7 +20,7 @@ namespace km {
 /// writer are thus still attributed to its robot. Thread-safe.
 class WriterBook {
  public:
-  WriterBook();
+  WriterBook() = default;
   WriterBook(const WriterBook&) = delete;
   WriterBook& operator=(const WriterBook&) = delete;
 
@@ -57,7 +57,6 @@ class EventReceipts : public std::enable_shared_from_this<EventReceipts> {
 class Peers {
  public:
   explicit Peers(const DdsParticipant& participant);
-  ~Peers();
   Peers(const Peers&) = delete;
   Peers& operator=(const Peers&) = delete;
 

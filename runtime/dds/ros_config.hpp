@@ -19,8 +19,9 @@ struct RosConfig {
 
   void visit_fields(auto& visitor) {
     visitor.field("domain", domain, {0, 230}, "ROS_DOMAIN_ID of drivers and viewers");
-    visitor.field("interface", interface,
-                  "network interface of theirs; empty: chosen; lo with ROS_LOCALHOST_ONLY=1");
+    visitor.field(
+        "interface", interface,
+        "network interface to them; empty: chosen automatically; lo with ROS_LOCALHOST_ONLY=1");
     visitor.field("peers", peers, "addresses of their hosts, for networks without multicast");
     visitor.field("publish", publish,
                   "publish the robot's state for viewers: odometry, pose, tf, path, mesh, "

@@ -71,8 +71,8 @@ RosNetwork::RosNetwork(const RosConfig& config) : ros_domain_(config.domain) {
   domain_ =
       DdsEntity(dds_create_domain(number, cyclone_xml(config, interface).c_str()),
                 "domain " + std::to_string(config.domain) + " of ROS on interface " + interface_);
-  participant_ =
-      DdsEntity(dds_create_participant(number, nullptr, nullptr), "participant among those of ROS");
+  participant_ = DdsEntity(dds_create_participant(number, nullptr, nullptr),
+                           "participant in the domain of ROS");
 }
 
 const dds_topic_descriptor_t& RosNetwork::descriptor_of(std::string_view type) {
@@ -82,7 +82,7 @@ const dds_topic_descriptor_t& RosNetwork::descriptor_of(std::string_view type) {
   });
   if (known == kTypes.end())
     throw std::invalid_argument("messages of " + readable(std::string(type), 80) +
-                                " are of no type that is known");
+                                " have an unknown type");
   return *known->descriptor;
 }
 

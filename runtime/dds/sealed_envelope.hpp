@@ -2,9 +2,12 @@
 
 #include <envelope.h>
 
+#include <algorithm>
+#include <array>
 #include <optional>
 #include <string>
 
+#include "modules/core/bytes.hpp"
 #include "modules/security/team_seal.hpp"
 #include "runtime/dds/entity.hpp"
 
@@ -17,10 +20,22 @@ class SealedEnvelope {
  public:
   /// `head` is copied; its content is not looked at. `addressee`: none for a message to all.
   SealedEnvelope(const std::string& topic, const Guid& writer, const km_wire_Envelope& head,
-                 std::optional<TeamPeer> addressee);
+                 std::optional<TeamPeer> addressee)
+      : way_(topic + '/' + std::string(writer.begin(), writer.end())),
+        sender_{head.robot, head.boot},
+        number_(head.number),
+        addressee_(addressee) {
+    ByteWriter key;
+    key.u64(head.key);
+    key.u16(head.version);
+    std::ranges::copy(key.release(), key_.begin());
+  }
 
   /// The result refers to this object.
-  [[nodiscard]] SealContext context() const;
+  [[nodiscard]] SealContext context() const {
+    return {
+        .topic = way_, .sender = sender_, .number = number_, .key = key_, .addressee = addressee_};
+  }
 
  private:
   std::string way_;

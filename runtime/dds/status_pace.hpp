@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -23,7 +24,15 @@ class StatusPace {
 
   /// To be called once per tick. `awaited`: any number that changes with what others wait for.
   /// `others`: number of other robots whose statuses have arrived.
-  [[nodiscard]] bool is_due(std::uint32_t awaited, std::size_t others);
+  [[nodiscard]] bool is_due(std::uint32_t awaited, std::size_t others) {
+    constexpr auto kNewTicks = static_cast<std::size_t>(kNew_s / kStatusPeriod_s);
+    const bool is_new = ticks_++ <= kNewTicks;
+    const std::size_t period = std::max(kUsualTicks, (others + kPerTick - 1) / kPerTick);
+    if (!is_new && awaited_ == awaited && ++since_sent_ < period) return false;
+    since_sent_ = 0;
+    awaited_ = awaited;
+    return true;
+  }
 
  private:
   std::size_t ticks_ = 0;

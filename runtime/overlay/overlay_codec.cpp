@@ -54,7 +54,7 @@ Decoded<OverlayPacket> decode_overlay_packet(std::span<const std::uint8_t> bytes
   OverlayMessage message;
   const std::uint8_t head = in.u8();
   if ((head & ~(kSignedBit | kOwnBit)) > static_cast<unsigned>(OverlayStream::kInlierSet))
-    return Result::refuse("a stream that is not known");
+    return Result::refuse("unknown stream");
   message.stream = static_cast<OverlayStream>(head & kStreamBits);
   message.is_signed = (head & kSignedBit) != 0;
   const bool is_own = (head & kOwnBit) != 0;
@@ -63,17 +63,17 @@ Decoded<OverlayPacket> decode_overlay_packet(std::span<const std::uint8_t> bytes
   if (is_addressed(message.stream)) message.to = in.varint_as<RobotId>();
   if (is_reliable(message.stream)) message.to_boot = in.u64();
   if (is_call(message.stream)) message.hops = in.u8();
-  if (in.failed()) return Result::refuse("cut short, or a number out of range");
+  if (in.failed()) return Result::refuse("truncated, or a number is out of range");
   const auto content = in.bytes(in.left());
-  if (lane_of(message.stream) != lane) return Result::refuse("a stream of another topic");
-  if (message.origin.boot == 0) return Result::refuse("of no process");
+  if (lane_of(message.stream) != lane) return Result::refuse("stream of another topic");
+  if (message.origin.boot == 0) return Result::refuse("its boot id is 0");
   if (!is_own && message.origin.robot == writer.robot)
     return Result::refuse("its origin is a former process of its sender");
   if (content.size() > max_content(lane)) return Result::refuse("the content is too long");
   if (message.is_signed && content.size() < kEndorsementBytes)
     return Result::refuse("shorter than its signature");
   if (message.stream == OverlayStream::kIntroduction && !parse_introduction(content))
-    return Result::refuse("a name that no robot has");
+    return Result::refuse("introduction without a robot name");
   message.content.assign(content.begin(), content.end());
   return Result::accept(
       {writer.robot, std::make_shared<const OverlayMessage>(std::move(message)), is_own});

@@ -113,7 +113,7 @@ const char* OverlayNode::take(const TeamPeer& sender, const OverlayPacket& packe
   // A message may arrive before the PeerEvent of its sender.
   const auto from = is_known ? RobotIdentity{.robot = sender.robot, .name = {}, .boot = sender.boot}
                              : identity_of(sender).value_or(RobotIdentity());
-  if (from.boot == 0) return "from a robot that is not known";
+  if (from.boot == 0) return "its sender is unknown";
   OverlayArrival arrival = OverlayArrival::kNew;
   const char* refusal = nullptr;
   act([&](Overlay& overlay) {
@@ -123,8 +123,8 @@ const char* OverlayNode::take(const TeamPeer& sender, const OverlayPacket& packe
   if (arrival == OverlayArrival::kRefused)
     log::limited(log::Level::kDebug, kTag, "refused " + std::to_string(sender.robot))
         << "robot " << sender.robot << " forwards a message of robot "
-        << packet.message->origin.robot << " that is not taken";
-  return arrival == OverlayArrival::kNoRoom ? "for want of room" : refusal;
+        << packet.message->origin.robot << ", which is refused";
+  return arrival == OverlayArrival::kNoRoom ? "no room for it" : refusal;
 }
 
 // Stores a directly received message for other robots. Returns the reason if it is forged,

@@ -69,18 +69,6 @@ TEST_CASE("Nodes are started sources last and stopped sources first", "[supervis
         std::vector<std::string>{"start odometry", "start camera", "stop camera", "stop odometry"});
 }
 
-TEST_CASE("A failed node ends the run with its name and its message", "[supervisor]") {
-  Run run;
-  auto& [log, diary, signals, supervisor] = run;
-  supervisor.emplace<ToyNode>("camera", diary);
-  supervisor.emplace<ToyNode>("odometry", diary).post(true);
-  const RunResult result = supervisor.run([] { return false; }, 0.001);
-  REQUIRE(result.failure.has_value());
-  CHECK(result.failure->node == "odometry");
-  CHECK(result.failure->message == "the reason");
-  CHECK_THAT(log.text(), Catch::Contains("odometry failed: the reason"));
-}
-
 // A node with every kind of thread that a node may have; one of them fails.
 class ThreadsNode final : public Node {
  public:
@@ -124,6 +112,7 @@ TEST_CASE("An exception in any thread of a node ends the run with the name of th
   REQUIRE(result.failure.has_value());
   CHECK(result.failure->node == "threads");
   CHECK(result.failure->message == "the reason");
+  CHECK_THAT(run.log.text(), Catch::Contains("threads failed: the reason"));
 }
 
 TEST_CASE("A node that fails while it finishes its work is still reported", "[supervisor]") {

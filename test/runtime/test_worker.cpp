@@ -1,4 +1,5 @@
 #include <pthread.h>
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <catch2/catch.hpp>
@@ -209,45 +210,26 @@ int niceness() {
   return getpriority(PRIO_PROCESS, static_cast<id_t>(gettid()));
 }
 
-TEST_CASE("Background work lowers the priority of its own thread only", "[runtime]") {
+TEST_CASE("Urgent work lowers the priority of a thread in the background, never raises it",
+          "[runtime]") {
+  const bool is_urgent = GENERATE(true, false), is_low_already = GENERATE(true, false);
+  CAPTURE(is_urgent, is_low_already);
+  constexpr int kLowest = 19;
   const int ordinary = niceness();
+  has_urgent_work = is_urgent;
   int before = 0, during = 0;
   std::thread thread([&] {
+    if (is_low_already) setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kLowest);
     before = niceness();
     work_in_background();
     work_in_background();
     during = niceness();
   });
   thread.join();
-  CHECK(before == ordinary);
-  CHECK(during >= ordinary + (ordinary < 10 ? 1 : 0));  // from 10 on it stays
-  CHECK(niceness() == ordinary);
-}
-
-TEST_CASE("Without urgent work, background work keeps its priority", "[runtime]") {
-  has_urgent_work = false;
-  const int ordinary = niceness();
-  int during = ordinary + 1;
-  std::thread thread([&] {
-    work_in_background();
-    during = niceness();
-  });
-  thread.join();
   has_urgent_work = true;
-  CHECK(during == ordinary);
-}
-
-TEST_CASE("Background work of a thread that is lower already does not raise it", "[runtime]") {
-  bool lowered = false;
-  int during = 0;
-  std::thread thread([&] {
-    lowered = setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), 19) == 0;
-    work_in_background();
-    during = niceness();
-  });
-  thread.join();
-  REQUIRE(lowered);
-  CHECK(during == 19);
+  CHECK(before == (is_low_already ? kLowest : ordinary));
+  CHECK(during == (is_urgent ? std::max(before, 10) : before));
+  CHECK(niceness() == ordinary);
 }
 
 }  // namespace

@@ -64,8 +64,8 @@ TEST_CASE("A link without a limit has no other rows", "[link_emulation]") {
 }
 
 TEST_CASE("An error in a link trace is reported with its line", "[link_emulation]") {
-  CHECK(refusal("") == "trace.csv: holds no row");
-  CHECK(refusal("time_s,bytes_per_s,delay_s\n") == "trace.csv: holds no row");
+  CHECK(refusal("") == "trace.csv: has no row");
+  CHECK(refusal("time_s,bytes_per_s,delay_s\n") == "trace.csv: has no row");
   CHECK(refusal("0,1,0\n1,2\n") == "trace.csv:2: 2 fields, expected time_s, bytes_per_s, delay_s");
   CHECK(refusal("0,1,0\n1,x,0\n") == "trace.csv:2: x is not a finite number");
   CHECK(refusal("0,1,0\n1,inf,0\n") == "trace.csv:2: inf is not a finite number");

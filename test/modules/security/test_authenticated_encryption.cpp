@@ -39,43 +39,5 @@ TEST_CASE("Encryption is the XChaCha20-Poly1305 of the standard's example", "[se
   CHECK(*decrypted == content);
 }
 
-TEST_CASE("Encrypted bytes are decrypted only with their key and associated data", "[security]") {
-  const PublishedExample example;
-  REQUIRE(decrypt(example.key, example.associated, example.encrypted));
-  SECTION("another key") {
-    SealingKey key = example.key;
-    key.data()[31] ^= 1U;
-    CHECK_FALSE(decrypt(key, example.associated, example.encrypted));
-  }
-  SECTION("other associated data") {
-    Octets longer = example.associated;
-    longer.push_back(0);
-    CHECK_FALSE(decrypt(example.key, longer, example.encrypted));
-  }
-  SECTION("any shorter part") {
-    for (std::size_t size = 0; size < example.encrypted.size(); ++size) {
-      CAPTURE(size);
-      CHECK_FALSE(
-          decrypt(example.key, example.associated, OctetView(example.encrypted).first(size)));
-    }
-  }
-}
-
-TEST_CASE("An empty content can be encrypted", "[security]") {
-  const SealingKey key = make_sealing_key();
-  Octets encrypted;
-  encrypt(key, random_nonce(), {}, {}, encrypted);
-  CHECK(encrypted.size() == kEncryptionBytes);
-  const auto decrypted = decrypt(key, {}, encrypted);
-  REQUIRE(decrypted);
-  CHECK(decrypted->empty());
-}
-
-TEST_CASE("Nonces and keys differ from draw to draw", "[security]") {
-  CHECK(random_nonce() != random_nonce());
-  const SealingKey a = make_sealing_key(), b = make_sealing_key();
-  CHECK(Octets(a.data(), a.data() + 32) != Octets(b.data(), b.data() + 32));
-}
-
 }  // namespace
 }  // namespace km

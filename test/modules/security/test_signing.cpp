@@ -30,12 +30,6 @@ TEST_CASE("A signature is valid only for its statement and its signer", "[securi
   CHECK_FALSE(verify(content, signature, PublicKey{}));  // key of small order
 }
 
-TEST_CASE("A secret that was written and read gives equal signatures", "[security]") {
-  const SigningKey key = make_signing_key();
-  const SigningKey again = signing_key_from(seed_of(key));
-  CHECK(sign(Octets{5}, again) == sign(Octets{5}, key));
-}
-
 TEST_CASE("Statements with different fields have different bytes", "[security]") {
   const auto of = [](std::string_view kind, std::string_view a, std::string_view b) {
     ByteWriter writer = statement(kind);

@@ -25,49 +25,33 @@ std::string admission(ToyMember& to, const RobotKeys& keys, const RobotIdentity&
 TEST_CASE("A robot is admitted only with a valid certificate of its team", "[security]") {
   const ToyTeam team, others("survey");
   ToyMember a(team, 0, "alpha");
-  RobotKeys keys = team.keys_of(1, "beta");
-  RobotIdentity identity = toy_identity(1, "beta");
-  REQUIRE(admission(a, keys, identity).empty());
+  const RobotKeys good = team.keys_of(1, "beta");
+  const RobotIdentity identity = toy_identity(1, "beta");
+  REQUIRE(admission(a, good, identity).empty());
+  const auto with = [](auto value, const auto& change) {
+    change(value);
+    return value;
+  };
   const std::string not_certified = "certificate is not the authority's for this id, name and key";
-
-  SECTION("another team of the same name") {
-    CHECK(admission(a, others.keys_of(1, "beta"), identity) == "credentials of another team");
-  }
-  SECTION("another team that claims this one's authority") {
-    keys = others.keys_of(1, "beta");
-    keys.authority = team.authority();
-    CHECK(admission(a, keys, identity) == not_certified);
-  }
-  SECTION("another id than the certificate's") {
-    identity.robot = 0;
-    CHECK(admission(a, keys, identity) == not_certified);
-  }
-  SECTION("another name than the certificate's") {
-    identity.name = "alpha";
-    CHECK(admission(a, keys, identity) == not_certified);
-  }
-  SECTION("a longer time than the certificate's") {
-    keys.certificate.valid_until_s += 1;
-    CHECK(admission(a, keys, identity) == not_certified);
-  }
-  SECTION("the certificate of a robot whose secret it does not have") {
-    keys.secret = make_signing_key();
-    CHECK(admission(a, keys, identity) == "credentials are not signed by the robot that they name");
-  }
-  SECTION("before its time") {
-    CHECK(admission(a, keys, identity, keys.certificate.valid_from_s - 1) ==
-          "certificate is not valid yet (are clocks right?)");
-    CHECK(admission(a, keys, identity, keys.certificate.valid_from_s).empty());
-  }
-  SECTION("after its time") {
-    CHECK(admission(a, keys, identity, keys.certificate.valid_until_s).empty());
-    CHECK(admission(a, keys, identity, keys.certificate.valid_until_s + 1) ==
-          "certificate has expired (are clocks right?)");
-  }
-  SECTION("its own credentials, sent back to it") {
-    CHECK(reason_of(a.seal.admit(a.identity, a.seal.credentials(), kToyNow_s)) ==
-          "these are this process's own credentials");
-  }
+  CHECK(admission(a, others.keys_of(1, "beta"), identity) == "credentials of another team");
+  CHECK(admission(a,
+                  with(others.keys_of(1, "beta"),
+                       [&](RobotKeys& keys) { keys.authority = team.authority(); }),
+                  identity) == not_certified);
+  CHECK(admission(a, good, with(identity, [](auto& its) { its.robot = 0; })) == not_certified);
+  CHECK(admission(a, good, with(identity, [](auto& its) { its.name = "alpha"; })) == not_certified);
+  CHECK(admission(a, with(good, [](RobotKeys& keys) { keys.certificate.valid_until_s += 1; }),
+                  identity) == not_certified);
+  CHECK(admission(a, with(good, [](RobotKeys& keys) { keys.secret = make_signing_key(); }),
+                  identity) == "credentials are not signed by the robot that they name");
+  CHECK(admission(a, good, identity, good.certificate.valid_from_s - 1) ==
+        "certificate is not valid yet (are clocks right?)");
+  CHECK(admission(a, good, identity, good.certificate.valid_from_s).empty());
+  CHECK(admission(a, good, identity, good.certificate.valid_until_s).empty());
+  CHECK(admission(a, good, identity, good.certificate.valid_until_s + 1) ==
+        "certificate has expired (are clocks right?)");
+  CHECK(reason_of(a.seal.admit(a.identity, a.seal.credentials(), kToyNow_s)) ==
+        "these are this process's own credentials");
 }
 
 TEST_CASE("An exchange key of small order is refused", "[security]") {

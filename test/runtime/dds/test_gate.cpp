@@ -1,5 +1,3 @@
-#include <dds/ddsi/ddsi_serdata.h>
-
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <future>
@@ -116,87 +114,6 @@ TEST_CASE("A peer that sends much delays only its own messages", "[gate]") {
   const auto place = std::ranges::find(pings, 99999U, &Ping::index) - pings.begin();
   CHECK(place < kFlood / 2);
   node.stop();
-}
-
-TEST_CASE("Only the status of a robot's twin makes it yield", "[gate]") {
-  const auto domain = std::make_shared<const DdsDomain>(loopback_config());
-  TestRobot a(domain, 3);
-  a.start();
-  REQUIRE(eventually([&] { return a.status_count() >= 4; }));
-  TestRobot twin(domain, 3);
-  twin.start();
-  CHECK(twin.receives(PeerEventKind::kConflict, 3));
-  CHECK(a.receives(PeerEventKind::kRefused, 3));
-  CHECK(TestRobot::matching(a.peer_events.messages(), PeerEventKind::kConflict, 3) == 0);
-  twin.ping(0);
-  CHECK(eventually([&] { return refusals(a, "claims this robot's id") == 1; }));
-}
-
-// An envelope as DDS keeps it, and with it what DDS reads others with.
-class LocalEnvelope {
- public:
-  explicit LocalEnvelope(const DdsConfig& config) : participant_(participant_with(config, "")) {
-    const DdsQos qos = make_dds_qos();
-    dds_qset_durability(qos.get(), DDS_DURABILITY_TRANSIENT_LOCAL);
-    dds_qset_reliability(qos.get(), DDS_RELIABILITY_RELIABLE, DDS_MSECS(100));
-    const dds_entity_t topic = dds_create_topic(participant_.handle(), &km_wire_Envelope_desc,
-                                                "envelopes", nullptr, nullptr);
-    const dds_entity_t reader = dds_create_reader(participant_.handle(), topic, qos.get(), nullptr);
-    const dds_entity_t writer = dds_create_writer(participant_.handle(), topic, qos.get(), nullptr);
-    km_wire_Envelope envelope = header({3, "robot", kProtocolVersion, 70}, 9);
-    std::vector<std::uint8_t> content(100, 7);
-    borrow(envelope.content, content);
-    check_dds(dds_write(writer, &envelope), "write");
-    dds_sample_info_t info{};
-    REQUIRE(eventually(
-        [&] { return dds_takecdr(reader, &serialized_, 1, &info, DDS_ANY_STATE) == 1; }));
-  }
-  ~LocalEnvelope() { ddsi_serdata_unref(serialized_); }
-  LocalEnvelope(const LocalEnvelope&) = delete;
-  LocalEnvelope& operator=(const LocalEnvelope&) = delete;
-
-  [[nodiscard]] std::vector<std::uint8_t> bytes() const {
-    std::vector<std::uint8_t> result(ddsi_serdata_size(serialized_));
-    ddsi_serdata_to_ser(serialized_, 0, result.size(), result.data());
-    return result;
-  }
-  // The path of messages that arrive on the network. False if DDS refuses the message.
-  [[nodiscard]] bool reads(std::vector<std::uint8_t> bytes) const {
-    const ddsrt_iovec_t part{bytes.data(), bytes.size()};
-    ddsi_serdata* received =
-        ddsi_serdata_from_ser_iov(serialized_->type, SDK_DATA, 1, &part, bytes.size());
-    if (received == nullptr) return false;
-    km_wire_Envelope envelope{};
-    const bool usable = ddsi_serdata_to_sample(received, &envelope, nullptr, nullptr);
-    if (usable) CHECK(envelope.content._length <= bytes.size());
-    dds_sample_free(&envelope, &km_wire_Envelope_desc, DDS_FREE_CONTENTS);
-    ddsi_serdata_unref(received);
-    return usable;
-  }
-
- private:
-  DdsEntity participant_;
-  ddsi_serdata* serialized_ = nullptr;
-};
-
-TEST_CASE("Envelopes of any bytes are read or refused by DDS itself", "[gate]") {
-  const auto domain = std::make_shared<const DdsDomain>(loopback_config());
-  const LocalEnvelope sound(domain->config());
-  const std::vector<std::uint8_t> bytes = sound.bytes();
-  REQUIRE(sound.reads(bytes));
-  std::mt19937 rng(1);
-  const auto below = [&](std::size_t end) {
-    return std::uniform_int_distribution<std::size_t>(0, end - 1)(rng);
-  };
-  int refused = 0;
-  for (int i = 0; i < 100'000; ++i) {
-    std::vector<std::uint8_t> corrupted = bytes;
-    for (std::size_t k = below(3); k < 3; ++k)
-      corrupted[below(i % 2 == 0 ? corrupted.size() : 40)] = static_cast<std::uint8_t>(below(256));
-    if (below(2) == 0) corrupted.resize(below(corrupted.size()) / 4 * 4 + 4);
-    refused += sound.reads(corrupted) ? 0 : 1;
-  }
-  CHECK(refused > 10'000);
 }
 
 }  // namespace

@@ -460,18 +460,6 @@ TEST_CASE("Participants outside the team do not take the place of a robot, howev
   CHECK(table.peers().front().state == PeerState::kAlive);
 }
 
-TEST_CASE("Many robots do not exhaust the memory", "[peers]") {
-  PeerTable table(kSelf);
-  std::size_t admitted = 0;
-  for (std::size_t n = 0; n < 3 * PeerTable::kMaxParticipants; ++n) {
-    table.participant(wide_guid(n), data_of(static_cast<RobotId>(n + 2), n + 1), "");
-    table.alive(wide_guid(n));
-    admitted += table.standing(wide_guid(n)) == Standing::kAdmitted ? 1 : 0;
-  }
-  CHECK(admitted == PeerTable::kMaxRobots);
-  CHECK(table.peers().size() == PeerTable::kMaxRobots);
-}
-
 TEST_CASE("A new robot takes the place of the one that has been lost for longest", "[peers]") {
   PeerTable table(kSelf);
   const auto receive = [&](std::size_t n, std::uint64_t boot) {

@@ -9,33 +9,6 @@
 namespace km {
 namespace {
 
-TEST_CASE("Two processes on one host discover each other", "[dds][processes]") {
-  const std::string discovery = GENERATE("multicast", "peers");
-  const auto settings =
-      own_team() + std::vector<std::string>{"interface=lo", "discovery=" + discovery};
-  const auto a = start_peer(3, settings);
-  const auto b = start_peer(4, settings);
-  const auto a_sees = a->wait_for("joined 4");
-  const auto b_sees = b->wait_for("joined 3");
-  REQUIRE(a_sees);
-  REQUIRE(b_sees);
-  const double seconds = seconds_between(b->started(), std::max(a_sees->time, b_sees->time));
-  std::cout << "discovery by " << discovery << ", loopback: " << seconds
-            << " s from the launch of the second process\n";
-  CHECK(seconds < kDiscoveryBound_s);
-
-  a->send_line("ping 0 99");
-  a->send_line("one 4 7");
-  CHECK(b->wait_for("ping 3 99"));
-  CHECK(b->wait_for("one 3 7"));
-  a->send_line("quit");
-  CHECK(b->wait_for("left 3"));
-  b->send_line("quit");
-  CHECK(b->wait_for("summary 100 0 0"));
-  CHECK(a->wait() == 0);
-  CHECK(b->wait() == 0);
-}
-
 TEST_CASE("A killed robot is lost within the liveliness time, and restarts as another boot",
           "[dds][processes]") {
   const auto settings = own_team() + std::vector<std::string>{"interface=lo", "liveliness_s=0.5"};
@@ -95,29 +68,6 @@ TEST_CASE("Robots meet although a program has announced more participants than t
   const auto b = start_peer(4, settings, 0, keys.of(4));
   CHECK(a->wait_for("joined 4"));
   CHECK(b->wait_for("joined 3"));
-}
-
-TEST_CASE("A dozen robots on one host all meet, with either discovery", "[dds][processes]") {
-  const std::string discovery = GENERATE("multicast", "peers");
-  constexpr RobotId kRobots = 12;
-  const auto settings =
-      own_team() + std::vector<std::string>{"interface=lo", "discovery=" + discovery};
-  std::vector<std::unique_ptr<Process>> robots;
-  for (RobotId id = 0; id < kRobots; ++id)
-    robots.push_back(start_peer(static_cast<RobotId>(100 * id), settings));
-  double last_s = 0.0;
-  for (RobotId id = 0; id < kRobots; ++id) {
-    for (RobotId other = 0; other < kRobots; ++other) {
-      if (other == id) continue;
-      const auto line = robots[id]->wait_for("joined " + std::to_string(100 * other));
-      REQUIRE(line);
-      last_s = std::max(last_s, seconds_between(robots.back()->started(), line->time));
-    }
-  }
-  std::cout << "12 robots by " << discovery << ": all 132 meetings within " << last_s
-            << " s from the last launch\n";
-  robots[0]->send_line("ping 5 5");
-  for (RobotId id = 1; id < kRobots; ++id) CHECK(robots[id]->wait_for("ping 0 5"));
 }
 
 TEST_CASE("Teams in one domain do not see each other", "[dds][processes]") {

@@ -92,14 +92,14 @@ TEST_CASE("An inconsistent message of the overlay is refused", "[overlay]") {
   REQUIRE(refusal_of(message).empty());
   SECTION("stream") {
     message.stream = static_cast<OverlayStream>(static_cast<int>(OverlayStream::kInlierSet) + 1);
-    CHECK(refusal_of(message) == "a stream that is not known");
+    CHECK(refusal_of(message) == "unknown stream");
   }
   SECTION("lane") {
-    CHECK(refusal_of(message_of(OverlayStream::kSession)) == "a stream of another topic");
+    CHECK(refusal_of(message_of(OverlayStream::kSession)) == "stream of another topic");
   }
   SECTION("boot") {
     message.origin.boot = 0;
-    CHECK(refusal_of(message) == "of no process");
+    CHECK(refusal_of(message) == "its boot id is 0");
   }
   SECTION("origin") {
     message.origin = {kSelf.robot, 71};
