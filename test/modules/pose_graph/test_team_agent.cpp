@@ -22,13 +22,6 @@ TeamProblem ring(unsigned seed) {
   return random_team_problem({.robots = kIds, .pairs = kRing, .keyframes = 12}, seed);
 }
 
-// All closures except for those between 33 and 50; the rest connects all four robots.
-TeamProblem without_33_50(TeamProblem problem) {
-  std::erase_if(problem.edges,
-                [](const PoseEdge& e) { return e.id().from.robot == 33 && e.id().to.robot == 50; });
-  return problem;
-}
-
 void check_optimum(const TeamNetwork& network, const TeamProblem& problem) {
   for (const auto& [id, robot] : network.robots) {
     CAPTURE(id);

@@ -4,6 +4,7 @@
 #include "apps/lab/pgo/local_team.hpp"
 #include "apps/lab/pgo/member_team.hpp"
 #include "apps/lab/pgo/staircase.hpp"
+#include "modules/core/lie.hpp"
 #include "modules/pose_graph/chordal.hpp"
 #include "modules/rbcd/member_rbcd.hpp"
 #include "test/support/pose_graph_problems.hpp"
@@ -12,11 +13,6 @@
 
 namespace km {
 namespace {
-
-// Relative effect of single precision on a cost. A rounded pose has a relative error of 6e-8, and
-// squared residuals have twice that, times their weights.
-constexpr double kSinglePrecision = 1e-6;
-constexpr double kSmallGridOptimum = 1025.398056;  // SE-Sync, unit quaternions
 
 std::vector<SE3> chordal(const TeamGraph& graph) {
   return chordal_initialisation(graph.poses(), graph.edges);
@@ -143,6 +139,19 @@ TEST_CASE("A robot whose own edges do not connect its poses cannot solve alone",
     return (e.i == 15 || e.j == 15) && graph.robot_of(e.i) == graph.robot_of(e.j);
   });
   CHECK_THROWS_WITH(LocalTeam(graph), Catch::Contains("robot 1 cannot solve alone"));
+}
+
+TEST_CASE("Robots with verticals that solve alone are joined upright", "[pgo][vertical]") {
+  std::mt19937 rng(4);
+  TeamGraph graph = noisy_chain(30, 3, 0.0, rng, 2.0);
+  // Closures between robots are tilted; the joined robots are not.
+  for (BlockEdge& e : graph.edges)
+    if (graph.robot_of(e.i) != graph.robot_of(e.j)) e.T_i_j.linear() *= so3_exp({0.1, 0.2, 0.0});
+  LocalTeam team(graph);
+  (void)run_team(graph, team, {}, {});
+  const LiftedPoses X = team_poses(graph, team);
+  for (const VerticalPrior& v : graph.verticals)
+    CHECK(vertical_cost(v, X.middleCols<3>(4 * v.pose)) < 1e-9);
 }
 
 }  // namespace km
