@@ -30,17 +30,5 @@ TEST_CASE("The number of admitted processes is bounded", "[security]") {
   CHECK(peers.find({2 * kMaxAdmitted - 1, 1}) != nullptr);
 }
 
-TEST_CASE("Many starts of one robot displace no other robot", "[security]") {
-  AdmittedPeers peers;
-  peers.add({2, 7}, {});
-  peers.add({4, 7}, {});
-  for (std::uint64_t boot = 1; boot <= 500; ++boot) {
-    peers.add({3, boot}, {});
-    peers.received({3, boot});
-  }
-  CHECK(peers.find({2, 7}) != nullptr);
-  CHECK(peers.find({4, 7}) != nullptr);
-}
-
 }  // namespace
 }  // namespace km

@@ -242,7 +242,8 @@ TEST_CASE("Programs without an identity, or with a broken one, are ignored", "[d
   REQUIRE(b.receives(PeerEventKind::kJoined, 3));
   RawWriter writer(outsider.handle(), domain->config(), TopicKind::kEvent);
   writer.write(header(a.participant.identity(), 0), {3, 0, {}});
-  CHECK(eventually([&] { return b.traffic(Direction::kIn).refused["its sender is not a known robot"] == 1; }));
+  CHECK(eventually(
+      [&] { return b.traffic(Direction::kIn).refused["its sender is not a known robot"] == 1; }));
   CHECK(b.received.messages().empty());
   const auto refusals =
       TestRobot::matching(b.peer_events.messages(), PeerEventKind::kRefused, RobotId{0});
