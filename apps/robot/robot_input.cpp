@@ -43,8 +43,8 @@ bool has_messages(const RobotOptions& options) {
 void report_damage(const fs::path& file, const RestoredRun& run) {
   if (run.journal.cut_bytes > 0)
     log::warn("journal") << file.string() << ": the last " << run.journal.cut_bytes
-                         << " bytes are torn: cut after entry " << run.journal.entries << ", byte "
-                         << run.journal.whole_bytes;
+                         << " bytes are incomplete: cut after entry " << run.journal.entries
+                         << ", byte " << run.journal.whole_bytes;
   for (const JournalDamage& damage : run.journal.damages)
     log::warn("journal") << to_string(damage, file);
   if (run.journal.damages.empty()) return;
@@ -60,7 +60,7 @@ std::optional<RestoredRun> restore(const RobotOptions& options, const std::strin
   const fs::path file = options.output / kJournal;
   if (!options.resume) return std::nullopt;
   if (is_absent(file)) {
-    log::warn("journal") << file.string() << ": there is none: the run starts from the beginning";
+    log::warn("journal") << file.string() << ": no such file: the run starts from the beginning";
     return std::nullopt;
   }
   RestoredRun run = restore_run(file);
@@ -88,15 +88,15 @@ void report_lost_surface(const fs::path& file, const MapMesh& map, const Restore
                                         run.odometry.back().stamp);
   log::warn("journal") << file.string() << ": has the surface of the first " << mapped << " of "
                        << run.keyframes.size()
-                       << " keyframes: the map lacks what only the others saw, " << fixed(lost_s, 1)
-                       << " s (mapping.mesh_interval_s)";
+                       << " keyframes: the map lacks the surface that only the others saw, "
+                       << fixed(lost_s, 1) << " s (mapping.mesh_interval_s)";
 }
 
 // The map of the former process; nullopt if the file is missing or damaged.
 std::optional<ResumedMap> restore_map(const fs::path& folder, const RestoredRun& run) try {
   const fs::path file = folder / kMapFile;
   if (is_absent(file)) {
-    log::warn("journal") << file.string() << ": there is none: the map starts from the beginning";
+    log::warn("journal") << file.string() << ": no such file: the map starts from the beginning";
     return std::nullopt;
   }
   MapMesh map = read_map_file(file);
@@ -107,22 +107,19 @@ std::optional<ResumedMap> restore_map(const fs::path& folder, const RestoredRun&
   return std::nullopt;
 }
 
-RestoredRun open_session(const RobotOptions& options) {
-  const fs::path file = options.session / kJournal;
+// A finished run, which has a keyframe.
+RestoredRun open_finished(const fs::path& folder) {
+  const fs::path file = folder / kJournal;
   RestoredRun run = restore_run(file);
-  report_damage(file, run);  // results of the session may replace the journal
+  report_damage(file, run);
   if (run.keyframes.empty())
     throw std::invalid_argument(file.string() + ": that run has no keyframe");
-  return alone_as(options.robot, std::move(run));
+  return run;
 }
 
 // Keyframes without an optimised pose follow the last one with such a pose by odometry.
 FinishedMap open_finished_map(const RobotOptions& options) {
-  const fs::path file = options.localize / kJournal;
-  RestoredRun run = restore_run(file);
-  report_damage(file, run);
-  if (run.keyframes.empty())
-    throw std::invalid_argument(file.string() + ": that run has no keyframe to localise at");
+  RestoredRun run = open_finished(options.localize);
   FinishedMap map{std::move(run.keyframes), std::move(run.solution.trajectory.T_world_kf)};
   map.T_map_kf.resize(std::min(map.T_map_kf.size(), map.keyframes.size()));
   while (map.T_map_kf.size() < map.keyframes.size()) {
@@ -142,10 +139,7 @@ RestoredRun open_run_to_extend(const RobotOptions& options) {
   std::error_code none;
   if (fs::equivalent(options.extend, options.output, none))
     throw std::invalid_argument(file.string() + ": is in the folder of --output: give another one");
-  RestoredRun run = restore_run(file);
-  report_damage(file, run);
-  if (run.keyframes.empty())
-    throw std::invalid_argument(file.string() + ": that run has no keyframe to go on from");
+  RestoredRun run = open_finished(options.extend);
   if (run.robot != options.robot)
     throw std::invalid_argument(file.string() + ": is of robot " + std::to_string(run.robot) +
                                 ": give --robot " + std::to_string(run.robot));
@@ -154,14 +148,10 @@ RestoredRun open_run_to_extend(const RobotOptions& options) {
   return run;
 }
 
-// The first keyframe of the map as keyframe 0 of this run. It has no time of this run, no vertical,
-// because the map's z is that of the frame, and no features, because MapMatcher has those of the
-// whole map.
-RestoredRun first_keyframe_of(const FinishedMap& map, RobotId robot) {
+// A run of one keyframe without features.
+RestoredRun run_of(const KeyframeOdometry& odometry) {
   RestoredRun run;
-  run.robot = robot;
-  KeyframeOdometry odometry{.id = {robot, 0}};
-  odometry.T_odom_kf = odometry.T_previous_kf = map.T_map_kf.front();
+  run.robot = odometry.id.robot;
   run.odometry.push_back(odometry);
   run.keyframes.push_back({.odometry = {odometry.id, odometry.T_odom_kf, Matrix6::Zero()},
                            .stamp = odometry.stamp,
@@ -169,20 +159,23 @@ RestoredRun first_keyframe_of(const FinishedMap& map, RobotId robot) {
   return run;
 }
 
+// The first keyframe of the map as keyframe 0 of this run. It has no time of this run, no vertical,
+// because the map's z is that of the frame, and no features, because MapMatcher has those of the
+// whole map.
+RestoredRun first_keyframe_of(const FinishedMap& map, RobotId robot) {
+  KeyframeOdometry odometry{.id = {robot, 0}};
+  odometry.T_odom_kf = odometry.T_previous_kf = map.T_map_kf.front();
+  return run_of(odometry);
+}
+
 // The origin of the absolute frame as keyframe 0. Its z is up.
 RestoredRun datum_keyframe(const AbsoluteFixesConfig& config, RobotId robot) {
   // Verticals deflect from the normal of the ellipsoid by less than 0.5 mrad in most places. A
   // motion capture is levelled by hand.
   const double sigma_rad = config.source == FixSource::kGnss ? 5e-4 : 0.01;
-  RestoredRun run;
-  run.robot = robot;
   KeyframeOdometry odometry{.id = {robot, 0}};
   odometry.vertical = Vertical{Eigen::Vector3d::UnitZ(), sigma_rad};
-  run.odometry.push_back(odometry);
-  run.keyframes.push_back({.odometry = {odometry.id, odometry.T_odom_kf, Matrix6::Zero()},
-                           .stamp = odometry.stamp,
-                           .features = {}});
-  return run;
+  return run_of(odometry);
 }
 
 FixInput open_fixes(const RobotOptions& options, const AbsoluteFixesConfig& config,
@@ -402,7 +395,8 @@ RigInput read_rig_input(const RobotOptions& options) {
 std::optional<RobotInput> open_robot_input(const RobotOptions& options, const RobotConfig& config,
                                            const std::optional<MappingPlan>& mapping,
                                            const RigInput& rig, SignalWatch& signals) {
-  if (!options.session.empty()) return RobotInput{PastRun(), {}, open_session(options)};
+  if (!options.session.empty())
+    return RobotInput{PastRun(), {}, alone_as(options.robot, open_finished(options.session))};
   const bool is_dataset = options.is_live || !options.dataset.empty();
   const fs::path& path = options.is_live ? options.rig
                          : is_dataset    ? options.dataset

@@ -1,5 +1,6 @@
 #include "apps/robot/run.hpp"
 
+#include <fcntl.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -18,7 +19,6 @@
 #include "apps/robot/growing_file.hpp"
 #include "apps/robot/map_results.hpp"
 #include "apps/robot/process_usage.hpp"
-#include "apps/robot/reserved_room.hpp"
 #include "apps/robot/results.hpp"
 #include "apps/robot/rounds_csv.hpp"
 #include "apps/robot/run_end.hpp"
@@ -336,6 +336,51 @@ void finish_record(const RobotOptions& options, RosOutputNode& node, const RunRe
     log::warn("record") << node.dropped() << " messages and images are missing in "
                         << options.record->string() << ": they came faster than they were written";
 }
+
+// Allocates the bytes of a file from its present end up to `bytes`. Returns an error, or 0.
+int allocate(const std::filesystem::path& file, std::uint64_t from, std::uint64_t bytes) {
+  const int descriptor = open(file.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
+  if (descriptor < 0) return errno;
+  const int error =
+      posix_fallocate(descriptor, static_cast<off_t>(from), static_cast<off_t>(bytes - from));
+  if (error != 0) (void)!ftruncate(descriptor, static_cast<off_t>(from));
+  close(descriptor);
+  return error;
+}
+
+// Room on the disk for a result that is written at the end of the run. A file of that size keeps
+// the room, and is removed just before the result is written.
+class ReservedRoom {
+ public:
+  // A file that a killed process has left is removed.
+  explicit ReservedRoom(fs::path file) : file_(std::move(file)) { release(); }
+  ~ReservedRoom() { release(); }
+  ReservedRoom(const ReservedRoom&) = delete;
+  ReservedRoom& operator=(const ReservedRoom&) = delete;
+
+  // If the disk is full, the room that is already reserved stays, and a warning names the bytes.
+  void reserve(std::uint64_t bytes) {
+    if (bytes <= reserved_bytes_) return;
+    // A step of this size makes the calls rare.
+    constexpr std::uint64_t kStep_bytes = std::uint64_t{16} << 10U;
+    bytes = (bytes / kStep_bytes + 1) * kStep_bytes;
+    if (const int error = allocate(file_, reserved_bytes_, bytes))
+      log::limited(log::Level::kWarn, "results", file_.string())
+          << file_.string() << ": no room for " << bytes
+          << " bytes of results at the end of the run: " << std::generic_category().message(error);
+    else
+      reserved_bytes_ = bytes;
+  }
+
+  void release() noexcept {
+    unlink(file_.c_str());
+    reserved_bytes_ = 0;
+  }
+
+ private:
+  const fs::path file_;
+  std::uint64_t reserved_bytes_ = 0;
+};
 
 // Room for the results that matter most: trajectories and summary.
 class FinalRoom {

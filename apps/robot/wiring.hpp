@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "apps/robot/diagnostics.hpp"
-#include "apps/robot/incarnations_met.hpp"
 #include "apps/robot/input_time.hpp"
 #include "apps/robot/journal_node.hpp"
 #include "apps/robot/mapping_plan.hpp"
@@ -125,6 +124,27 @@ struct Topics {
   Topic<RobotObjects> sent_objects;  // to the other robots and to the search for places
   Crossing<RobotObjects> objects;
   Crossing<RobotStatus> status;
+};
+
+/// For each other robot, the incarnation with which this robot has closures. Thread-safe.
+class IncarnationsMet {
+ public:
+  /// Later closures with `peer` belong to its present incarnation.
+  void meet(const TeamPeer& peer) {
+    const std::lock_guard lock(mutex_);
+    boots_[peer.robot] = peer.boot;
+  }
+
+  /// A boot id of the incarnation; 0 if the robot has not been met.
+  [[nodiscard]] std::uint64_t of(RobotId robot) const {
+    const std::lock_guard lock(mutex_);
+    const auto found = boots_.find(robot);
+    return found == boots_.end() ? 0 : found->second;
+  }
+
+ private:
+  mutable std::mutex mutex_;  // guards boots_
+  std::map<RobotId, std::uint64_t> boots_;
 };
 
 /// All nodes of one robot and their connections: the system on one page (wiring.cpp).

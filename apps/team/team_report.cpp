@@ -18,8 +18,6 @@ namespace {
 
 using Rows = std::vector<std::vector<std::string>>;
 
-constexpr double kManySkipped = 0.05;  // share of the frames above which odometry loses accuracy
-
 constexpr std::array kTraffic = {"place_recognition", "geometric_verification", "pgo", "map",
                                  "other"};
 
@@ -72,19 +70,16 @@ std::string drift_remark(const TeamResult& team) {
     if (robot.odometry) add(*robot.odometry);
   if (team.optimized) add(team.optimized->joint);
   if (lengths_m.empty()) return "";
-  std::ostringstream text;
-  text << "ATE: rmse. Drift: mean relative error, in percent of the way and in degrees per metre, "
-          "over\npieces of the path of ";
+  std::ostringstream lengths;
   std::size_t left = lengths_m.size();
   for (const double length_m : lengths_m)
-    text << length_m << (--left == 0 ? " m.\n" : left == 1 ? " and " : ", ");
-  text
-      << "Odometry is aligned with the truth robot by robot, the optimised trajectories all by one "
-         "transform: that\nof a robot can be off as a whole. Live: the poses as known when each "
-         "image came, in this\nframe, which a robot enters when it joins the others. Covered: "
-         "share "
-         "of the time of the images that\nhas poses.\n";
-  return text.str();
+    lengths << length_m << (--left == 0 ? " m" : left == 1 ? " and " : ", ");
+  return R"(ATE: root mean square error. Drift: mean relative error over pieces of the path of )" +
+         lengths.str() + R"(, in percent of
+their length and in degrees per metre. Covered: share of the time of the images that has poses. Odometry is
+aligned with the truth robot by robot, and optimised trajectories by one transform for the team. Live: poses
+as they were known when each image came, in the team's frame, from the time at which the robot joined.
+)";
 }
 
 std::string trajectory_table(const TeamResult& team) {
@@ -213,41 +208,16 @@ std::string mesh_table(const TeamMeshes& meshes) {
          "share of these that is right.\n";
 }
 
-// Empty unless processors were too slow for the rate.
-std::string percent(double part, double rest) {
-  return fixed(100.0 * part / std::max(1.0, part + rest), 0) + " %";
-}
-
-// States the frames that a slow computer has left out.
-std::string skipped_remark(const RobotResult& robot) {
-  const RunSummary summary = robot.summary.value_or(RunSummary{});
-  const std::string& name = robot.plan.name;
-  const auto skipped = static_cast<double>(summary.frames_skipped);
-  const auto used = static_cast<double>(summary.frames);
-  std::string text;
-  if (summary.paused_s >= kNoticedPause_s)
-    text += "note: the recording of " + name + " was paused for " + fixed(summary.paused_s, 1) +
-            " s in all, as processors were short\n";
-  if (skipped > kManySkipped * (skipped + used))
-    text += "note: " + name + " skipped " + percent(skipped, used) +
-            " of its frames: use --rate auto, which waits, or fewer robots\n";
-  if (!summary.mapping) return text;
-  const auto in_map = static_cast<double>(summary.mapping->frames);
-  const auto not_in_map = static_cast<double>(summary.mapping->dropped_under_load);
-  if (not_in_map > kManySkipped * (not_in_map + in_map))
-    text += "note: the map of " + name + " lacks " + percent(not_in_map, in_map) +
-            " of its frames: use --rate auto, which waits\n";
-  return text;
-}
-
-// The gravest findings of a robot that has ended in order, with the remedy. failures() has the
-// others.
-std::string faults(const RobotResult& robot) {
+// The findings of a robot that has ended in order: errors, and frames that a slow computer has left
+// out. failures() has the other robots.
+std::string findings(const RobotResult& robot) {
   std::string text;
   if (!robot.run.exit.ok()) return text;
   for (const Finding& finding : robot.summary.value_or(RunSummary{}).findings)
-    if (finding.severity == Severity::kError)
-      text += "error: " + finding.what + ": " + finding.to_do + "\n";
+    if (finding.severity == Severity::kError || finding.id.starts_with("frames.") ||
+        finding.id == "map.dropped_under_load")
+      text += std::string(to_string(finding.severity)) + ": " + finding.what + ": " +
+              finding.to_do + '\n';
   return text;
 }
 
@@ -259,7 +229,7 @@ std::string notes(const TeamResult& team) {
     if (robot.left_nothing()) continue;
     for (const std::string& note : robot.notes)
       text.append("note: ").append(robot.plan.name).append(": ").append(note).append("\n");
-    text += skipped_remark(robot) + faults(robot);
+    text += findings(robot);
   }
   return text;
 }

@@ -1,10 +1,7 @@
 #pragma once
 
-#include <chrono>
 #include <cstdint>
-#include <map>
 #include <memory>
-#include <mutex>
 #include <vector>
 
 #include "modules/loop_closure/node/loop_closure_codec.hpp"
@@ -112,41 +109,6 @@ struct FloodPeer {
   DdsBridge bridge;
   RobotStatusNode status_node;
   Inbox<PeerEvent> peer_events;
-};
-
-/// Measures the time from numbered questions to their answers. Thread-safe.
-class AnswerTimes {
- public:
-  using Clock = std::chrono::steady_clock;
-
-  void asked(std::uint32_t number) {
-    const std::lock_guard lock(mutex_);
-    open_.emplace(number, Clock::now());
-  }
-  /// Call for the answer to this question, which also answers those before it.
-  void answered(std::uint32_t number) {
-    const std::lock_guard lock(mutex_);
-    while (!open_.empty() && open_.begin()->first <= number) {
-      taken_s_.push_back(
-          std::chrono::duration<double>(Clock::now() - open_.begin()->second).count());
-      open_.erase(open_.begin());
-    }
-  }
-  [[nodiscard]] bool all_answered() const {
-    const std::lock_guard lock(mutex_);
-    return open_.empty();
-  }
-  /// Times of the answers since the last call [s], ascending.
-  [[nodiscard]] std::vector<double> take() {
-    const std::lock_guard lock(mutex_);
-    std::ranges::sort(taken_s_);
-    return std::exchange(taken_s_, {});
-  }
-
- private:
-  mutable std::mutex mutex_;  // guards the members below
-  std::map<std::uint32_t, Clock::time_point> open_;
-  std::vector<double> taken_s_;
 };
 
 }  // namespace km

@@ -179,34 +179,22 @@ TEST_CASE("The bytes of robots are compared with a server that receives all keyf
   CHECK_THAT(to_table(team), !Contains("A server"));
 }
 
-TEST_CASE("A robot that skipped many frames is reported", "[team]") {
+TEST_CASE("Errors and frames left out are stated with their remedy, other findings are not",
+          "[team]") {
   TeamResult team = HalfTeam().collect();
-  CHECK_THAT(to_table(team), !Contains("of its frames"));
-  team.robots[0].summary->frames = 20;
-  team.robots[0].summary->frames_skipped = 80;
-  CHECK_THAT(to_table(team), Contains("note: a skipped 80 % of its frames: use --rate auto, which "
-                                      "waits, or fewer robots"));
-  // Also beside a note on pauses.
-  team.robots[0].summary->paused_s = 1.5;
-  team.robots[0].summary->mapping = MappingSummary{.frames = 4, .dropped_under_load = 6};
-  CHECK_THAT(to_table(team), Contains("was paused for 1.5 s in all") &&
-                                 Contains("note: a skipped 80 % of its frames") &&
-                                 Contains("note: the map of a lacks 60 % of its frames"));
-}
-
-TEST_CASE("Errors among the findings of a robot are stated, and its notes are not", "[team]") {
-  TeamResult team = HalfTeam().collect();
-  RunSummary& summary = *team.robots[0].summary;
-  summary.findings = {{.id = "vocabulary.other",
-                       .severity = Severity::kError,
-                       .what = "a: 7 keyframes of b are described by another vocabulary",
-                       .means = "none can be compared",
-                       .to_do = "the same run.vocabulary on all robots"},
-                      {.id = "frames.paused", .severity = Severity::kNote, .what = "a: a pause"}};
+  team.robots[0].summary->findings = {
+      {.id = "vocabulary.other",
+       .severity = Severity::kError,
+       .what = "a: 7 keyframes of b have another vocabulary",
+       .means = "none can be compared",
+       .to_do = "use one run.vocabulary on all robots"},
+      {"frames.skipped", Severity::kWarning, "a: 80 frames skipped, 80 %", "", "use --rate auto"},
+      {.id = "memory.grows", .severity = Severity::kWarning, .what = "a: memory grows"}};
   CHECK_THAT(to_table(team),
-             Contains("error: a: 7 keyframes of b are described by another vocabulary: the same "
+             Contains("error: a: 7 keyframes of b have another vocabulary: use one "
                       "run.vocabulary on all robots\n") &&
-                 !Contains("a pause"));
+                 Contains("warning: a: 80 frames skipped, 80 %: use --rate auto\n") &&
+                 !Contains("memory grows"));
 }
 
 TEST_CASE("The JSON of a run holds every robot, with all of its summary", "[team]") {
