@@ -5,16 +5,13 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
-#include <iostream>
 #include <optional>
 #include <random>
-#include <sstream>
 #include <string>
 #include <vector>
 
 #include "apps/robot/run_summary.hpp"
 #include "modules/core/lie.hpp"
-#include "modules/core/text_table.hpp"
 #include "modules/evaluation/trajectory_error.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
 #include "test/support/command.hpp"
@@ -66,21 +63,15 @@ EurocCopy first_seconds(const fs::path& recording, double length_s) {
   return copy;
 }
 
-// A recording on which sensors fail.
-struct Stage {
-  std::string name;
-  fs::path recording;
-  double length_s = 0.0;  // length of the part that is used
-  double begin_s = 0.0;   // begin of the fault
-};
+constexpr double kLength_s = 16.0;  // length of the part of the recording that is used
+constexpr double kBegin_s = 5.0;    // begin of the fault
 
 struct Outcome {
   int exit_code = -1;
   std::string output;
-  std::size_t poses = 0;
   RunSummary summary;
   // Position errors, in the frame that fits the poses before the fault.
-  double before_m = 0.0, worst_m = 0.0, last_m = 0.0;
+  double worst_m = 0.0, last_m = 0.0;
   std::optional<double> back_s;  // after the fault
 };
 
@@ -119,11 +110,11 @@ std::optional<double> back_after_s(const std::vector<PosePair>& pairs, const Ali
   return back ? std::optional(seconds_between(end, *back)) : std::nullopt;
 }
 
-Outcome meet(const Stage& stage, const SensorFault& fault) {
+Outcome meet(const fs::path& recording, const SensorFault& fault) {
   const TemporaryFolder folder;
-  EurocCopy copy = first_seconds(stage.recording, stage.length_s);
+  EurocCopy copy = first_seconds(recording, kLength_s);
   const Stamp first = copy.cameras[0].front().stamp;
-  const Stamp begin = first + (fault.is_at_start ? 0 : nanoseconds(stage.begin_s));
+  const Stamp begin = first + (fault.is_at_start ? 0 : nanoseconds(kBegin_s));
   const Stamp end = begin + nanoseconds(fault.lasts_s);
   fault.corrupt(copy, begin, end);
   copy.write(folder.path() / "recording");
@@ -134,15 +125,13 @@ Outcome meet(const Stage& stage, const SensorFault& fault) {
   if (run.exit_code != 0) return outcome;
   outcome.summary = read_summary(folder.path() / "results/summary.json");
   const auto estimate = read_trajectory(folder.path() / "results/odometry.tum");
-  const auto truth = read_trajectory(
-      find_trajectory(stage.recording / "mav0/state_groundtruth_estimate0").value());
+  const auto truth =
+      read_trajectory(find_trajectory(recording / "mav0/state_groundtruth_estimate0").value());
   const auto pairs = associate(truth, estimate, {first, estimate.back().stamp}, 0.1, 0.01);
-  outcome.poses = estimate.size();
   std::vector<PosePair> fitted;
   for (const PosePair& pair : pairs)
     if (pair.stamp < begin || fault.is_at_start) fitted.push_back(pair);
   const Alignment alignment = align(fitted, false);
-  outcome.before_m = rms_m(fitted, alignment, [](Stamp) { return true; });
   for (const PosePair& pair : pairs)
     if (pair.stamp >= begin && pair.stamp < end + nanoseconds(1.0))
       outcome.worst_m = std::max(outcome.worst_m, error_m(pair, alignment));
@@ -150,38 +139,6 @@ Outcome meet(const Stage& stage, const SensorFault& fault) {
   outcome.last_m = rms_m(pairs, alignment, [last](Stamp stamp) { return stamp >= last; });
   outcome.back_s = back_after_s(pairs, alignment, end);
   return outcome;
-}
-
-std::string line_with(const std::string& text, const std::string& part) {
-  std::istringstream lines(text);
-  for (std::string line; std::getline(lines, line);)
-    if (!part.empty() && line.find(part) != line.npos) return line;
-  return "";
-}
-
-std::vector<std::string> row_of(const Stage& stage, const SensorFault& fault,
-                                const Outcome& outcome) {
-  const OdometrySummary odometry = outcome.summary.odometry.value_or(OdometrySummary{});
-  const auto mm = [](double m) { return fixed(1e3 * m, 1); };
-  return {stage.name,
-          fault.name,
-          fixed(fault.lasts_s, 1),
-          std::to_string(outcome.poses),
-          mm(outcome.worst_m),
-          mm(outcome.last_m),
-          outcome.back_s ? fixed(*outcome.back_s, 2) : "-",
-          std::to_string(odometry.starts),
-          fixed(odometry.blind_seconds, 1),
-          std::to_string(outcome.exit_code)};
-}
-
-std::vector<Stage> stages() {
-  std::vector<Stage> stages;
-  if (const auto recording = shared_data("euroc/MH_01_easy"))
-    stages.push_back({"MH_01", fs::absolute(*recording), 16.0, 5.0});
-  if (const char* flight = std::getenv("KM_FLIGHT"))
-    stages.push_back({fs::path(flight).filename(), fs::absolute(flight), 40.0, 15.0});
-  return stages;
 }
 
 // The short form has the faults that differ most.
@@ -196,28 +153,22 @@ bool is_wanted(const SensorFault& fault) {
 }  // namespace
 
 TEST_CASE("A robot survives what happens to its sensors", "[faults]") {
-  std::vector<std::vector<std::string>> rows = {{"recording", "fault", "lasts [s]", "poses",
-                                                 "worst [mm]", "last 3 s [mm]", "back after [s]",
-                                                 "starts", "blind [s]", "exit"}};
-  for (const Stage& stage : stages())
-    for (const SensorFault& fault : sensor_faults()) {
-      constexpr double kAfter_s = 4.0;  // length of the part after the fault
-      const double begin_s = fault.is_at_start ? 0.0 : stage.begin_s;
-      if (!is_wanted(fault) || begin_s + fault.lasts_s + kAfter_s > stage.length_s) continue;
-      const Outcome outcome = meet(stage, fault);
-      rows.push_back(row_of(stage, fault, outcome));
-      std::cout << align_columns({rows.back()}) << "    " << line_with(outcome.output, fault.event)
-                << '\n';
-      CAPTURE(stage.name, fault.name, fault.lasts_s, outcome.output);
-      CHECK(outcome.exit_code == 0);
-      CHECK_THAT(outcome.output, Catch::Contains(fault.event));
-      CHECK(outcome.worst_m < fault.bound_m);
-      CHECK(outcome.last_m < fault.bound_m);
-      CHECK(outcome.back_s.value_or(1e9) <= 1.0);
-      REQUIRE(outcome.summary.odometry);
-      CHECK((outcome.summary.odometry->vision_losses > 0) == fault.is_blind);
-    }
-  std::cout << align_columns(rows);
+  const auto recording = shared_data("euroc/MH_01_easy");
+  if (!recording) return;
+  for (const SensorFault& fault : sensor_faults()) {
+    constexpr double kAfter_s = 4.0;  // length of the part after the fault
+    const double begin_s = fault.is_at_start ? 0.0 : kBegin_s;
+    if (!is_wanted(fault) || begin_s + fault.lasts_s + kAfter_s > kLength_s) continue;
+    const Outcome outcome = meet(fs::absolute(*recording), fault);
+    CAPTURE(fault.name, fault.lasts_s, outcome.output);
+    CHECK(outcome.exit_code == 0);
+    CHECK_THAT(outcome.output, Catch::Contains(fault.event));
+    CHECK(outcome.worst_m < fault.bound_m);
+    CHECK(outcome.last_m < fault.bound_m);
+    CHECK(outcome.back_s.value_or(1e9) <= 1.0);
+    REQUIRE(outcome.summary.odometry);
+    CHECK((outcome.summary.odometry->vision_losses > 0) == fault.is_blind);
+  }
 }
 
 TEST_CASE("A driver that restarts does not end a live robot", "[faults][live]") {
