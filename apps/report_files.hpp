@@ -4,7 +4,6 @@
 #include <ostream>
 #include <string>
 
-#include "apps/command_line.hpp"
 #include "apps/output_file.hpp"
 #include "apps/program_options.hpp"
 #include "modules/charts/chart_page.hpp"
@@ -17,15 +16,15 @@ struct ReportFiles {
 
   /// Defines --json and --plot, and describes their content. A plot is a page: other file names are
   /// refused.
-  void define(Command app, const std::string& in_json, const std::string& in_plot) {
-    app.add_option("--json", json, "Also write " + in_json + " to this file, as JSON");
-    app.add_option("--plot", plot, "Also draw " + in_plot + ", as a page for a browser: *.html")
-        .check(why_no_page);
-  }
   void define(CLI::App& app, const std::string& in_json, const std::string& in_plot) {
     app.add_option("--json", json, "Also write " + in_json + " to this file, as JSON");
     app.add_option("--plot", plot, "Also draw " + in_plot + ", as a page for a browser: *.html")
-        ->check(why_no_page);
+        ->check([](const std::string& file) {
+          return file.ends_with(".html") ? std::string()
+                                         : file +
+                                               ": --plot writes *.html (its charts can be saved "
+                                               "as *.svg in the browser)";
+        });
   }
 
   /// Checks the folders of the files, see check_output_folder(); call it before the work.
@@ -39,14 +38,6 @@ struct ReportFiles {
   void write(const auto& write_json, const std::string& title, const auto& draw) const {
     write_output(json, write_json);
     write_output(plot, [&](std::ostream& out) { out << chart_page(title, draw()); });
-  }
-
- private:
-  static std::string why_no_page(const std::string& file) {
-    return file.ends_with(".html") ? std::string()
-                                   : file +
-                                         ": --plot writes *.html (its charts can be saved as "
-                                         "*.svg in the browser)";
   }
 };
 

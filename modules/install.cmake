@@ -33,7 +33,7 @@ foreach(module ${modules})
     endif()
   endforeach()
 endforeach()
-foreach(header apps/centralised_system.hpp apps/command_line.hpp apps/descriptor.hpp
+foreach(header apps/centralised_system.hpp apps/descriptor.hpp
                apps/output_file.hpp apps/program_folder.hpp apps/program_options.hpp apps/program_version.hpp
                apps/report_files.hpp apps/stage_progress.hpp
                apps/team/robot_process.hpp apps/team/team_file.hpp

@@ -3,12 +3,12 @@
 #include <filesystem>
 #include <iostream>
 
-#include "apps/command_line.hpp"
 #include "apps/lab/experiments/report.hpp"
 #include "apps/lab/experiments/run_inputs.hpp"
 #include "apps/lab/experiments/run_steps.hpp"
 #include "apps/lab/experiments/step_record.hpp"
 #include "apps/program_folder.hpp"
+#include "apps/program_options.hpp"
 #include "modules/core/text_table.hpp"
 
 namespace {
@@ -57,7 +57,7 @@ std::vector<std::string> all_names() {
   return names;
 }
 
-void define(km::Command app, Options& options) {
+void define(CLI::App& app, Options& options) {
   app.footer(
       "Keys of a world in worlds.yaml, paths relative to it; those below quick: replace them "
       "with --quick:\n" +
@@ -67,13 +67,14 @@ void define(km::Command app, Options& options) {
   app.add_option("--results", options.results,
                  "Numbers, logs and the report (default: experiments_results)");
   app.add_option("--graphs", options.graphs, "Recorded pose graphs (default: the folder of --data)")
-      .existing_folder();
-  app.add_option("--euroc", options.euroc, "EuRoC's recordings, see above").existing_folder();
+      ->check(CLI::ExistingDirectory);
+  app.add_option("--euroc", options.euroc, "EuRoC's recordings, see above")
+      ->check(CLI::ExistingDirectory);
   app.add_option("--config", options.config, "Folder of the experiments' configuration")
-      .existing_folder();
+      ->check(CLI::ExistingDirectory);
   app.add_option("--programs", options.programs,
                  "Folder of the other programs (default: this one's)")
-      .existing_folder();
+      ->check(CLI::ExistingDirectory);
   app.add_flag("--quick", options.quick,
                "Small versions of all: other data and results, in quick/ below the folders");
 }
@@ -207,30 +208,29 @@ void report(const km::ExperimentConfig& config, const km::ExperimentPaths& paths
 }  // namespace
 
 int main(int argc, char** argv) try {
-  km::CommandLine line("kimera_multi_experiments", kAbout);
-  const km::Command app = line.command();
+  CLI::App app(kAbout, "kimera_multi_experiments");
   Options options;
   define(app, options);
-  app.require_subcommand(true);
-  const km::Command list_command =
-      app.add_subcommand("list", "Shows the experiments, their steps, and what is done");
-  const km::Command run_command =
-      app.add_subcommand("run", "Does what is not done yet, then reports");
+  app.require_subcommand(1);
+  app.fallthrough();
+  const CLI::App& list_command =
+      *app.add_subcommand("list", "Shows the experiments, their steps, and what is done");
+  CLI::App& run_command = *app.add_subcommand("run", "Does what is not done yet, then reports");
   std::vector<std::string> names = all_names();
   names.emplace_back("all");
   run_command
       .add_option("NAME", options.names,
                   "pcm, cosmo, trajectory, resources, mesh, semantics, levels, or all")
-      .required()
-      .one_of(names);
+      ->required()
+      ->check(CLI::IsMember(names));
   run_command.add_flag("--again", options.again, "Also what is done");
   app.add_subcommand("report", "Writes report.html and report.md of what there is");
-  if (const auto exit_code = line.parse(argc, argv, 1)) return *exit_code;
-  const Setup setup = setup_of(options, run_command.is_parsed());
+  if (const auto exit_code = km::parse_options(app, argc, argv, 1)) return *exit_code;
+  const Setup setup = setup_of(options, run_command.parsed());
   const km::ExperimentConfig config = km::read_experiments(setup.config, setup.quick);
-  if (list_command.is_parsed())
+  if (list_command.parsed())
     list(config, setup.paths);
-  else if (run_command.is_parsed())
+  else if (run_command.parsed())
     return run(options, setup, config);
   else
     report(config, setup.paths);

@@ -1,42 +1,43 @@
 #include <exception>
 #include <iostream>
 
-#include "apps/command_line.hpp"
 #include "apps/lab/simulate/simulate.hpp"
+#include "apps/program_options.hpp"
 
 namespace {
 
 constexpr int kInterrupted = 130;  // exit code of shells for SIGINT
 
 constexpr const char* kAbout =
-    "Makes recordings of robots that move through a built-in world: EuRoC/ASL folders with "
-    "images,\n"
-    "inertial data and the truth, and a team file to run on them.\n\n"
-    "Worlds: city, camp and store have roads or aisles for vehicles, vicon_room and hall are for\n"
-    "flying robots. The same seed makes the same bytes, whatever the number of threads. Ctrl-C "
-    "stops in "
-    "order, a second one at\n"
-    "once; the same command continues a stopped run.\n\n"
-    "Examples:\n"
-    "  kimera_multi_simulate --world city --robots 2 --duration 60 --output city\n"
-    "  kimera_multi_simulate --world camp --rig rgbd --labels --depth-rate 5 --output camp\n"
-    "  kimera_multi_simulate --config config/simulation/city.yaml --output city\n"
-    "  kimera_multi_simulate --world vicon_room --resolution 376x240 --output small\n"
-    "  kimera_multi_team --config small/team.yaml --output results/small\n\n"
-    "With --trajectory and --imu the robots move as recorded flights did, and keep the recorded\n"
-    "inertial data; only the images are rendered:\n"
-    "  kimera_multi_simulate --world vicon_room --trajectory V1_02.csv V1_03.csv \\\n"
-    "      --imu V1_02.imu.csv V1_03.imu.csv --names a b --end 60 --output vicon1\n\n"
-    "Exit code: 0 if the recordings are complete, 1 for input that cannot be used or a disk that\n"
-    "cannot be written, 130 if it was stopped.";
+    R"(Makes recordings of robots that move through a built-in world: EuRoC/ASL folders with images, inertial
+data and the truth, and a team file to run on them.
+
+Worlds: city, camp and store have roads or aisles for vehicles; vicon_room and hall are for flying robots.
+The same seed makes the same bytes, for any number of threads. Ctrl-C stops in order, a second one at
+once; the same command continues a stopped run.
+
+Examples:
+  kimera_multi_simulate --world city --robots 2 --duration 60 --output city
+  kimera_multi_simulate --world camp --rig rgbd --labels --depth-rate 5 --output camp
+  kimera_multi_simulate --config config/simulation/city.yaml --output city
+  kimera_multi_simulate --world vicon_room --resolution 376x240 --output small
+  kimera_multi_team --config small/team.yaml --output results/small
+
+With --trajectory and --imu the robots move like recorded flights, and keep the recorded inertial data;
+only the images are rendered:
+  kimera_multi_simulate --world vicon_room --trajectory V1_02.csv V1_03.csv \
+      --imu V1_02.imu.csv V1_03.imu.csv --names a b --end 60 --output vicon1
+
+Exit codes: 0 if the recordings are complete; 1 for unusable input or a disk that cannot be written; 130 if
+it was stopped.)";
 
 }  // namespace
 
 int main(int argc, char** argv) try {
-  km::CommandLine line("kimera_multi_simulate", kAbout);
+  CLI::App app(kAbout, "kimera_multi_simulate");
   km::SimulationOptions options;
-  km::define(line.command(), options);
-  if (const auto exit_code = line.parse(argc, argv, 1)) return *exit_code;
+  km::define(app, options);
+  if (const auto exit_code = km::parse_options(app, argc, argv, 1)) return *exit_code;
   options = km::completed(options);
   km::SignalWatch signals;
   km::Progress progress;

@@ -27,7 +27,7 @@ constexpr bool kIsList<std::vector<T>> = true;
 // same key, as if a file contained it.
 class OptionFields : public FieldVisitor<OptionFields> {
  public:
-  OptionFields(Command app, ConfigSection& given) : app_(app), given_(given) {}
+  OptionFields(CLI::App& app, ConfigSection& given) : app_(app), given_(given) {}
 
   template <typename T, typename Accepted>
   void visit(const char* key, const T& value, const Accepted& accepted, std::string text) {
@@ -44,14 +44,14 @@ class OptionFields : public FieldVisitor<OptionFields> {
       app_.add_option_function<std::vector<std::string>>(name, give, text);
     else
       app_.add_option_function<std::string>(name, give, text)
-          .default_text(required_.contains(key) ? "" : yaml_text(value, accepted));
+          ->default_str(required_.contains(key) ? "" : yaml_text(value, accepted));
   }
   void required(std::initializer_list<const char*> keys) {
     required_.insert(keys.begin(), keys.end());
   }
 
  private:
-  Command app_;
+  CLI::App& app_;
   ConfigSection& given_;
   std::set<std::string> required_;
 };
@@ -100,9 +100,9 @@ bool is_resolution(const std::string& text) {
   return parse_resolution(text).has_value();
 }
 
-void define(Command app, SimulationOptions& options) {
+void define(CLI::App& app, SimulationOptions& options) {
   struct Given {
-    explicit Given(Command app) : fields(app, given) {}
+    explicit Given(CLI::App& app) : fields(app, given) {}
     std::string file;
     ConfigSection given{"command line", {}, {}};
     OptionFields fields;
@@ -114,7 +114,7 @@ void define(Command app, SimulationOptions& options) {
     try {
       read_options(line->file, line->given, options);
     } catch (const ConfigError& error) {
-      throw CommandLineError(error.what());
+      throw CLI::ValidationError(error.what());
     }
   });
 }

@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "apps/command_line.hpp"
 #include "apps/lab/simulate/effects.hpp"
 #include "apps/lab/simulation/dataset/dataset_record.hpp"
 #include "apps/lab/simulation/dataset/image_encoding.hpp"
+#include "apps/program_options.hpp"
 #include "modules/core/camera.hpp"
 #include "modules/core/config.hpp"
 
@@ -116,7 +116,7 @@ struct SimulationOptions {
 /// Adds the options to a command line, and --config for a file of them: a YAML map, which may have
 /// sections of effects. The command line has priority over the file. All errors of both are
 /// reported together, by name and line.
-void define(Command app, SimulationOptions& options);
+void define(CLI::App& app, SimulationOptions& options);
 
 /// Options with derived values filled in: names, the number of robots, the rate of depth images,
 /// and the rig of the calibration files. Throws std::invalid_argument for contradicting options,

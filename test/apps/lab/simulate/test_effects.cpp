@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <fstream>
 #include <sstream>
@@ -11,11 +12,12 @@ namespace km {
 namespace {
 
 SimulationOptions parsed_effects(std::vector<std::string> arguments) {
-  CommandLine line("kimera_multi_simulate", "");
+  CLI::App app;
   SimulationOptions options;
-  define(line.command(), options);
+  define(app, options);
   arguments.insert(arguments.end(), {"--world", "city", "--output", "x"});
-  line.parse_words(std::move(arguments));
+  std::ranges::reverse(arguments);  // CLI11 takes them from the end
+  app.parse(std::move(arguments));
   return completed(options);
 }
 

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <string>
 #include <vector>
@@ -9,10 +10,11 @@ namespace km {
 namespace {
 
 SimulationOptions parse(std::vector<std::string> arguments) {
-  CommandLine line("kimera_multi_simulate", "");
+  CLI::App app;
   SimulationOptions options;
-  define(line.command(), options);
-  line.parse_words(std::move(arguments));
+  define(app, options);
+  std::ranges::reverse(arguments);  // CLI11 takes them from the end
+  app.parse(std::move(arguments));
   return completed(options);
 }
 
