@@ -5,8 +5,6 @@
 #include <cmath>
 #include <random>
 
-#include "modules/pose_graph/frontal_cholesky.hpp"
-
 namespace km {
 namespace {
 
@@ -47,70 +45,26 @@ Eigen::SparseMatrix<double> hold(Eigen::SparseMatrix<double> S, const QuadraticP
   return S;
 }
 
-// Factorises S + shift * units for several shifts with one elimination plan.
+// Factorises S + shift * units for several shifts with one symbolic analysis.
 class ShiftedCholesky {
  public:
-  explicit ShiftedCholesky(const Eigen::SparseMatrix<double>& S) : cholesky_(make_plan(S)) {
-    const std::vector<NodePair>& pairs = cholesky_.plan().pairs();
-    const auto nodes = static_cast<std::size_t>(cholesky_.plan().nodes());
-    S_ = BlockMatrix::zero(4, nodes, pairs.size());
-    int pair = 0;
-    for (int j = 0; j < cholesky_.plan().nodes(); ++j) {  // in the order of make_plan()
-      for (Index c = 0; c < 4; ++c)
-        for (Eigen::SparseMatrix<double>::InnerIterator s(S, 4 * j + c); s; ++s)
-          if (s.row() / 4 == j) S_.at(j)(s.row() % 4, c) = s.value();
-      const int first = pair;
-      while (pair < static_cast<int>(pairs.size()) && pairs[static_cast<std::size_t>(pair)][1] == j)
-        ++pair;
-      for (Index c = 0; c < 4; ++c) {
-        int here = first;
-        for (Eigen::SparseMatrix<double>::InnerIterator s(S, 4 * j + c); s && s.row() / 4 < j;
-             ++s) {
-          while (pairs[static_cast<std::size_t>(here)][0] != s.row() / 4) ++here;
-          S_.between(here)(s.row() % 4, c) = s.value();
-        }
-      }
-    }
+  explicit ShiftedCholesky(Eigen::SparseMatrix<double> S) : S_(std::move(S)) {
+    llt_.analyzePattern(S_);
   }
 
   // False: up to rounding, S + shift * units is not positive definite.
   [[nodiscard]] bool factorise(const Eigen::VectorXd& units, double shift) {
-    A_ = S_;
-    for (Index i = 0; i < units.size(); ++i) A_.diagonal(i % 4, i) += shift * units(i);
-    return cholesky_.factorise(A_);
+    Eigen::SparseMatrix<double> A = S_;
+    A.diagonal() += shift * units;
+    llt_.factorize(A);
+    return llt_.info() == Eigen::Success;
   }
 
-  [[nodiscard]] Eigen::VectorXd solve(const Eigen::VectorXd& b) const {
-    Eigen::MatrixXd x = b;
-    cholesky_.forward(x);
-    cholesky_.backward(x);
-    return x;
-  }
+  [[nodiscard]] Eigen::VectorXd solve(const Eigen::VectorXd& b) const { return llt_.solve(b); }
 
  private:
-  static std::shared_ptr<const EliminationPlan> make_plan(const Eigen::SparseMatrix<double>& S) {
-    const Index nodes = S.rows() / 4;
-    std::vector<NodePair> pairs;
-    std::vector<Index> seen(static_cast<std::size_t>(nodes), -1);
-    for (Index j = 0; j < nodes; ++j) {
-      const std::size_t first = pairs.size();
-      for (Index c = 0; c < 4; ++c)
-        for (Eigen::SparseMatrix<double>::InnerIterator s(S, 4 * j + c); s && s.row() / 4 < j;
-             ++s) {
-          Index& mark = seen[static_cast<std::size_t>(s.row() / 4)];
-          if (mark == j) continue;
-          mark = j;
-          pairs.push_back({static_cast<int>(s.row() / 4), static_cast<int>(j)});
-        }
-      std::sort(pairs.begin() + static_cast<std::ptrdiff_t>(first), pairs.end());
-    }
-    return std::make_shared<const EliminationPlan>(
-        std::vector<bool>(static_cast<std::size_t>(nodes), false), std::move(pairs));
-  }
-
-  FrontalCholesky cholesky_;
-  BlockMatrix S_;
-  BlockMatrix A_;
+  Eigen::SparseMatrix<double> S_;
+  Eigen::SimplicialLLT<Eigen::SparseMatrix<double>> llt_;
 };
 
 // X with the best translations for its rotations. Along long chains, translations can differ by

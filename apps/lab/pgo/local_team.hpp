@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "apps/lab/pgo/team_schedule.hpp"
+#include "apps/lab/pgo/team_graph.hpp"
 #include "apps/lab/pgo/team_solver.hpp"
 
 namespace km {

@@ -7,9 +7,9 @@
 #include <stdexcept>
 #include <utility>
 
-#include "apps/lab/pgo/connected_parts.hpp"
 #include "apps/lab/pgo/odometry_start.hpp"
 #include "apps/lab/pgo/solvers.hpp"
+#include "apps/lab/pgo/team_graph.hpp"
 #include "modules/evaluation/trajectory_error.hpp"
 #include "modules/outlier_rejection/chi_squared.hpp"
 #include "modules/outlier_rejection/pcm.hpp"

@@ -4,6 +4,7 @@
 #include <map>
 #include <numeric>
 #include <set>
+#include <stdexcept>
 #include <utility>
 
 namespace km {
@@ -105,6 +106,96 @@ SessionGraph part_of(const TeamGraph& graph, std::size_t robot) {
 
 QuadraticProblem problem_of(const TeamGraph& graph, Eigen::Index rank) {
   return {rank, graph.poses(), graph.edges, {}, graph.verticals};
+}
+
+TeamNeighbours neighbours_in(const TeamGraph& graph) {
+  std::vector<std::set<std::size_t>> sets(graph.robots());
+  for (const BlockEdge& e : graph.edges) {
+    const std::size_t a = graph.robot_of(e.i);
+    const std::size_t b = graph.robot_of(e.j);
+    if (a == b) continue;
+    sets[a].insert(b);
+    sets[b].insert(a);
+  }
+  TeamNeighbours neighbours;
+  for (const auto& set : sets) neighbours.emplace_back(set.begin(), set.end());
+  return neighbours;
+}
+
+std::vector<std::vector<std::size_t>> colours_of(const TeamNeighbours& neighbours) {
+  std::vector<std::size_t> order(neighbours.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return neighbours[a].size() > neighbours[b].size();
+  });
+  std::vector<std::vector<std::size_t>> colours;
+  for (const std::size_t k : order) {
+    const auto is_free = [&](const std::vector<std::size_t>& members) {
+      return std::none_of(members.begin(), members.end(), [&](std::size_t other) {
+        return std::binary_search(neighbours[k].begin(), neighbours[k].end(), other);
+      });
+    };
+    const auto found = std::find_if(colours.begin(), colours.end(), is_free);
+    if (found == colours.end())
+      colours.push_back({k});
+    else
+      found->push_back(k);
+  }
+  for (auto& members : colours) std::sort(members.begin(), members.end());
+  return colours;
+}
+
+TeamTree breadth_first_tree(const TeamNeighbours& neighbours) {
+  TeamTree tree{.order = {0}, .parent = std::vector<std::size_t>(neighbours.size(), 0)};
+  std::set<std::size_t> reached{0};
+  for (std::size_t at = 0; at < tree.order.size(); ++at)
+    for (const std::size_t next : neighbours[tree.order[at]])
+      if (reached.insert(next).second) {
+        tree.parent[next] = tree.order[at];
+        tree.order.push_back(next);
+      }
+  if (tree.order.size() != neighbours.size())
+    throw std::invalid_argument("breadth_first_tree: robot 0 is not connected with all others");
+  return tree;
+}
+
+std::vector<ConnectedPart> connected_parts(const TeamGraph& graph,
+                                           const std::vector<bool>& keep_edge) {
+  const std::vector<Eigen::Index> lowest = part_of_poses(with_edges(graph, keep_edge));
+  std::vector<ConnectedPart> parts;
+  std::map<Eigen::Index, std::size_t> part_of_lowest;
+  std::vector<std::size_t> last_robot;  // last robot of each part so far
+  std::vector<Eigen::Index> number(static_cast<std::size_t>(graph.poses()));
+  for (std::size_t i = 0; i < number.size(); ++i) {
+    const auto [at, is_new] = part_of_lowest.emplace(lowest[i], parts.size());
+    const std::size_t robot = graph.robot_of(static_cast<Eigen::Index>(i));
+    if (is_new)
+      parts.push_back({.graph = {.dimension = graph.dimension}, .poses = {}, .edges = {}});
+    if (is_new) last_robot.push_back(graph.robots());  // none
+    ConnectedPart& part = parts[at->second];
+    number[i] = static_cast<Eigen::Index>(part.poses.size());
+    if (last_robot[at->second] != robot) part.graph.first.push_back(number[i]);
+    last_robot[at->second] = robot;
+    part.poses.push_back(i);
+    part.graph.ids.push_back(graph.ids[i]);
+  }
+  for (ConnectedPart& part : parts)
+    part.graph.first.push_back(static_cast<Eigen::Index>(part.poses.size()));
+  for (std::size_t k = 0; k < graph.edges.size(); ++k) {
+    if (!keep_edge[k]) continue;
+    BlockEdge edge = graph.edges[k];
+    ConnectedPart& part = parts[part_of_lowest.at(lowest[static_cast<std::size_t>(edge.i)])];
+    edge.i = number[static_cast<std::size_t>(edge.i)];
+    edge.j = number[static_cast<std::size_t>(edge.j)];
+    part.graph.edges.push_back(edge);
+    part.edges.push_back(k);
+  }
+  for (const VerticalPrior& prior : graph.verticals) {
+    const auto pose = static_cast<std::size_t>(prior.pose);
+    parts[part_of_lowest.at(lowest[pose])].graph.verticals.push_back(
+        {number[pose], prior.up, prior.weight});
+  }
+  return parts;
 }
 
 }  // namespace km

@@ -59,4 +59,34 @@ struct TeamGraph {
 /// does.
 [[nodiscard]] QuadraticProblem problem_of(const TeamGraph& graph, Eigen::Index rank);
 
+/// By robot: the robots with which it shares edges, ascending.
+using TeamNeighbours = std::vector<std::vector<std::size_t>>;
+
+[[nodiscard]] TeamNeighbours neighbours_in(const TeamGraph& graph);
+
+/// Groups of robots without edges between them, which may move at the same time. The greedy
+/// colouring begins with the robot with the most neighbours.
+[[nodiscard]] std::vector<std::vector<std::size_t>> colours_of(const TeamNeighbours& neighbours);
+
+/// Breadth-first tree from robot 0. parent[k] comes before k in `order`.
+struct TeamTree {
+  std::vector<std::size_t> order;
+  std::vector<std::size_t> parent;  ///< By robot; the parent of robot 0 is 0.
+};
+
+/// Throws std::invalid_argument if robot 0 is not connected with all others.
+[[nodiscard]] TeamTree breadth_first_tree(const TeamNeighbours& neighbours);
+
+/// A connected part of a team's graph. Robots, poses and edges keep the order of the whole graph.
+struct ConnectedPart {
+  TeamGraph graph;                 ///< Graph of the robots that have a pose in the part.
+  std::vector<std::size_t> poses;  ///< [i]: number of pose i in the whole graph.
+  std::vector<std::size_t> edges;  ///< [k]: number of edge k in the whole graph.
+};
+
+/// Returns the connected parts of the subgraph of the kept edges, ascending by their first pose.
+/// Precondition: `keep_edge` has an element for each edge.
+[[nodiscard]] std::vector<ConnectedPart> connected_parts(const TeamGraph& graph,
+                                                         const std::vector<bool>& keep_edge);
+
 }  // namespace km

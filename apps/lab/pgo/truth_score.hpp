@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "apps/lab/pgo/connected_parts.hpp"
+#include "apps/lab/pgo/team_graph.hpp"
 #include "apps/lab/pgo/team_graph_file.hpp"
 
 namespace km {

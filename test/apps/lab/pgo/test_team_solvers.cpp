@@ -1,9 +1,9 @@
 #include <catch2/catch.hpp>
 
+#include "apps/lab/pgo/central_solver.hpp"
 #include "apps/lab/pgo/gauss_seidel_team.hpp"
 #include "apps/lab/pgo/local_team.hpp"
 #include "apps/lab/pgo/member_team.hpp"
-#include "apps/lab/pgo/staircase.hpp"
 #include "modules/core/lie.hpp"
 #include "modules/pose_graph/chordal.hpp"
 #include "modules/rbcd/member_rbcd.hpp"
