@@ -211,9 +211,6 @@ void Robot::add_sensing(const RobotConfig& config, const PlaybackPace& pace,
   else
     add_odometry<VioNode>(rig, config.tracker, config.vio, odometry);
   if (mapping) add_mapping(config, pace, rig.stereo, *mapping, std::move(map));
-  std::optional<ImageDescriber> describer;
-  if (const std::string& network = config.place_recognition.network; !network.empty())
-    describer.emplace(find_shipped_file(network, "place_recognition.network"));
   std::optional<KeypointDescriber> keypoint_describer;
   if (const std::string& network = config.keyframe_features.network; !network.empty())
     keypoint_describer.emplace(find_shipped_file(network, "keyframe_features.network"));
@@ -222,7 +219,7 @@ void Robot::add_sensing(const RobotConfig& config, const PlaybackPace& pace,
                                 KeyframeFeaturesTopics{.odometry = topics_.keyframe_odometry,
                                                        .frames = topics_.located_frames,
                                                        .keyframes = topics_.new_keyframes},
-                                std::move(describer), std::move(keypoint_describer));
+                                std::move(keypoint_describer));
   if (restored_) features.continue_from(restored_->keyframes.back().odometry);
 }
 

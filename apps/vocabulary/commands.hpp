@@ -33,7 +33,5 @@ struct VocabularyCommand {
 void add_train(CLI::App& app);
 void add_inspect(CLI::App& app);
 void add_evaluate(CLI::App& app);
-void add_describe(CLI::App& app);
-void add_patches(CLI::App& app);
 
 }  // namespace km

@@ -17,8 +17,6 @@ text files that list one image per line. Examples:
 }  // namespace
 
 int main(int argc, char** argv) {
-  return km::run_subcommands(
-      "kimera_multi_vocabulary", kAbout,
-      {km::add_train, km::add_inspect, km::add_evaluate, km::add_describe, km::add_patches}, argc,
-      argv);
+  return km::run_subcommands("kimera_multi_vocabulary", kAbout,
+                             {km::add_train, km::add_inspect, km::add_evaluate}, argc, argv);
 }

@@ -51,18 +51,6 @@ struct KeyframeFeatures {
   std::uint16_t network = 0;  ///< Identity of the network of `matched`; 0: ORB.
 };
 
-/// Global descriptor of an image by a network (see ImageDescriber). The cosine of the angle between
-/// two descriptors states how similar their images are, if they are of one network.
-struct ImageDescriptor {
-  std::uint64_t network = 0;        ///< Fingerprint of the network; 0: this image is not described.
-  std::vector<std::int8_t> values;  ///< At most kMaxImageDescriptorBytes; empty: not described.
-
-  bool operator==(const ImageDescriptor&) const = default;
-};
-
-/// Largest size of an ImageDescriptor, in memory and in a message.
-inline constexpr std::size_t kMaxImageDescriptorBytes = 128;
-
 /// Pose of a keyframe in its robot's odometry frame with the covariance accumulated along the
 /// odometry since that robot's first keyframe (see between_on_chain()).
 struct OdometryPose {
@@ -76,7 +64,6 @@ struct Keyframe {
   OdometryPose odometry;
   Stamp stamp = 0;
   KeyframeFeatures features;
-  ImageDescriptor image = {};
 };
 
 }  // namespace km

@@ -27,9 +27,8 @@ struct RelativePose {
 struct LoopCandidate {
   KeyframeId query;
   KeyframeId match;
-  double similarity = 0.0;  ///< Normalised score of the bags of words, or a cosine, see by_image.
+  double similarity = 0.0;  ///< Normalised score of the bags of words.
   int support = 1;          ///< Number of candidates nearby, see PlaceCandidate.
-  bool by_image = false;    ///< Found by the descriptors of the images, and not by words.
 };
 
 /// Identity of a loop closure: a pair of keyframes, independent of the robot and the direction of

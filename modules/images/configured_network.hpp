@@ -10,8 +10,8 @@ namespace km {
 
 /// The place of a network in the configuration, for messages.
 struct NetworkKey {
-  const char* key;      ///< "place_recognition.network"
-  const char* shipped;  ///< The file that comes with the program: "networks/places.onnx".
+  const char* key;      ///< "keyframe_features.network"
+  const char* shipped;  ///< The file that comes with the program: "networks/keypoints.onnx".
 };
 
 /// A network in ONNX format whose file the configuration names. It is run by OpenCV's dnn module on

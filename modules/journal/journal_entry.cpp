@@ -59,9 +59,6 @@ void describe(auto& archive, As<Keyframe> auto& keyframe) {
   });
   archive.require(features.matched.size() ==
                   (features.network == 0 ? 0 : features.keypoints.size()));
-  archive(keyframe.image.network);
-  archive.list(keyframe.image.values, kMaxImageDescriptorBytes, 1,
-               [&](auto& value) { archive(value); });
 }
 
 void describe(auto& archive, As<Closure> auto& closure) {

@@ -6,8 +6,6 @@
 namespace km {
 namespace {
 
-constexpr double kSimilarityByImage = 0.7;
-
 // Candidates of equal 4 z, rounded, count as equal.
 constexpr double kBinsPerUnit = 4.0;
 
@@ -20,8 +18,7 @@ double logistic(double x) {
 
 // At most 40, where every probability is 1: a similarity may have any size.
 double evidence(const LoopCandidate& candidate) {
-  const double similarity = candidate.by_image ? kSimilarityByImage : candidate.similarity;
-  return std::clamp(11.7 * similarity + 1.1 * std::min(candidate.support, 5), 0.0, 40.0);
+  return std::clamp(11.7 * candidate.similarity + 1.1 * std::min(candidate.support, 5), 0.0, 40.0);
 }
 
 }  // namespace

@@ -19,9 +19,6 @@ namespace km {
 ///
 /// d is the maximum of its posterior distribution. Before the first result, d has a normal
 /// distribution with a mean of 14 and a standard deviation of 2.
-///
-/// A candidate that was found by the descriptor of its image has no normalised score of words. It
-/// counts as one with a similarity of 0.7.
 class ClosureOdds {
  public:
   [[nodiscard]] double probability(const LoopCandidate& candidate) const;

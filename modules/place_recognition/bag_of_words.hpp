@@ -21,14 +21,13 @@ struct WordCount {
 /// the bag determines the weighted vector exactly, at a fraction of the vector's size.
 using BagOfWords = std::vector<WordCount>;
 
-/// The words of one keyframe and the descriptor of its image, as robots send them to each other.
+/// The words of one keyframe, as robots send them to each other.
 struct KeyframeBow {
   KeyframeId id;
   Stamp stamp = 0;
   std::uint64_t vocabulary = 0;  ///< Vocabulary::id() of the words.
   BagOfWords words;              ///< None if an earlier keyframe shows the place.
   double normalizer = 0.0;       ///< Score against the keyframe before it; 0 if there is none.
-  ImageDescriptor image = {};    ///< Only with words.
 };
 
 /// Sparse TF-IDF vector of one image with L1 norm 1. It is empty if no word of the image has a

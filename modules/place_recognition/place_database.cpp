@@ -24,10 +24,9 @@ void count_support(std::vector<PlaceCandidate>& candidates) {
 PlaceDatabase::PlaceDatabase(const PlaceRecognitionConfig& config, std::size_t words)
     : config_(checked(config)), database_(words) {}
 
-std::size_t PlaceDatabase::add(BowVector vector, Stamp stamp, ImageDescriptor image) {
+std::size_t PlaceDatabase::add(BowVector vector, Stamp stamp) {
   expect_order(stamp);
   const std::size_t index = database_.add(vector);
-  images_.add(std::move(image));
   stamps_.push_back(stamp);
   newest_ = stamp;
   view_ = vector;
@@ -52,29 +51,18 @@ void PlaceDatabase::expect_order(Stamp stamp) const {
                                 std::to_string(newest_));
 }
 
-CandidateSearch PlaceDatabase::search(const BowVector& query, double normalizer,
-                                      const ImageDescriptor& image) const {
-  return search_among(query, normalizer, image, stamps_.size());
+CandidateSearch PlaceDatabase::search(const BowVector& query, double normalizer) const {
+  return search_among(query, normalizer, stamps_.size());
 }
 
-CandidateSearch PlaceDatabase::search_own(const BowVector& query, Stamp stamp,
-                                          const ImageDescriptor& image) const {
+CandidateSearch PlaceDatabase::search_own(const BowVector& query, Stamp stamp) const {
   const Stamp newest = stamp - nanoseconds(config_.min_gap_s);
   const auto end = std::upper_bound(stamps_.begin(), stamps_.end(), newest);
-  return search_among(query, score(query, last_), image,
+  return search_among(query, score(query, last_),
                       std::max(static_cast<std::size_t>(end - stamps_.begin()), known_from_));
 }
 
 CandidateSearch PlaceDatabase::search_among(const BowVector& query, double normalizer,
-                                            const ImageDescriptor& image, std::size_t count) const {
-  CandidateSearch result = search_words(query, normalizer, count);
-  for (const auto& [index, cosine] : images_.search(image, config_.image_similarity, count))
-    choose({.index = index, .similarity = cosine, .by_image = true}, result.candidates);
-  count_support(result.candidates);
-  return result;
-}
-
-CandidateSearch PlaceDatabase::search_words(const BowVector& query, double normalizer,
                                             std::size_t count) const {
   CandidateSearch result;
   result.normalizer = normalizer;
@@ -91,6 +79,7 @@ CandidateSearch PlaceDatabase::search_words(const BowVector& query, double norma
     choose(
         {.index = match.index, .similarity = static_cast<double>(match.score) / result.normalizer},
         result.candidates);
+  count_support(result.candidates);
   return result;
 }
 

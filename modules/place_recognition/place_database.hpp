@@ -7,7 +7,6 @@
 #include "modules/core/ids.hpp"
 #include "modules/core/stamp.hpp"
 #include "modules/place_recognition/bow_database.hpp"
-#include "modules/place_recognition/descriptor_database.hpp"
 #include "modules/place_recognition/place_recognition_config.hpp"
 
 namespace km {
@@ -15,10 +14,9 @@ namespace km {
 /// A keyframe that may show the same place as the query.
 struct PlaceCandidate {
   std::size_t index = 0;    ///< In order of add().
-  double similarity = 0.0;  ///< Normalised, see PlaceDatabase; if by_image, a cosine.
+  double similarity = 0.0;  ///< Normalised, see PlaceDatabase.
   int support = 1;          ///< Number of the query's candidates within 3 keyframes of this
                             ///< candidate, including itself.
-  bool by_image = false;    ///< Found by the descriptor of the image, and not by words.
 };
 
 enum class SearchStatus {
@@ -33,8 +31,7 @@ struct CandidateSearch {
   std::size_t compared = 0;      ///< Number of keyframes that share a word with the query.
   std::size_t above = 0;         ///< Number of these at or above the threshold.
   double best_similarity = 0.0;  ///< Best similarity of all compared keyframes.
-  std::vector<PlaceCandidate> candidates;  ///< At most max_candidates: those of words, then those
-                                           ///< of the image, each by descending similarity.
+  std::vector<PlaceCandidate> candidates;  ///< At most max_candidates, by descending similarity.
 };
 
 /// The views of one robot, in order of time, and the search for earlier visits of a place.
@@ -47,25 +44,21 @@ struct CandidateSearch {
 /// follow.
 ///
 /// A keyframe is a view if it shows more than the view before it: s(v_t, v_view) is below
-/// new_view_score. Other robots need only the views of a robot, and search only these.
-///
-/// If images have descriptors by a network, keyframes of similar descriptors become candidates too,
-/// as far as words leave room. They need no normaliser. Const members are thread-safe.
+/// new_view_score. Other robots need only the views of a robot, and search only these. Const
+/// members are thread-safe.
 class PlaceDatabase {
  public:
   /// For vectors of a vocabulary of `words` words. Throws ConfigError if `config` is out of bounds.
   PlaceDatabase(const PlaceRecognitionConfig& config, std::size_t words);
 
   /// Candidates among all keyframes for the keyframe `query` of another robot, with the normaliser
-  /// that this robot has sent. `image`: the descriptor of the query's image, or an empty one.
-  CandidateSearch search(const BowVector& query, double normalizer,
-                         const ImageDescriptor& image = {}) const;
+  /// that this robot has sent.
+  CandidateSearch search(const BowVector& query, double normalizer) const;
 
   /// Candidates for a keyframe of this robot taken at `stamp`, not yet added. The search covers the
   /// keyframes that are at least min_gap_s older or were added before mark_odometry_break(). The
   /// keyframe that was added or passed last normalises the score.
-  CandidateSearch search_own(const BowVector& query, Stamp stamp,
-                             const ImageDescriptor& image = {}) const;
+  CandidateSearch search_own(const BowVector& query, Stamp stamp) const;
 
   /// States that odometry hardly determines the pose of the next keyframe relative to the keyframe
   /// before it. All keyframes added so far then count as other places, whatever their age, and the
@@ -80,7 +73,7 @@ class PlaceDatabase {
 
   /// Adds a keyframe and returns its index. Throws std::invalid_argument if `stamp` is before the
   /// last stamp, or if BowDatabase::add() does. The state is then unchanged.
-  std::size_t add(BowVector vector, Stamp stamp, ImageDescriptor image = {});
+  std::size_t add(BowVector vector, Stamp stamp);
 
   /// Takes a keyframe that is not added: it only normalises the score of the next one. Throws
   /// std::invalid_argument if `stamp` is before the last stamp.
@@ -89,15 +82,12 @@ class PlaceDatabase {
   std::size_t size() const { return stamps_.size(); }
 
  private:
-  CandidateSearch search_words(const BowVector& query, double normalizer, std::size_t count) const;
-  CandidateSearch search_among(const BowVector& query, double normalizer,
-                               const ImageDescriptor& image, std::size_t count) const;
+  CandidateSearch search_among(const BowVector& query, double normalizer, std::size_t count) const;
   void expect_order(Stamp stamp) const;
   void choose(const PlaceCandidate& found, std::vector<PlaceCandidate>& chosen) const;
 
   PlaceRecognitionConfig config_;
   BowDatabase database_;
-  DescriptorDatabase images_;
   std::vector<Stamp> stamps_;                         // ascending
   Stamp newest_ = std::numeric_limits<Stamp>::min();  // stamp of the keyframe added or passed last
   std::size_t known_from_ = 0;

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <string>
-
 #include "modules/core/config.hpp"
 
 namespace km {
@@ -18,8 +16,6 @@ struct PlaceRecognitionConfig {
   double candidate_separation_s = 0.0;
   double new_view_score = 0.24;
   bool known_places = true;
-  std::string network = {};
-  double image_similarity = 0.35;
 
   void visit_fields(auto& visitor) {
     visitor.field("word_keypoints", word_keypoints, {50, 4000},
@@ -46,13 +42,6 @@ struct PlaceRecognitionConfig {
         "neither send nor search the words of keyframes at places that earlier keyframes "
         "of this robot show from nearly the same pose; false: a robot that moves at known "
         "places sends and keeps as much as at new ones");
-    visitor.field("network", network,
-                  "ONNX file that describes whole images, beside the words; one for all robots; "
-                  "input: 1 x 1 or 3 x height x width, output: up to 128 numbers; "
-                  "networks/places.onnx comes with the program; empty: none");
-    visitor.field("image_similarity", image_similarity, {0.0, 1.0},
-                  "least cosine of two descriptors by the network for a candidate that words do "
-                  "not find; lower: more candidates, more work for verification");
   }
 };
 

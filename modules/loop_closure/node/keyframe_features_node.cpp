@@ -16,11 +16,9 @@ constexpr std::size_t kFrameQueue = 64;
 KeyframeFeaturesNode::KeyframeFeaturesNode(const KeyframeFeaturesConfig& config,
                                            const StereoRig& rig,
                                            const KeyframeFeaturesTopics& topics,
-                                           std::optional<ImageDescriber> describer,
                                            std::optional<KeypointDescriber> keypoint_describer)
     : camera_(rig.cameras[0]),
       extractor_(rig, config, std::move(keypoint_describer)),
-      describer_(std::move(describer)),
       keyframes_(topics.keyframes),
       worker_(
           kFrameQueue, Overflow::kBlock,
@@ -58,7 +56,6 @@ void KeyframeFeaturesNode::step(const LocatedFrame& located) {
   Keyframe keyframe = std::move(without_images_.front());
   without_images_.pop_front();
   keyframe.features = std::move(features);
-  if (describer_) keyframe.image = describer_->describe(located.frame->left);
   keyframes_.publish(std::move(keyframe));
 }
 

@@ -10,7 +10,6 @@
 #include "modules/core/covariance.hpp"
 #include "modules/core/odometry.hpp"
 #include "modules/loop_closure/keyframe_features.hpp"
-#include "modules/place_recognition/image_describer.hpp"
 #include "runtime/node.hpp"
 #include "runtime/topic.hpp"
 #include "runtime/worker.hpp"
@@ -24,16 +23,14 @@ struct KeyframeFeaturesTopics {
   Out<Keyframe> keyframes;
 };
 
-/// Adds to the keyframes of odometry their features, the descriptor of their image, and the
-/// covariance accumulated along the chain.
+/// Adds to the keyframes of odometry their features and the covariance accumulated along the
+/// chain.
 class KeyframeFeaturesNode final : public Node {
  public:
-  /// Without `describer` images have no descriptor, and without `keypoint_describer` keypoints only
-  /// that of ORB. Throws ConfigError if `config` is out of
-  /// bounds, std::invalid_argument if the rig cannot be rectified.
+  /// Without `keypoint_describer` keypoints have only the descriptor of ORB. Throws ConfigError if
+  /// `config` is out of bounds, std::invalid_argument if the rig cannot be rectified.
   KeyframeFeaturesNode(const KeyframeFeaturesConfig& config, const StereoRig& rig,
                        const KeyframeFeaturesTopics& topics,
-                       std::optional<ImageDescriber> describer = {},
                        std::optional<KeypointDescriber> keypoint_describer = {});
 
   /// Continues after the keyframe `last` of an earlier process. The odometry of keyframes up to
@@ -57,7 +54,6 @@ class KeyframeFeaturesNode final : public Node {
 
   const Camera camera_;  // left
   KeyframeFeatureExtractor extractor_;
-  std::optional<ImageDescriber> describer_;
   const Out<Keyframe> keyframes_;
   std::deque<Keyframe> without_images_;
   UncertainPose chain_;  // from the first keyframe's odometry frame to the latest keyframe

@@ -80,10 +80,7 @@ void LoopClosureNode::evict_before(KeyframeIndex newest) {
 }
 
 void LoopClosureNode::step(const std::shared_ptr<const LoopCandidate>& candidate) {
-  accept({{candidate->match, candidate->query},
-          candidate->similarity,
-          candidate->support,
-          candidate->by_image});
+  accept({{candidate->match, candidate->query}, candidate->similarity, candidate->support});
 }
 
 void LoopClosureNode::step(const std::shared_ptr<const RelativePose>& measured_closure) {
@@ -256,8 +253,7 @@ bool LoopClosureNode::advance(const Work& work) {
 void LoopClosureNode::request_keyframe(const KeyframeId& missing, const Work& work) {
   const bool under_way = waiting_.contains(missing);
   if (!under_way && !work.measured) {
-    const auto decision =
-        policy_.decide({work.id.to, work.id.from, work.similarity, work.support, work.by_image});
+    const auto decision = policy_.decide({work.id.to, work.id.from, work.similarity, work.support});
     if (decision != RequestPolicy::Decision::kRequest)
       return report(work, ClosureStage::kCandidate, to_string(decision));
   }

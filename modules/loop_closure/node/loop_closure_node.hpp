@@ -120,7 +120,6 @@ class LoopClosureNode final : public Node {
     ClosureId id;
     double similarity = 0.0;
     int support = 1;                            ///< LoopCandidate::support.
-    bool by_image = false;                      ///< LoopCandidate::by_image.
     std::optional<RelativePose> measured = {};  ///< Measured closure; empty for a candidate.
     bool requested = false;                     ///< The keyframe of the peer has been requested.
   };

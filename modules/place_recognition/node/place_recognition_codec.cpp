@@ -25,9 +25,6 @@ Codec<KeyframeBow>::Encoded Codec<KeyframeBow>::encode(const KeyframeBow& messag
   wire.vocabulary = message.vocabulary;
   borrow(wire.bag, encoded.bag);
   wire.normalizer = static_cast<float>(message.normalizer);
-  wire.network = message.image.network;
-  encoded.image.assign(message.image.values.begin(), message.image.values.end());
-  borrow(wire.image, encoded.image);
   return encoded;
 }
 
@@ -40,16 +37,11 @@ Decoded<KeyframeBow> Codec<KeyframeBow>::decode(const Wire& wire, const TeamPeer
   if (!words) return Decoded<KeyframeBow>::refuse("the words cannot be decoded");
   if (!(wire.normalizer >= 0.0F && wire.normalizer <= kMaxScore))
     return Decoded<KeyframeBow>::refuse("the normaliser is no score");
-  const auto image = elements_of(wire.image, kMaxImageDescriptorBytes);
-  if (!image) return Decoded<KeyframeBow>::refuse("the image's descriptor is missing or too long");
-  if ((wire.network == 0) != image->empty())
-    return Decoded<KeyframeBow>::refuse("the image's descriptor has no network or no values");
   return Decoded<KeyframeBow>::accept({.id = {wire.keyframe.robot, wire.keyframe.index},
                                        .stamp = wire.stamp,
                                        .vocabulary = wire.vocabulary,
                                        .words = *std::move(words),
-                                       .normalizer = double{wire.normalizer},
-                                       .image = {wire.network, {image->begin(), image->end()}}});
+                                       .normalizer = double{wire.normalizer}});
 }
 
 }  // namespace km

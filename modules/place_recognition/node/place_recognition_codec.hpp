@@ -14,13 +14,13 @@ template <>
 struct Codec<KeyframeBow> {
   using Wire = km_wire_BagOfWords;
   static constexpr const char* kTopic = "bags_of_words";
-  static constexpr std::uint16_t kVersion = 3;
+  static constexpr std::uint16_t kVersion = 1;
   static constexpr std::size_t kMaxBytes = 1U << 18U;
   static const dds_topic_descriptor_t& descriptor() { return km_wire_BagOfWords_desc; }
 
   struct Encoded {
     Wire wire{};
-    std::vector<std::uint8_t> bag, image;
+    std::vector<std::uint8_t> bag;
   };
   static MessageKey key_of(const KeyframeBow& message);
   static Encoded encode(const KeyframeBow& message);

@@ -75,17 +75,15 @@ void PlaceRecognitionNode::step(const Keyframe& keyframe) {
   const UncertainPose chain{keyframe.odometry.T_odom_kf, keyframe.odometry.covariance};
   if (const auto before = std::exchange(chain_, chain); before && breaks_odometry(*before, chain))
     own_.mark_odometry_break();
-  CandidateSearch search = own_.search_own(vector, keyframe.stamp, keyframe.image);
+  CandidateSearch search = own_.search_own(vector, keyframe.stamp);
   const PlaceNovelty novelty = novelty_of(keyframe.odometry, search);
   if (novelty != PlaceNovelty::kNew) keep_due(novelty, search.candidates);
   KeyframeBow bow{.id = id, .stamp = keyframe.stamp, .vocabulary = vocabulary_->id(), .words = {}};
   if (novelty == PlaceNovelty::kNew && own_.is_view(vector)) {
     bow.words = std::move(words);
     bow.normalizer = search.normalizer;
-    bow.image = keyframe.image;
     // Added before it is published, so that no pair is missed: see the class comment.
-    own_.add(std::move(vector), keyframe.stamp, keyframe.image);
-    if (keyframe.image.network != 0) network_ = keyframe.image.network;
+    own_.add(std::move(vector), keyframe.stamp);
     own_ids_.push_back(id);
     known_.add_view(keyframe.odometry, median_depth_m(keyframe.features).value_or(0.0));
   } else {
@@ -113,13 +111,7 @@ void PlaceRecognitionNode::step(const KeyframeBow& peer_bow) {
   if (!searched_[id.robot].insert(id.index).second)
     return publish_refusal(id, PlaceQueryStatus::kRepeated);
   if (peer_bow.words.empty()) return publish(id, {});
-  const std::uint64_t network = peer_bow.image.network;
-  if (network != 0 && network_ != 0 && network != network_)
-    log::limited(log::Level::kWarn, name(), "network of " + std::to_string(id.robot))
-        << "robot " << id.robot << " describes images by another network ("
-        << fingerprint_text(network) << ", here " << fingerprint_text(network_)
-        << "): only words are compared; set one place_recognition.network";
-  publish(id, own_.search(vocabulary_->weigh(peer_bow.words), peer_bow.normalizer, peer_bow.image));
+  publish(id, own_.search(vocabulary_->weigh(peer_bow.words), peer_bow.normalizer));
 }
 
 BagOfWords PlaceRecognitionNode::words_of(const KeyframeFeatures& features) const {
@@ -142,8 +134,7 @@ void PlaceRecognitionNode::publish(const KeyframeId& query, CandidateSearch sear
     topics_.candidates.publish(LoopCandidate{.query = query,
                                              .match = own_ids_[found.index],
                                              .similarity = found.similarity,
-                                             .support = found.support,
-                                             .by_image = found.by_image});
+                                             .support = found.support});
   topics_.queries.publish(PlaceQuery{query, PlaceQueryStatus::kSearched, std::move(search)});
 }
 

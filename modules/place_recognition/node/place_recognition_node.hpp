@@ -30,8 +30,8 @@ struct PlaceRecognitionTopics {
   In<Closure> closures;       ///< Verified closures of this robot; only those between own keyframes
                               ///< are used.
   In<PeerEvent> peer_events;  ///< Only kRestarted is used: the peer's indices begin again at 0.
-  Out<KeyframeBow> own_bows;  ///< Words and image descriptor of every own keyframe, for the peers;
-                              ///< none if it is no view or shows a known place.
+  Out<KeyframeBow> own_bows;  ///< Words of every own keyframe, for the peers; none if it is no view
+                              ///< or shows a known place.
   Out<LoopCandidate> candidates;
   Out<PeerEvent> restarts;  ///< kRestarted, after the last candidate with a keyframe from before
                             ///< the restart.
@@ -97,7 +97,6 @@ class PlaceRecognitionNode final : public Node {
   KnownPlaces known_;
   std::optional<UncertainPose> chain_;  // odometry of the newest own keyframe
   std::vector<KeyframeId> own_ids_;     // ids of the keyframes in own_, in the same order
-  std::uint64_t network_ = 0;           // network of the newest own descriptor
   std::map<RobotId, std::set<KeyframeIndex>> searched_;  // keyframes of peers
   Worker<Input> worker_;                                 // last member: stops first
 };

@@ -63,7 +63,6 @@ Keyframe features(KeyframeIndex index, std::mt19937& rng) {
     if (keyframe.features.network != 0)
       keyframe.features.matched.emplace_back().fill(static_cast<std::uint8_t>(rng()));
   }
-  keyframe.image = {.network = 7, .values = {-128, -1, 0, 127}};
   return keyframe;
 }
 

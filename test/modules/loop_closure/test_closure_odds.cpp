@@ -25,9 +25,6 @@ TEST_CASE("Similarity and support make a closure more probable", "[closure_odds]
   CHECK(odds.probability(found_with(1.0, 1)) == Approx(logistic(12.8 - 14.0)));
   CHECK(odds.probability(found_with(1.0, 4)) == Approx(logistic(16.1 - 14.0)));
   CHECK(odds.probability(found_with(1.0, 9)) == odds.probability(found_with(1.0, 5)));
-  LoopCandidate by_image = found_with(0.4, 2);
-  by_image.by_image = true;
-  CHECK(odds.probability(by_image) == Approx(odds.probability(found_with(0.7, 2))));
 }
 
 TEST_CASE("The difficulty of an environment is learned from results", "[closure_odds]") {

@@ -109,27 +109,5 @@ TEST_CASE("keyframes out of order, and images that do not fit the rig, are misus
   CHECK_THROWS_AS(chain.node.step(empty), std::invalid_argument);
 }
 
-TEST_CASE("a keyframe has the descriptor of its image if there is a network",
-          "[keyframe_features_node]") {
-  const TemporaryFolder folder;
-  PointwiseNetwork copying{.channels = 1, .height = 8, .width = 16};
-  copying.weights = {{1.0F}};
-  copying.biases = {0.0F};
-  const auto file = folder.write("net.onnx", copying.onnx());
-  Topic<KeyframeOdometry> odometry;
-  Topic<LocatedFrame> frames;
-  Topic<Keyframe> keyframes;
-  std::vector<Keyframe> published;
-  keyframes.subscribe([&](const auto& message) { published.push_back(*message); });
-  KeyframeFeaturesNode node({}, small_rig(),
-                            {.odometry = odometry, .frames = frames, .keyframes = keyframes},
-                            ImageDescriber(file));
-  node.step(KeyframeOdometry{.id = {4, 0}, .stamp = 10});
-  node.step(tiled(10));
-  REQUIRE(published.size() == 1);
-  CHECK(published[0].image == ImageDescriber(file).describe(tiled(10).frame->left));
-  CHECK(published[0].image.values.size() == 128);
-}
-
 }  // namespace
 }  // namespace km

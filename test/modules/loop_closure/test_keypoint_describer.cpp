@@ -94,7 +94,7 @@ TEST_CASE("The shipped network gives the numbers of its training", "[keypoint_de
   const auto found = KeypointDescriber("config/networks/keypoints.onnx")
                          .describe(image, std::vector{cv::KeyPoint(120, 120, 31, 0, 1, 0)});
   REQUIRE(found.size() == 1);
-  // As apps/lab/places/train_keypoints.py prints them, without the smoothing of the image.
+  // As computed by torch after the training, without the smoothing of the image.
   const std::vector<int> expected = {0,  -5, 2, 7, 4,  1,  1,  -2, 2,  4,  -1, -1,
                                      -4, 0,  1, 1, -4, -6, -5, 3,  -2, -2, 2,  1};
   const auto numbers = numbers_of(found[0]);

@@ -1,8 +1,6 @@
 #include <catch2/catch.hpp>
-#include <random>
 
 #include "modules/place_recognition/bow_database.hpp"
-#include "modules/place_recognition/descriptor_database.hpp"
 #include "modules/place_recognition/vocabulary.hpp"
 #include "modules/place_recognition/vocabulary_training.hpp"
 #include "test/modules/place_recognition/synthetic_orb.hpp"
@@ -54,21 +52,6 @@ TEST_CASE("Bag of words, k = 10, L = 5", "[place_recognition][!benchmark]") {
     for (std::size_t i = 0; i < 5000; ++i) half.add(vectors[i]);
     meter.measure(
         [&](int i) { return half.add(vectors[5000 + static_cast<std::size_t>(i) % 5000]); });
-  };
-}
-
-TEST_CASE("Descriptors of images, 128 bytes", "[descriptors][!benchmark]") {
-  std::mt19937 rng(1);
-  const auto descriptor = [&] {
-    ImageDescriptor result{1, {}};
-    for (int i = 0; i < 128; ++i) result.values.push_back(static_cast<std::int8_t>(rng()));
-    return result;
-  };
-  DescriptorDatabase database;
-  for (int i = 0; i < 10000; ++i) database.add(descriptor());
-  const ImageDescriptor query = descriptor();
-  BENCHMARK("search among 10000 images") {
-    return database.search(query, 0.8, 10000);
   };
 }
 

@@ -281,48 +281,6 @@ TEST_CASE("Keyframes that cannot be compared are reported and change nothing",
   CHECK(robot.queries.received.empty());
 }
 
-// Unit vectors of a network of four numbers.
-ImageDescriptor seen(std::size_t direction, std::uint64_t network = 9) {
-  ImageDescriptor image{network, {0, 0, 0, 0}};
-  image.values[direction] = 100;
-  return image;
-}
-
-TEST_CASE("The image's descriptor finds places that words do not, and none of another network",
-          "[place_recognition][node]") {
-  const std::uint64_t network = GENERATE(9, 10);
-  Robot robot(kSelf, {.max_candidates = 2});
-  const std::vector<std::uint32_t> directions = {1, 2, 1, 0, 1};
-  for (std::uint32_t i = 0; i < directions.size(); ++i) {
-    Keyframe own = keyframe({kSelf, i}, {10 * i + 1, 10 * i + 2});
-    own.image = seen(directions[i]);
-    robot.node.step(own);
-    CHECK(robot.own_bows.received[i].image == own.image);
-  }
-  KeyframeBow query = bow({kPeer, 2}, {31, 32});
-  query.image = seen(1, network);
-  robot.node.step(query);
-  std::vector<KeyframeIndex> found;
-  for (const LoopCandidate& candidate : robot.candidates.received)
-    if (candidate.query == query.id) found.push_back(candidate.match.index);
-  // Words first, then the earliest of equal images, up to max_candidates.
-  CHECK(found == (network == 9 ? std::vector<KeyframeIndex>{3, 0} : std::vector<KeyframeIndex>{3}));
-}
-
-TEST_CASE("Keyframe 0 of a peer, which words cannot compare, is found by its image",
-          "[place_recognition][node]") {
-  Robot robot(kSelf);
-  Keyframe own = keyframe({kSelf, 0}, {1, 2});
-  own.image = seen(3);
-  robot.node.step(own);
-  KeyframeBow query = bow({kPeer, 0}, {5, 6}, 0.0);
-  query.image = seen(3);
-  robot.node.step(query);
-  REQUIRE(robot.candidates.received.size() == 1);
-  CHECK(robot.candidates.received[0].similarity == Approx(1.0));
-  CHECK(robot.candidates.received[0].by_image);
-}
-
 // Tests the claim of the class comment: the pair is found in either order of the messages.
 TEST_CASE("No pair of keyframes of two robots is missed in any order of delivery",
           "[place_recognition][node]") {
@@ -464,8 +422,7 @@ TEST_CASE("A keyframe's words survive the wire", "[place_recognition]") {
                             .stamp = 1403636584763555584,
                             .vocabulary = 0xFEDCBA9876543210ULL,
                             .words = {{3, 1}, {900, 4}},
-                            .normalizer = 0.25,
-                            .image = {.network = 12, .values = {-128, -1, 0, 1, 127}}};
+                            .normalizer = 0.25};
   auto encoded = encoded_by(700, message);
   const auto moved = std::move(encoded);  // the wire type points into its owner
   const auto result = decoded(moved);
@@ -475,7 +432,6 @@ TEST_CASE("A keyframe's words survive the wire", "[place_recognition]") {
   CHECK(result.value->vocabulary == message.vocabulary);
   CHECK(result.value->words == message.words);
   CHECK(result.value->normalizer == message.normalizer);
-  CHECK(result.value->image == message.image);
 }
 
 TEST_CASE("A normaliser that is no score is refused with the reason", "[place_recognition]") {
@@ -486,25 +442,6 @@ TEST_CASE("A normaliser that is no score is refused with the reason", "[place_re
       make, {{"negative", kReason, [](Message& m) { m.wire.normalizer = -0.1F; }},
              {"above one", kReason, [](Message& m) { m.wire.normalizer = 1.1F; }},
              {"not a number", kReason, [](Message& m) { m.wire.normalizer = NAN; }}});
-}
-
-TEST_CASE("A hostile descriptor of an image is refused with the reason", "[place_recognition]") {
-  using Message = Arrived<KeyframeBow>;
-  const auto make = [] {
-    return encoded_by<KeyframeBow>(
-        7, {.id = {7, 1}, .words = {{3, 1}}, .image = {12, std::vector<std::int8_t>(128, 1)}});
-  };
-  constexpr const char* kSize = "the image's descriptor is missing or too long";
-  constexpr const char* kHalf = "the image's descriptor has no network or no values";
-  check_refusals<KeyframeBow>(
-      make, {{"too long", kSize,
-              [](Message& m) {
-                m.image.assign(kMaxImageDescriptorBytes + 1, 0);
-                borrow(m.wire.image, m.image);
-              }},
-             {"no buffer", kSize, [](Message& m) { m.wire.image._buffer = nullptr; }},
-             {"no network", kHalf, [](Message& m) { m.wire.network = 0; }},
-             {"no values", kHalf, [](Message& m) { m.wire.image._length = 0; }}});
 }
 
 TEST_CASE("A message that contradicts itself is refused with the reason", "[place_recognition]") {

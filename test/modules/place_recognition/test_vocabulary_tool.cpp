@@ -1,14 +1,8 @@
 #include <catch2/catch.hpp>
-#include <cstdint>
 #include <filesystem>
-#include <opencv2/imgproc.hpp>
 #include <string>
 
-#include "modules/images/keypoint_patches.hpp"
-#include "modules/images/spread_keypoints.hpp"
-#include "modules/loop_closure/keyframe_features_config.hpp"
 #include "test/support/command.hpp"
-#include "test/support/image_file.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/temporary_folder.hpp"
 
@@ -50,51 +44,6 @@ TEST_CASE("The tool trains on real images and distinguishes the two places",
   // 0, 1 and 2, 3 are pairs of one place each.
   CHECK(score_of(0, 1) > score_of(0, 2));
   CHECK(score_of(2, 3) > score_of(1, 3));
-}
-
-// A grey image with corners everywhere.
-cv::Mat blocks(int width, int height, std::uint64_t seed) {
-  cv::Mat small(height / 10, width / 10, CV_8U), image;
-  cv::RNG random(seed);
-  random.fill(small, cv::RNG::UNIFORM, 0, 256);
-  cv::resize(small, image, {width, height}, 0.0, 0.0, cv::INTER_NEAREST);
-  return image;
-}
-
-// NumPy's format: 6 bytes of magic, 2 of the version, 2 of the header's length, then the records.
-TEST_CASE("The tool writes the patches that a robot describes", "[place_recognition]") {
-  const TemporaryFolder folder;
-  const cv::Mat flat(240, 320, CV_8U, cv::Scalar(90)), textured = blocks(320, 240, 3);
-  write_png(folder.path() / "a.png", flat);
-  write_png(folder.path() / "b.png", textured);
-  const CommandResult run = run_tool("patches " + folder.path().string() + " --features 50 -o " +
-                                     (folder.path() / "p.npy").string());
-  INFO(run.output);
-  REQUIRE(run.exit_code == 0);
-  const SpreadKeypoints keypoints =
-      spread_keypoints(textured, 50, KeyframeFeaturesConfig().min_contrast);
-  REQUIRE(keypoints.corners.size() > 20);
-  const std::string count = std::to_string(keypoints.corners.size());
-  CHECK_THAT(run.output, Contains(count + " patches of 2 images"));
-
-  const std::string bytes = folder.read("p.npy");
-  const std::size_t begin = 10 + static_cast<std::uint8_t>(bytes[8]) +
-                            256U * static_cast<std::size_t>(static_cast<std::uint8_t>(bytes[9]));
-  CHECK(bytes.substr(0, 8) == std::string("\x93NUMPY\x01\x00", 8));
-  CHECK(begin % 64 == 0);
-  CHECK_THAT(bytes.substr(0, begin), Contains("'shape': (" + count + ",)"));
-  const cv::Mat patches = keypoint_patches(textured, keypoints.corners);
-  std::string expected;
-  for (std::size_t i = 0; i < keypoints.corners.size(); ++i) {
-    const cv::KeyPoint& corner = keypoints.corners[i];
-    const std::uint32_t image = 1, octave = static_cast<std::uint32_t>(corner.octave);
-    const auto append = [&](const auto& value) {
-      expected.append(reinterpret_cast<const char*>(&value), sizeof value);
-    };
-    append(image), append(corner.pt), append(octave), append(keypoints.descriptors[i]);
-    expected.append(patches.ptr<char>(static_cast<int>(i)), kPatchSide * kPatchSide);
-  }
-  CHECK(bytes.substr(begin) == expected);
 }
 
 TEST_CASE("The tool names unusable input and fails", "[place_recognition]") {
