@@ -234,13 +234,4 @@ std::vector<std::size_t> greedy_extension(const BitGraph& graph, std::vector<std
   return clique;
 }
 
-std::vector<std::size_t> greedy_clique(const BitGraph& graph) {
-  std::vector<std::size_t> best;
-  for (std::size_t v = 0; v < graph.size(); ++v) {
-    std::vector<std::size_t> clique = greedy_extension(graph, {v}, best.size());
-    if (!clique.empty()) best = std::move(clique);
-  }
-  return best;
-}
-
 }  // namespace km

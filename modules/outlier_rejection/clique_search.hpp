@@ -37,21 +37,14 @@ struct [[nodiscard]] CliqueSearch {
 CliqueSearch find_clique(const BitGraph& graph, std::span<const std::size_t> candidates,
                          const CliqueGoal& goal);
 
-// The heuristic of Pattabiraman et al., "Fast Algorithms for the Maximum Clique Problem on Massive
-// Graphs with Applications to Overlapping Community Detection", Internet Mathematics 2015. The
-// heuristic repeatedly adds the vertex of greatest degree among those adjacent to the whole clique,
-// without backtracking; of equal degrees, the vertex with the lowest number. Vertices whose degree
-// is too small for a clique of more than `more_than` vertices are excluded. The result need not be
-// a maximum. O(vertices^2 / 64) per start.
-
-/// Extends `clique` by this heuristic; ascending. Empty unless the result has more than `more_than`
-/// vertices. Precondition: `clique` is a clique with at least one vertex.
+/// Extends `clique` by the heuristic of Pattabiraman et al. (Internet Mathematics 2015); ascending.
+/// Empty unless the result has more than `more_than` vertices. The heuristic repeatedly adds the
+/// vertex of greatest degree among those adjacent to the whole clique, without backtracking; of
+/// equal degrees, the vertex with the lowest number. Vertices whose degree is too small for a
+/// clique of more than `more_than` vertices are excluded. The result need not be a maximum.
+/// O(vertices^2 / 64). Precondition: `clique` is a clique with at least one vertex.
 [[nodiscard]] std::vector<std::size_t> greedy_extension(const BitGraph& graph,
                                                         std::vector<std::size_t> clique,
                                                         std::size_t more_than);
-
-/// The largest result of this heuristic from any single vertex; of equally large ones, the result
-/// from the lowest vertex.
-[[nodiscard]] std::vector<std::size_t> greedy_clique(const BitGraph& graph);
 
 }  // namespace km

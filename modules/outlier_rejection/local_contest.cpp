@@ -7,7 +7,6 @@ namespace km {
 namespace {
 
 PcmConfig tolerant(PcmConfig config) {
-  config.criterion = CycleCriterion::kMahalanobis;
   constexpr double kLargest = 1000.0;  // bound of both scales
   for (double* scale : {&config.odometry_noise_scale, &config.closure_noise_scale})
     *scale = std::min(kLargest, LocalContest::kNoise * *scale);

@@ -36,18 +36,11 @@ bool MaxClique::add(std::span<const std::size_t> neighbours) {
   for (const std::size_t u : neighbours) graph_.connect(u, v);
   const std::size_t before = clique_.size();
   const std::size_t most = std::min(bound_, neighbours.size()) + 1;  // bound of any clique with v
-  if (method_ == CliqueMethod::kExact) {
-    if (neighbours.size() >= before) search_exactly(v, neighbours, most);
-  } else {
-    adopt(method_ == CliqueMethod::kBatch ? greedy_clique(graph_)
-                                          : greedy_extension(graph_, {v}, before));
-    bound_ = std::max(bound_, most);
-  }
+  if (neighbours.size() >= before) search(v, neighbours, most);
   return clique_.size() > before;
 }
 
-void MaxClique::search_exactly(std::size_t v, std::span<const std::size_t> neighbours,
-                               std::size_t most) {
+void MaxClique::search(std::size_t v, std::span<const std::size_t> neighbours, std::size_t most) {
   std::vector<std::size_t> known;
   for (const std::size_t u : clique_)
     if (graph_.adjacent(u, v)) known.push_back(u);

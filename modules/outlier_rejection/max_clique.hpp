@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "modules/outlier_rejection/bit_graph.hpp"
-#include "modules/outlier_rejection/clique_method.hpp"
 
 namespace km {
 
@@ -18,19 +17,21 @@ namespace km {
 /// search stops when a proven maximum has grown by one. The older of equally large cliques is kept.
 /// Deterministic. Not thread-safe. Copyable.
 ///
-/// The exact method first runs the greedy heuristic, which is cheap: from the new vertex with its
+/// The search first runs the greedy heuristic, which is cheap: from the new vertex with its
 /// neighbours in the known clique, and from the vertex alone. The search tree then finds a larger
 /// clique or proves that there is none. If max_search_nodes ends the search, the larger of both
 /// cliques counts, and bound() is an upper bound on the maximum.
 class MaxClique {
  public:
-  /// `max_search_nodes` bounds the search tree of one add() of the exact method.
-  explicit MaxClique(std::uint64_t max_search_nodes, CliqueMethod method = CliqueMethod::kExact)
-      : max_search_nodes_(max_search_nodes), method_(method) {}
+  /// Bounds an addition to some ten milliseconds (README, Limits).
+  static constexpr std::uint64_t kMaxSearchNodes = 10000;
+
+  /// `max_search_nodes` bounds the search tree of one add().
+  explicit MaxClique(std::uint64_t max_search_nodes) : max_search_nodes_(max_search_nodes) {}
 
   /// Adds vertex number size(), with edges to the `neighbours`, distinct and below size().
   /// Returns true if the clique grew. Throws std::invalid_argument for other neighbours; the state
-  /// is then unchanged. With every method the clique never shrinks.
+  /// is then unchanged. The clique never shrinks.
   bool add(std::span<const std::size_t> neighbours);
 
   [[nodiscard]] std::size_t size() const { return graph_.size(); }
@@ -38,7 +39,7 @@ class MaxClique {
   /// The largest clique found, ascending. Valid until the next add().
   [[nodiscard]] std::span<const std::size_t> clique() const { return clique_; }
 
-  /// No clique of the graph is larger than this. Heuristic methods compute it from degrees alone.
+  /// No clique of the graph is larger than this.
   [[nodiscard]] std::size_t bound() const { return bound_; }
 
   /// True if clique() is a proven maximum. False after max_search_nodes has ended a search, until a
@@ -53,12 +54,11 @@ class MaxClique {
  private:
   // Searches for a larger clique with the new vertex v. `most`: upper bound on the size of such a
   // clique.
-  void search_exactly(std::size_t v, std::span<const std::size_t> neighbours, std::size_t most);
+  void search(std::size_t v, std::span<const std::size_t> neighbours, std::size_t most);
   void search_tree(std::size_t v, std::span<const std::size_t> neighbours, std::size_t most);
   void adopt(std::vector<std::size_t> clique);
 
   std::uint64_t max_search_nodes_;
-  CliqueMethod method_;
   BitGraph graph_;
   std::vector<std::size_t> clique_;
   std::size_t bound_ = 0;

@@ -1,7 +1,6 @@
 #include "modules/outlier_rejection/pair_cycle.hpp"
 
 #include <Eigen/Cholesky>
-#include <cstdlib>
 
 #include "modules/core/lie.hpp"
 
@@ -17,17 +16,12 @@ BlockCovariance added(const KeyframeId& i, const BlockCovariance& at_i, const Ke
   return i.index < k.index ? at_k - at_i : at_i - at_k;
 }
 
-std::int64_t steps(const KeyframeId& i, const KeyframeId& k) {
-  return std::abs(std::int64_t{i.index} - std::int64_t{k.index});
-}
-
 }  // namespace
 
 PreparedClosure::PreparedClosure(const OrientedClosure& closure)
     : id(closure.id),
       a(closure.a.id),
       b(closure.b.id),
-      t_odoma_a(closure.a.T_odom_kf.translation()),
       T_odoma_odomb(closure.a.T_odom_kf * closure.T_a_b.T * closure.b.T_odom_kf.inverse()),
       odometry_a(transported(closure.a.T_odom_kf, BlockCovariance(closure.a.covariance))),
       odometry_b(transported(closure.b.T_odom_kf, BlockCovariance(closure.b.covariance))),
@@ -35,46 +29,33 @@ PreparedClosure::PreparedClosure(const OrientedClosure& closure)
           closure.a.T_odom_kf * closure.T_a_b.T,
           BlockCovariance(closure.T_a_b.Sigma + kLeastClosureVariance * Matrix6::Identity()))) {}
 
-PairCycle::PairCycle(const PreparedClosure& i, const PreparedClosure& k)
-    : i_(i), k_(k), T_(i.T_odoma_odomb * k.T_odoma_odomb.inverse()) {}
-
-bool PairCycle::within_distance(double max_distance_squared) const {
-  const Eigen::Matrix3d R = T_.linear(), R_k = k_.T_odoma_odomb.linear();
-  const BlockCovariance along_a = added(i_.a, i_.odometry_a, k_.a, k_.odometry_a);
-  const BlockCovariance along_b = added(i_.b, i_.odometry_b, k_.b, k_.odometry_b);
+bool closes_within(const PreparedClosure& i, const PreparedClosure& k,
+                   double max_distance_squared) {
+  const SE3 T = i.T_odoma_odomb * k.T_odoma_odomb.inverse();
+  const Eigen::Matrix3d R = T.linear(), R_k = k.T_odoma_odomb.linear();
+  const BlockCovariance along_a = added(i.a, i.odometry_a, k.a, k.odometry_a);
+  const BlockCovariance along_b = added(i.b, i.odometry_b, k.b, k.odometry_b);
 
   // The distance of the rotation alone is at most that of the cycle, and rejects most outliers.
   const Eigen::Vector3d phi = so3_log(R);
-  const Eigen::Matrix3d rr = R.transpose() * i_.measured.rr * R +
-                             R_k * along_b.rr * R_k.transpose() + k_.measured.rr + along_a.rr;
+  const Eigen::Matrix3d rr = R.transpose() * i.measured.rr * R +
+                             R_k * along_b.rr * R_k.transpose() + k.measured.rr + along_a.rr;
   const Eigen::LLT<Eigen::Matrix3d> L_rr(rr);
   if (L_rr.info() != Eigen::Success) return false;
   const Eigen::Vector3d y_r = L_rr.matrixL().solve(phi);
   if (!(y_r.squaredNorm() <= max_distance_squared)) return false;
 
-  BlockCovariance Sigma = transported(T_.inverse(), i_.measured);
-  Sigma += transported(k_.T_odoma_odomb, along_b);
-  Sigma += k_.measured;
+  BlockCovariance Sigma = transported(T.inverse(), i.measured);
+  Sigma += transported(k.T_odoma_odomb, along_b);
+  Sigma += k.measured;
   Sigma += along_a;
-  const Eigen::Vector3d rho = so3_right_jacobian_inverse(-phi) * T_.translation();
+  const Eigen::Vector3d rho = so3_right_jacobian_inverse(-phi) * T.translation();
   // Cholesky factorisation of Sigma by blocks.
   const Eigen::Matrix3d W = L_rr.matrixL().solve(Sigma.rt);
   const Eigen::LLT<Eigen::Matrix3d> L_tt(Sigma.tt - W.transpose() * W);
   if (L_tt.info() != Eigen::Success) return false;
   const Eigen::Vector3d y_t = L_tt.matrixL().solve(rho - W.transpose() * y_r);
   return y_r.squaredNorm() + y_t.squaredNorm() <= max_distance_squared;
-}
-
-double PairCycle::translation_m() const {
-  return (T_ * i_.t_odoma_a - i_.t_odoma_a).norm();
-}
-
-double PairCycle::rotation_rad() const {
-  return angle_of(T_.linear());
-}
-
-std::int64_t PairCycle::transforms() const {
-  return 2 + steps(i_.a, k_.a) + steps(i_.b, k_.b);
 }
 
 }  // namespace km

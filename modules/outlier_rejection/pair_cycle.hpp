@@ -77,34 +77,17 @@ struct PreparedClosure {
 
   ClosureId id;
   KeyframeId a, b;
-  Eigen::Vector3d t_odoma_a;
   SE3 T_odoma_odomb;           ///< Transform between the odometry frames, by this closure.
   BlockCovariance odometry_a;  ///< Covariance accumulated at a, expressed in odom_a.
   BlockCovariance odometry_b;  ///< Covariance accumulated at b, expressed in odom_b.
   BlockCovariance measured;    ///< Covariance of the closure, at b, expressed in odom_a.
 };
 
-/// The cycle through two closures between the same robots: from keyframe a_i along closure i, the
-/// odometry of b, closure k reversed and the odometry of a. The cycle is expressed in odom_a.
-class PairCycle {
- public:
-  /// Both closures must outlive this.
-  PairCycle(const PreparedClosure& i, const PreparedClosure& k);
-
-  /// True if the squared Mahalanobis distance between the cycle and the identity is at most
-  /// `max_distance_squared`.
-  [[nodiscard]] bool within_distance(double max_distance_squared) const;
-
-  [[nodiscard]] double translation_m() const;  ///< Distance by which the cycle moves keyframe a_i.
-  [[nodiscard]] double rotation_rad() const;
-  [[nodiscard]] std::int64_t transforms() const;  ///< Number of odometry steps and closures.
-
- private:
-  [[nodiscard]] BlockCovariance covariance() const;
-
-  const PreparedClosure& i_;
-  const PreparedClosure& k_;
-  SE3 T_;
-};
+/// True if the squared Mahalanobis distance between the identity and the cycle through two closures
+/// between the same robots is at most `max_distance_squared`. The cycle leads from keyframe a_i
+/// along closure i, the odometry of b, closure k reversed and the odometry of a. It is expressed in
+/// odom_a.
+[[nodiscard]] bool closes_within(const PreparedClosure& i, const PreparedClosure& k,
+                                 double max_distance_squared);
 
 }  // namespace km

@@ -37,7 +37,7 @@ Pcm::Pcm(RobotId a, RobotId b, const PcmConfig& config)
       b_(std::max(a, b)),
       config_(checked(config)),
       test_(config),
-      clique_(static_cast<std::uint64_t>(config.max_search_nodes), config.search) {}
+      clique_(MaxClique::kMaxSearchNodes) {}
 
 PcmAddResult Pcm::add(const Closure& closure) {
   check_usable(closure, a_, b_);
@@ -45,10 +45,7 @@ PcmAddResult Pcm::add(const Closure& closure) {
   if (known_.size() >= kMaxClosures) return PcmAddResult::kFull;
   known_.insert(closure.id());
 
-  const OrientedClosure oriented = test_.orient(closure);
-  if (config_.odometry_gate && a_ == b_ && !test_.agrees_with_odometry(oriented))
-    return PcmAddResult::kAgainstOdometry;
-  PreparedClosure added(oriented);
+  PreparedClosure added(test_.orient(closure));
   const std::vector<std::size_t> consistent = test_.consistent_with(added, closures_);
   closures_.push_back(std::move(added));
   return clique_.add(consistent) ? PcmAddResult::kGrew : PcmAddResult::kAdded;

@@ -13,11 +13,10 @@ namespace km {
 
 /// Result for a closure given to Pcm.
 enum class PcmAddResult {
-  kRepeated,         ///< Ignored: another measurement of this pair of keyframes came before.
-  kAgainstOdometry,  ///< Refused: the closure contradicts odometry (PcmConfig::odometry_gate).
-  kFull,             ///< Refused: Pcm::kMaxClosures are known.
-  kAdded,            ///< Stored; the consistent set is as large as before.
-  kGrew,             ///< Stored; the consistent set is larger than before.
+  kRepeated,  ///< Ignored: another measurement of this pair of keyframes came before.
+  kFull,      ///< Refused: Pcm::kMaxClosures are known.
+  kAdded,     ///< Stored; the consistent set is as large as before.
+  kGrew,      ///< Stored; the consistent set is larger than before.
 };
 
 /// True if the closure has two distinct ends, finite poses with rotations orthonormal to 1e-6, and
@@ -63,7 +62,7 @@ class Pcm {
   PcmConfig config_;
   CycleTest test_;
   std::vector<PreparedClosure> closures_;
-  std::set<ClosureId> known_;  // stored closures, and those refused by the odometry gate
+  std::set<ClosureId> known_;  // stored closures
   MaxClique clique_;
 };
 

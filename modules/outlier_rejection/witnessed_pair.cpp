@@ -24,7 +24,7 @@ WitnessedPair::WitnessedPair(RobotId a, RobotId b, const PcmConfig& config)
       config_(checked(config)),
       test_(config),
       contest_(config),
-      clique_(static_cast<std::uint64_t>(config.max_search_nodes)) {}
+      clique_(MaxClique::kMaxSearchNodes) {}
 
 PcmAddResult WitnessedPair::add(const Closure& closure) {
   check_usable(closure, a_, b_);
@@ -35,14 +35,11 @@ PcmAddResult WitnessedPair::add(const Closure& closure) {
     thin();
   }
   known_.insert(id);
-  const OrientedClosure oriented = test_.orient(closure);
-  if (config_.odometry_gate && a_ == b_ && !test_.agrees_with_odometry(oriented))
-    return PcmAddResult::kAgainstOdometry;
   added_.insert(id);
   contest_.add(closure);
   has_unstated_ |= closure.inliers == 0;
   const std::size_t before = witnesses();
-  if (!is_witnessed()) test(oriented);
+  if (!is_witnessed()) test(test_.orient(closure));
   return witnesses() > before ? PcmAddResult::kGrew : PcmAddResult::kAdded;
 }
 

@@ -54,7 +54,7 @@ class WitnessedPair {
   RobotId a_, b_;
   PcmConfig config_;
   CycleTest test_;
-  std::set<ClosureId> known_;  // added closures, and those refused by the odometry gate
+  std::set<ClosureId> known_;  // added closures
   std::set<ClosureId> added_;
   bool has_unstated_ = false;  // true if an added closure does not state its inliers
   LocalContest contest_;       // among added closures

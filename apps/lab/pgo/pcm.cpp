@@ -32,7 +32,7 @@ before.
 
 Searches:
   exact        the proven maximum after every addition: branch and bound among the new
-               vertex's neighbours, bounded by pcm.max_search_nodes of the robots
+               vertex's neighbours, within a bound
   incremental  greedy from the new vertex only (the heuristic of Kimera-Multi)
   batch        greedy from every vertex, from scratch at every addition
 
@@ -50,7 +50,6 @@ struct PcmCommand {
   ReportFiles files;
   std::vector<std::string> searches{"exact"};
   ClosureChoice selection;
-  PcmConfig config{.odometry_gate = true};
 };
 
 void define_closures(CLI::App& app, ClosureChoice& selection) {
@@ -79,11 +78,9 @@ std::vector<PcmRun> run_file(const PcmCommand& command) {
   std::cout << closures.size() << " closures, " << outliers << " of them false\n"
             << indefinite_text(indefinite);
   std::vector<PcmRun> runs;
-  PcmConfig config = command.config;
   for (const std::string& search : command.searches) {
-    config.search = kSearches.at(search);
     StageProgress progress;
-    runs.push_back(run_pcm(closures, config, [&](std::size_t done) {
+    runs.push_back(run_pcm(closures, kSearches.at(search), [&](std::size_t done) {
       progress(search + " search",
                static_cast<double>(done) / static_cast<double>(closures.size()));
     }));

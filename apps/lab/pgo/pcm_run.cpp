@@ -5,7 +5,9 @@
 #include <random>
 #include <span>
 #include <stdexcept>
+#include <variant>
 
+#include "apps/lab/pgo/greedy_clique.hpp"
 #include "apps/lab/pgo/solvers.hpp"
 #include "modules/outlier_rejection/cycle_test.hpp"
 #include "modules/outlier_rejection/max_clique.hpp"
@@ -20,39 +22,65 @@ namespace {
 // The clique search of one run and the record of its additions.
 class RecordedSearch {
  public:
-  explicit RecordedSearch(const PcmConfig& config)
-      : clique_(static_cast<std::uint64_t>(config.max_search_nodes), config.search) {
-    run.search = to_string(config.search);
+  explicit RecordedSearch(CliqueMethod method) : clique_(search_by(method)) {
+    run.search = to_string(method);
   }
 
   PcmAddition& add(const std::vector<std::size_t>& neighbours, double check_s) {
     const double begin_s = thread_cpu_s();
-    clique_.add(neighbours);
-    const double search_s = thread_cpu_s() - begin_s;
     run.edges += neighbours.size();
-    run.search_nodes = clique_.search_nodes();
-    run.searches_ended = clique_.searches_ended();
-    return run.additions.emplace_back(PcmAddition{.vertices = clique_.size(),
-                                                  .check_s = check_s,
-                                                  .search_s = search_s,
-                                                  .clique = clique_.clique().size(),
-                                                  .bound = clique_.bound()});
+    return std::visit(
+        [&](auto& clique) -> PcmAddition& {
+          clique.add(neighbours);
+          const double search_s = thread_cpu_s() - begin_s;
+          return run.additions.emplace_back(PcmAddition{.vertices = clique.size(),
+                                                        .check_s = check_s,
+                                                        .search_s = search_s,
+                                                        .clique = clique.clique().size(),
+                                                        .bound = clique.bound()});
+        },
+        clique_);
   }
 
-  [[nodiscard]] std::span<const std::size_t> clique() const { return clique_.clique(); }
+  [[nodiscard]] std::span<const std::size_t> clique() const {
+    return std::visit([](const auto& clique) { return clique.clique(); }, clique_);
+  }
+
+  [[nodiscard]] PcmRun take() {
+    if (const auto* exact = std::get_if<MaxClique>(&clique_)) {
+      run.search_nodes = exact->search_nodes();
+      run.searches_ended = exact->searches_ended();
+    }
+    return std::move(run);
+  }
 
   PcmRun run;
 
  private:
-  MaxClique clique_;
+  using Clique = std::variant<MaxClique, GreedyClique>;
+
+  static Clique search_by(CliqueMethod method) {
+    using enum GreedyClique::Starts;
+    if (method == CliqueMethod::kExact) return MaxClique(MaxClique::kMaxSearchNodes);
+    return GreedyClique(method == CliqueMethod::kBatch ? kAllVertices : kNewVertex);
+  }
+
+  Clique clique_;
 };
+
+// True if the closure agrees with the odometry between its ends: the cycle through it and through
+// the keyframe `a` itself is consistent.
+bool agrees_with_odometry(const CycleTest& test, const OrientedClosure& closure) {
+  const OrientedClosure itself{{closure.a.id, closure.a.id}, closure.a, closure.a, {}};
+  return test.consistent(PreparedClosure(closure), PreparedClosure(itself));
+}
 
 }  // namespace
 
-PcmRun run_pcm(const std::vector<LabelledClosure>& closures, const PcmConfig& config,
+PcmRun run_pcm(const std::vector<LabelledClosure>& closures, CliqueMethod method,
                const PcmProgress& progress) {
-  const CycleTest test(config);
-  RecordedSearch additions(config);
+  const CycleTest test(PcmConfig{});
+  RecordedSearch additions(method);
   std::vector<PreparedClosure> vertices;
   std::vector<bool> is_true;
   for (std::size_t n = 0; n < closures.size(); ++n) {
@@ -63,7 +91,7 @@ PcmRun run_pcm(const std::vector<LabelledClosure>& closures, const PcmConfig& co
                                   to_string(closure.to.id) + " cannot be weighed");
     const double begin_s = thread_cpu_s();
     const OrientedClosure oriented = test.orient(closure);
-    if (config.odometry_gate && !test.agrees_with_odometry(oriented)) {
+    if (!agrees_with_odometry(test, oriented)) {
       ++(outlier ? additions.run.dropped_false : additions.run.dropped_true);
       continue;
     }
@@ -78,7 +106,7 @@ PcmRun run_pcm(const std::vector<LabelledClosure>& closures, const PcmConfig& co
     addition.true_vertices =
         static_cast<std::size_t>(std::count(is_true.begin(), is_true.end(), true));
   }
-  return std::move(additions.run);
+  return additions.take();
 }
 
 std::string to_string(CliqueMethod method) {

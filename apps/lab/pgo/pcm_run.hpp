@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "modules/core/pose_graph.hpp"
-#include "modules/outlier_rejection/pcm_config.hpp"
 
 namespace km {
 
@@ -32,18 +31,27 @@ struct PcmAddition {
 struct PcmRun {
   std::string search;  ///< "exact", "incremental" or "batch".
   std::vector<PcmAddition> additions;
-  std::size_t dropped_true = 0, dropped_false = 0;  ///< Closures that the odometry gate dropped.
+  std::size_t dropped_true = 0, dropped_false = 0;  ///< Closures that contradict odometry.
   std::size_t edges = 0;                            ///< Edges of the consistency graph.
   std::uint64_t search_nodes = 0;
-  std::size_t searches_ended = 0;  ///< Searches that reached PcmConfig::max_search_nodes.
+  std::size_t searches_ended = 0;  ///< Searches that reached MaxClique::kMaxSearchNodes.
+};
+
+/// Method by which a larger clique is searched after a vertex was added.
+enum class CliqueMethod {
+  kExact,        ///< MaxClique.
+  kIncremental,  ///< GreedyClique from the new vertex.
+  kBatch,        ///< GreedyClique from every vertex.
 };
 
 /// Called before every addition with the number of closures handled so far.
 using PcmProgress = std::function<void(std::size_t)>;
 
-/// Adds the closures one at a time, as Pcm does. All are inside one robot. Throws
-/// std::invalid_argument for a closure that is not is_usable().
-[[nodiscard]] PcmRun run_pcm(const std::vector<LabelledClosure>& closures, const PcmConfig& config,
+/// Adds the closures one at a time, as Pcm does. All are inside one robot; those that contradict
+/// the odometry between their ends are dropped. Throws std::invalid_argument for a closure that is
+/// not is_usable().
+[[nodiscard]] PcmRun run_pcm(const std::vector<LabelledClosure>& closures,
+                             CliqueMethod method = CliqueMethod::kExact,
                              const PcmProgress& progress = {});
 
 /// "exact", "incremental" or "batch".

@@ -1,16 +1,17 @@
 #include "modules/outlier_rejection/node/pcm_node.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <string>
 #include <utility>
 
-#include "runtime/clock.hpp"
 #include "runtime/log.hpp"
 
 namespace km {
 namespace {
 
 constexpr std::size_t kQueue = 256;
+constexpr std::chrono::milliseconds kPublishPeriod(500);  // of changed sets
 
 std::string text_of(RobotId a, RobotId b) {
   return "robots " + std::to_string(a) + ' ' + std::to_string(b) + ": ";
@@ -26,7 +27,7 @@ PcmNode::PcmNode(const PcmConfig& config, RobotId self, const PcmTopics& topics,
       inlier_sets_(topics.inlier_sets),
       worker_(
           kQueue, Overflow::kBlock, [this](const Input& input) { handle(input); },
-          PcmConfig::kSection, steady_duration(config.publish_period_s), [] { return Tick(); }) {
+          PcmConfig::kSection, kPublishPeriod, [] { return Tick(); }) {
   topics.closures.subscribe([this](const auto& message) { worker_.post(message); });
   topics.keyframes.subscribe([this](const auto& message) { worker_.post(message); });
   topics.restarts.subscribe([this](const auto& message) { worker_.post(message); });
@@ -78,7 +79,10 @@ void PcmNode::step(const Closure& closure) {
       std::visit([&](auto& set) { return set.add(closure); }, pair.closures);
   const bool takes_all = config_.selection == ClosureSelection::kWitness;
   pair.changed |= result == PcmAddResult::kGrew || (takes_all && result == PcmAddResult::kAdded);
-  report(closure, result, pair);
+  const std::string robots = text_of(self_, std::max(from, to));
+  if (result == PcmAddResult::kFull)
+    log::limited(log::Level::kWarn, name(), "full " + robots)
+        << robots << Pcm::kMaxClosures << " closures are stored, more are refused";
 }
 
 PcmNode::Pair& PcmNode::pair_with(RobotId other) {
@@ -88,22 +92,6 @@ PcmNode::Pair& PcmNode::pair_with(RobotId other) {
   if (config_.selection == ClosureSelection::kPcm)
     pair.closures.emplace<Pcm>(self_, other, config_);
   return pairs_.emplace(other, std::move(pair)).first->second;
-}
-
-void PcmNode::report(const Closure& closure, PcmAddResult result, const Pair& pair) const {
-  const std::string robots = text_of(self_, std::max(closure.from.id.robot, closure.to.id.robot));
-  if (result == PcmAddResult::kFull)
-    log::limited(log::Level::kWarn, name(), "full " + robots)
-        << robots << Pcm::kMaxClosures << " closures are stored, more are refused";
-  if (result == PcmAddResult::kAgainstOdometry)
-    log::debug(name()) << robots << to_string(closure.from.id) << " -> " << to_string(closure.to.id)
-                       << " disagrees with odometry";
-  const auto* pcm = std::get_if<Pcm>(&pair.closures);
-  if (pcm == nullptr || config_.search != CliqueMethod::kExact || pcm->clique().proven()) return;
-  log::limited(log::Level::kInfo, name(), "unproven " + robots)
-      << robots << pcm->clique().clique().size() << " closures agree, up to "
-      << pcm->clique().bound()
-      << " may: a search ended at pcm.max_search_nodes and fell back to the heuristic";
 }
 
 void PcmNode::publish_changes() {

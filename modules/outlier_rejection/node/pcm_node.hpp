@@ -88,7 +88,6 @@ class PcmNode final : public Node {
   Pair& pair_with(RobotId other);
   [[nodiscard]] std::vector<ClosureId> selected(RobotId other, Pair& pair) const;
   [[nodiscard]] bool is_joined(RobotId other, Pair& pair) const;
-  void report(const Closure& closure, PcmAddResult result, const Pair& pair) const;
 
   const PcmConfig config_;
   const RobotId self_;

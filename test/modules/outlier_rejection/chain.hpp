@@ -1,12 +1,13 @@
 #pragma once
 
+#include <Eigen/Cholesky>
 #include <random>
 #include <vector>
 
 #include "modules/core/covariance.hpp"
 #include "modules/core/lie.hpp"
 #include "modules/core/pose_graph.hpp"
-#include "modules/outlier_rejection/pcm_config.hpp"
+#include "modules/outlier_rejection/pair_cycle.hpp"
 #include "test/support/random_pose.hpp"
 
 namespace km {
@@ -43,14 +44,22 @@ inline Closure closure(const OdometryPose& from, const OdometryPose& to, const S
   return {from, to, T_from_to, variance * Matrix6::Identity(), 0, 0.8};
 }
 
-/// Closed cycles may have this error per transform, independent of the covariances.
-inline PcmConfig bounds_per_transform(double translation_m, double rotation_rad) {
-  PcmConfig config;
-  config.criterion = CycleCriterion::kBounds;
-  config.bounds_per_transform = true;
-  config.max_cycle_translation_m = translation_m;
-  config.max_cycle_rotation_rad = rotation_rad;
-  return config;
+/// The cycle through two closures between the same robots, from keyframe a_i to a_i, composed
+/// transform by transform: what closes_within() computes faster.
+inline UncertainPose cycle_through(const OrientedClosure& i, const OrientedClosure& k) {
+  const auto along_odometry = [](const OdometryPose& from, const OdometryPose& to) {
+    const UncertainPose T_from{from.T_odom_kf, from.covariance}, T_to{to.T_odom_kf, to.covariance};
+    return from.id.index <= to.id.index ? between_on_chain(T_from, T_to)
+                                        : inverse(between_on_chain(T_to, T_from));
+  };
+  const UncertainPose T_ai_bk = compose(i.T_a_b, along_odometry(i.b, k.b));
+  return compose(compose(T_ai_bk, inverse(k.T_a_b)), along_odometry(k.a, i.a));
+}
+
+/// Squared Mahalanobis distance of the identity from T.
+inline double distance_squared(const UncertainPose& T) {
+  const Vector6 xi = se3_log(T.T);
+  return xi.dot(T.Sigma.ldlt().solve(xi));
 }
 
 /// The same measurement given from the other side.

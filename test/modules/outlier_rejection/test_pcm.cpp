@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <set>
 
 #include "modules/outlier_rejection/pcm.hpp"
@@ -11,53 +10,6 @@
 
 namespace km {
 namespace {
-
-// Two quarter turns, then four steps straight on.
-Chain hook() {
-  Chain chain(0);
-  for (int i = 0; i < 2; ++i) chain.step(rotz(std::numbers::pi / 2, 1.0));
-  for (int i = 0; i < 4; ++i) chain.step(rotz(0.0, 1.0));
-  return chain;
-}
-
-PcmConfig per_transform(double translation_m, double rotation_rad) {
-  PcmConfig config = bounds_per_transform(translation_m, rotation_rad);
-  config.min_inliers = 1;
-  return config;
-}
-
-std::vector<std::uint32_t> later_ends(const Pcm& pcm) {
-  std::vector<std::uint32_t> indices;
-  for (const ClosureId& id : pcm.inliers()) indices.push_back(id.to.index);
-  return indices;
-}
-
-TEST_CASE("Pairwise bounds on translation keep the older of two equal sets", "[pcm]") {
-  const Chain chain = hook();
-  Pcm pcm(0, 0, per_transform(0.05, std::numbers::pi));
-  const auto add = [&](std::size_t from, double x, double y) {
-    return pcm.add(closure(chain.at(from), chain.at(0), rotz(std::numbers::pi, x, y)));
-  };
-  CHECK(add(3, 0.0, 0.9) == PcmAddResult::kGrew);
-  CHECK(add(4, -0.9, 0.9) == PcmAddResult::kGrew);
-  CHECK(add(5, -1.9, 0.8) == PcmAddResult::kGrew);
-  // 0.256 / 5 = 0.0512 against closure 3: inconsistent, so {4, 5, 6} only ties with {3, 4, 5}.
-  CHECK(add(6, -2.8, 0.74) == PcmAddResult::kAdded);
-  CHECK(later_ends(pcm) == std::vector<std::uint32_t>{3, 4, 5});
-}
-
-TEST_CASE("Pairwise bounds on rotation keep the older of two equal sets", "[pcm]") {
-  const Chain chain = hook();
-  Pcm pcm(0, 0, per_transform(1000.0, 0.005));
-  const auto add = [&](std::size_t from, double angle, double x) {
-    return pcm.add(closure(chain.at(from), chain.at(0), rotz(angle, x, 1.0)));
-  };
-  CHECK(add(3, std::numbers::pi, 0.0) == PcmAddResult::kGrew);
-  CHECK(add(4, 3.141, -1.0) == PcmAddResult::kGrew);
-  CHECK(add(5, 3.13, -2.0) == PcmAddResult::kGrew);
-  CHECK(add(6, 3.12, -3.0) == PcmAddResult::kAdded);  // 0.021 / 4 = 0.00525 against closure 4
-  CHECK(later_ends(pcm) == std::vector<std::uint32_t>{3, 4, 5});
-}
 
 // Half true closures with honest covariances, half random poses.
 std::vector<Closure> mixed_closures(const TwoRobots& robots, std::size_t count, std::mt19937& rng) {
@@ -155,21 +107,6 @@ TEST_CASE("Fewer closures than min_inliers are not published", "[pcm]") {
     CHECK(pcm.add(robots.measure(n, n + 1, 0.001, rng)) == PcmAddResult::kGrew);
   }
   CHECK(pcm.inliers().size() == 3);
-}
-
-TEST_CASE("The odometry gate is for closures inside one robot, when asked for", "[pcm]") {
-  const Chain chain = hook();
-  PcmConfig config;
-  config.min_inliers = 1;
-  const Closure wrong = closure(chain.at(3), chain.at(0), rotz(std::numbers::pi, 5.0, 5.0));
-  CHECK(Pcm(0, 0, config).add(wrong) == PcmAddResult::kGrew);
-  config.odometry_gate = true;
-  Pcm gated(0, 0, config);
-  CHECK(gated.add(wrong) == PcmAddResult::kAgainstOdometry);
-  CHECK(gated.add(wrong) == PcmAddResult::kRepeated);
-  CHECK(gated.add(closure(chain.at(4), chain.at(0), rotz(std::numbers::pi, -1.0, 1.0))) ==
-        PcmAddResult::kGrew);
-  CHECK(gated.size() == 1);
 }
 
 TEST_CASE("PCM refuses closures it cannot weigh and keeps its state", "[pcm]") {

@@ -121,25 +121,6 @@ TEST_CASE("The PCM node survives closures that cannot be weighed", "[node]") {
   CHECK(team.sets.messages()[0].closures.size() == 3);
 }
 
-TEST_CASE("The PCM node says that a search was cut short, and how much may be missing", "[node]") {
-  Team team;
-  PcmConfig config = bounds_per_transform(0.5, 3.1);
-  config.bounds_per_transform = false;
-  config.max_search_nodes = 1;
-  config.selection = ClosureSelection::kPcm;
-  PcmNode node(config, 0, team.topics());
-  const CapturedLog log;
-  const Chain a(0), b(1);  // closures agree where their translations differ by half a metre
-  for (std::uint32_t n = 0; n < 300; ++n) {
-    OdometryPose from = a.at(0);
-    from.id.index = n;
-    const SE3 T_a_b = make_pose(Eigen::Matrix3d::Identity(), 0.25 * random_vector<3>(team.rng));
-    node.step(closure(from, b.at(0), T_a_b));
-  }
-  CHECK_THAT(log.text(),
-             Catch::Contains("robots 0 1: ") && Catch::Contains("ended at pcm.max_search_nodes"));
-}
-
 TEST_CASE("The PCM node's thread handles what was published before it stops", "[node]") {
   Team team;
   PcmNode node(tolerant(), 0, team.topics());
