@@ -28,10 +28,10 @@ void check(const AbsoluteFixesConfig& config) {
   require(config.min_sigma_m <= config.max_sigma_m, ".min_sigma_m is above max_sigma_m");
 }
 
-// Standard deviation from three variances; nullopt if they state none.
+// Standard deviation from three variances; nullopt if they state none (0 or negative).
 std::optional<double> sigma_of(double x, double y, double z) {
   const double mean = (x + y + z) / 3.0;
-  return mean > 0.0 ? std::optional(std::sqrt(mean)) : std::nullopt;
+  return mean <= 0.0 ? std::nullopt : std::optional(std::sqrt(mean));  // NaN stays NaN
 }
 
 std::optional<double> sigma_of(const RosNavSatFix& fix) {
@@ -111,7 +111,7 @@ std::optional<TimedPosition> FixReader::accept(const ReceivedFix& fix) {
   if (!coordinates.allFinite() || !std::isfinite(claimed_m)) return refuse(counts_.not_finite);
   if (is_gnss && !(std::abs(coordinates.x()) <= 90.0 && std::abs(coordinates.y()) <= 360.0))
     return refuse(counts_.malformed);
-  if (claimed_m > config_.max_sigma_m) return refuse(counts_.too_uncertain);
+  if (!(claimed_m <= config_.max_sigma_m)) return refuse(counts_.too_uncertain);
   if (last_ && stamp <= *last_) return refuse(counts_.out_of_order);
   last_ = stamp;
   TimedPosition accepted{stamp, coordinates, std::max(claimed_m, config_.min_sigma_m)};

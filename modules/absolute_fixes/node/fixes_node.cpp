@@ -12,13 +12,12 @@ constexpr std::size_t kQueue = 4096;  // minutes of images
 FixesNode::FixesNode(FixInput input, const FixesTopics& topics)
     : reader_(std::move(input.reader)),
       association_(Eigen::Vector3d(reader_.config().lever_arm_m.data()),
-                   reader_.config().used_correlation_s()),
+                   reader_.config().used_correlation_s(), input.recorded),
       live_(std::move(input.live)),
       topics_(topics),
       worker_(
           kQueue, Overflow::kBlock, [this](const Input& received) { step(received); },
           AbsoluteFixesConfig::kSection) {
-  for (const TimedPosition& fix : input.recorded) association_.add(fix);
   const auto post = [this](const auto& message) { worker_.post(message); };
   topics_.states.subscribe(post);
   topics_.restored_states.subscribe(post);

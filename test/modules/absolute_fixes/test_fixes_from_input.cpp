@@ -69,6 +69,9 @@ TEST_CASE("unusable fixes are counted by reason", "[absolute_fixes]") {
   bad.altitude = std::numeric_limits<double>::quiet_NaN();
   CHECK_FALSE(read(reader, bad));
   bad = nav_sat_fix(200);
+  bad.position_covariance[4] = std::numeric_limits<double>::quiet_NaN();
+  CHECK_FALSE(read(reader, bad));
+  bad = nav_sat_fix(200);
   bad.position_covariance[8] = 1e6;
   CHECK_FALSE(read(reader, bad));
   CHECK_FALSE(read(reader, nav_sat_fix(100)));
@@ -79,9 +82,9 @@ TEST_CASE("unusable fixes are counted by reason", "[absolute_fixes]") {
   REQUIRE(usual);
   CHECK(usual->sigma_m == 3.0);
   const FixCounts& counts = reader.counts();
-  CHECK(counts.received == 7);
+  CHECK(counts.received == 8);
   CHECK(counts.without_position == 1);
-  CHECK(counts.not_finite == 1);
+  CHECK(counts.not_finite == 2);
   CHECK(counts.too_uncertain == 1);
   CHECK(counts.out_of_order == 1);
   CHECK(counts.malformed == 1);
@@ -239,6 +242,54 @@ TEST_CASE("a fix between images measures the nearest keyframe", "[absolute_fixes
     CHECK((fix.p_kf - antenna).norm() < 2.0 * 0.065);
   }
   CHECK(association.unused() > 2 * taken.size());
+}
+
+TEST_CASE("a robot that rests for an hour stores a minute", "[absolute_fixes]") {
+  constexpr Stamp kSecond_ns = 1'000'000'000, kHour_ns = 3600 * kSecond_ns;
+  FixAssociation association(Eigen::Vector3d::Zero());
+  KeyframeOdometry keyframe;
+  const bool has_keyframe = GENERATE(true, false);  // before the rest
+  keyframe.stamp = 2 * kSecond_ns;
+  keyframe.id = {3, 1};
+  if (has_keyframe) association.add(keyframe);
+  std::size_t most = 0;
+  for (Stamp t = 0; t < kHour_ns; t += kSecond_ns / 20) {
+    OdometryState state;
+    state.stamp = t;
+    association.add(state);
+    if (t % (kSecond_ns / 5) == 0)
+      association.add(TimedPosition{t + 7, {seconds_between(0, t), 0.0, 0.0}, 0.1});
+    REQUIRE(association.take(5).empty());
+    most = std::max(most, association.stored());
+  }
+  CHECK(most <= 61 * (20 + 5));
+  keyframe.stamp = kHour_ns - kSecond_ns / 20;
+  keyframe.id.index = 2;
+  association.add(keyframe);
+  KeyframeOdometry next = keyframe;
+  next.id.index = 3;
+  next.stamp = kHour_ns + kSecond_ns;
+  association.add(next);
+  std::vector<PositionFix> taken;
+  for (Stamp t = kHour_ns; t <= kHour_ns + 5 * kSecond_ns; t += kSecond_ns / 20) {
+    OdometryState state;
+    state.stamp = t;
+    association.add(state);
+    for (const PositionFix& fix : association.take(5)) taken.push_back(fix);
+  }
+  // Each keyframe has the nearest fix.
+  REQUIRE(taken.size() == (has_keyframe ? 2 : 1));
+  if (has_keyframe) CHECK(taken[0].p_datum.x() == Approx(2.0));
+  CHECK(taken.back().keyframe.index == 2);
+  CHECK(taken.back().p_datum.x() == Approx(3599.8));
+}
+
+TEST_CASE("fixes without odometry are stored in a bounded number", "[absolute_fixes]") {
+  FixAssociation association(Eigen::Vector3d::Zero());
+  for (std::size_t i = 0; i < FixAssociation::kMaxAhead + 10; ++i)
+    association.add(TimedPosition{static_cast<Stamp>(i), Eigen::Vector3d::Zero(), 0.1});
+  CHECK(association.stored() == FixAssociation::kMaxAhead);
+  CHECK(association.unused() == 10);
 }
 
 }  // namespace
