@@ -25,6 +25,7 @@ constexpr double kUniqueness = 1.15;
 constexpr int kNeighbour = 2;               // largest distance of a neighbour [px]
 constexpr int kMaxLeftRightDifference = 1;  // between the two directions of search [px]
 constexpr double kMaxRefinement_px = 1.5;   // largest change of the disparity by the refinement
+constexpr double kLeastCorrelation = 0.8;   // zero-normalised, of left and right patch
 constexpr double kMaxRowOffset_px = 1.5;    // remaining violation of the epipolar constraint after
                                             // calibration
 
@@ -183,9 +184,9 @@ float EpipolarMatcher::disparity(const Rectified& images, const Eigen::Vector2d&
   if (!reference.textured) return 0.0F;
   const Eigen::Vector2d start(pixel.x() - *shift, pixel.y());
   const std::optional<Refined> refined = refine(reference, images.right, start);
-  if (!refined || refined->correlation < config_.min_stereo_correlation) return 0.0F;
+  if (!refined || !(refined->correlation >= kLeastCorrelation)) return 0.0F;
   const Eigen::Vector2d moved = refined->position - start;
-  if (std::abs(moved.x()) > kMaxRefinement_px || std::abs(moved.y()) > kMaxRowOffset_px)
+  if (!(std::abs(moved.x()) <= kMaxRefinement_px && std::abs(moved.y()) <= kMaxRowOffset_px))
     return 0.0F;
   return static_cast<float>(pixel.x() - refined->position.x());
 }

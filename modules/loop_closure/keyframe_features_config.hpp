@@ -14,7 +14,6 @@ struct KeyframeFeaturesConfig {
   int min_contrast = 7;
   double min_depth_m = 0.4;
   double max_depth_m = 40.0;
-  double min_stereo_correlation = 0.8;
   std::string network = "networks/keypoints.onnx";
 
   void visit_fields(auto& visitor) {
@@ -27,8 +26,6 @@ struct KeyframeFeaturesConfig {
         "min_depth_m", min_depth_m, {0.05, 10.0},
         "[m] smallest depth that is used, along the optical axis, from stereo or a depth image");
     visitor.field("max_depth_m", max_depth_m, {1.0, 1000.0}, "[m] largest depth that is used");
-    visitor.field("min_stereo_correlation", min_stereo_correlation, {0.0, 0.99},
-                  "least zero-normalised cross-correlation of left and right patch");
     visitor.field(
         "network", network,
         "ONNX file of a network that describes keypoints, by which keyframes of two robots are "

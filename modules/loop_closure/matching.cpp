@@ -126,8 +126,9 @@ class KeypointGrid {
 
   /// Calls visit(i) for every keypoint in the cell of `pixel` and the eight cells around it.
   void near(const Eigen::Vector2d& pixel, auto&& visit) const {
-    if (!((pixel - low_).minCoeff() >= -cell_)) return;
-    if (pixel.x() > low_.x() + (columns_ + 1) * cell_ || pixel.y() > low_.y() + (rows_ + 1) * cell_)
+    const Eigen::Vector2d cells = (pixel - low_) / cell_;
+    if (!(cells.x() >= -1.0 && cells.x() <= columns_ + 1 && cells.y() >= -1.0 &&
+          cells.y() <= rows_ + 1))
       return;
     const Eigen::Vector2i centre = cell_of(pixel);
     for (int y = std::max(centre.y() - 1, 0); y <= std::min(centre.y() + 1, rows_ - 1); ++y)
@@ -186,10 +187,10 @@ std::optional<Nearest> best_near(const Projection& projection, const Prepared& q
   const double disparity_scale = features.focal_px * features.baseline_m;
   std::vector<Nearest> near;
   grid.near(projection.pixel, [&](std::uint32_t i) {
-    if ((grid.pixel(i) - projection.pixel).norm() > rules.radius_px) return;
+    if (!((grid.pixel(i) - projection.pixel).norm() <= rules.radius_px)) return;
     const Keypoint& keypoint = features.keypoints[i];
     const double off = static_cast<double>(keypoint.inverse_depth) - projection.inverse_depth;
-    if (keypoint.has_depth() && std::abs(off) * disparity_scale > rules.radius_px) return;
+    if (keypoint.has_depth() && !(std::abs(off) * disparity_scale <= rules.radius_px)) return;
     near.push_back({i, distance_of(query, descriptors[i])});
   });
   const auto best = std::min_element(near.begin(), near.end(), [](const auto& l, const auto& r) {

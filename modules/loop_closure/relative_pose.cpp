@@ -107,7 +107,7 @@ bool is_outlier_along_an_axis(const SE3& T_b_a, const ImagePoint& a, const Image
     g += axis < 2 ? dh_dm(axis) : Eigen::RowVector3d::UnitZ();
     const double variance = s * s * g.cwiseAbs2().dot(a.variance.transpose()) + b.variance[axis];
     const double r = at[axis] - b.m[axis];
-    if (r * r > quantile(dim) * variance) return true;
+    if (!(r * r <= quantile(dim) * variance)) return true;
   }
   return false;
 }
@@ -316,9 +316,48 @@ Matrix6 information_without_strongest(const PoseFit& fit, std::span<const ImageP
   return left;
 }
 
-RansacResult<SE3> ransac_pose(std::span<const ImagePair> pairs, const RansacOptions& options,
-                              std::mt19937& rng) {
-  return ransac<SE3>(ThreePointProblem(pairs), options, rng);
+RansacResult ransac_pose(std::span<const ImagePair> pairs, const RansacOptions& options,
+                         std::mt19937& rng) {
+  const ThreePointProblem problem(pairs);
+  RansacResult best;
+  const std::size_t n = problem.size();
+  const std::size_t drawable = problem.drawable();
+  if (drawable < ThreePointProblem::kSampleSize) return best;
+
+  const auto consider = [&](const SE3& T_a_b) {
+    double cost = 0.0;
+    std::vector<std::size_t> inliers;
+    for (std::size_t i = 0; i < n && cost < best.cost; ++i) {
+      const double error = problem.error(T_a_b, i);
+      if (error <= 1.0) inliers.push_back(i);
+      cost += std::min(error, 1.0);
+    }
+    if (!(cost < best.cost)) return false;
+    best.T_a_b = T_a_b;
+    best.cost = cost;
+    best.inliers = std::move(inliers);
+    return true;
+  };
+
+  std::uniform_int_distribution<std::size_t> draw(0, drawable - 1);
+  double needed = options.max_iterations;
+  for (; best.iterations < needed; ++best.iterations) {
+    std::array<std::size_t, ThreePointProblem::kSampleSize> sample;
+    for (std::size_t k = 0; k < sample.size();) {
+      sample[k] = draw(rng);
+      if (std::find(sample.begin(), sample.begin() + k, sample[k]) == sample.begin() + k) ++k;
+    }
+    const std::optional<SE3> T_a_b = problem.solve(sample);
+    if (!T_a_b || !consider(*T_a_b)) continue;
+    const std::optional<SE3> polished = problem.polish(*best.T_a_b, best.inliers);
+    if (polished) consider(*polished);
+    const double share = static_cast<double>(best.inliers.size()) / static_cast<double>(n);
+    const double clean = std::pow(share, static_cast<double>(sample.size()));
+    const double adapted =
+        std::log1p(-options.confidence) / std::log1p(-std::min(clean, 1 - 1e-12));
+    if (clean > 0.0) needed = std::min(needed, std::ceil(adapted));
+  }
+  return best;
 }
 
 }  // namespace km

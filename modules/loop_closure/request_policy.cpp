@@ -52,7 +52,7 @@ RequestPolicy::Decision RequestPolicy::decide(const LoopCandidate& candidate) {
   const double probability = peer.odds.probability(candidate);
   const double enough =
       (peer.successes < kJoined ? kShareBeforeJoining : 1.0) * config_.min_closure_probability;
-  if (probability < enough) {
+  if (!(probability >= enough)) {
     // A query counts once, with its most probable candidate.
     if (peer.last_query != query) peer.last_share = 0.0;
     peer.last_query = query;

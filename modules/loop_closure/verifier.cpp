@@ -15,23 +15,26 @@
 namespace km {
 namespace {
 
-constexpr double kRansacConfidence = 0.999;
 constexpr int kRefineIterations = 5;
+
+// Errors that do not average out over points (calibration, shutter), added to every covariance
+// [rad, m per axis].
+constexpr double kSystematicRotation_rad = 0.003, kSystematicTranslation_m = 0.008;
 
 // Radii of the successive guided matchings [px].
 constexpr double kGuidedRadii_px[] = {8.0, 5.6, 3.9};
-constexpr double kGuidedRatio = 0.9;
 
 // Share of the inliers, those that determine the pose most, without which the pose is tested.
 constexpr double kStrongestShare = 0.15;
 
 // Ratio of the variance of the pose to that under independent errors of the points. Errors of
 // neighbouring points are correlated. With this ratio the 95 % region contains 95 % of the errors
-// of EuRoC V1_01 and 99 % of MH_01 (bench_loop_closure). With 4 it contains 94 and 99 %.
+// of EuRoC V1_01 and 99 % of MH_01. With 4 it contains 94 and 99 %.
 constexpr double kCommonErrors = 6.0;
 
 std::vector<ImagePair> pairs_of(const std::vector<Match>& matches, const KeyframeFeatures& from,
-                                const KeyframeFeatures& to, const ImageNoise& noise) {
+                                const KeyframeFeatures& to) {
+  const ImageNoise noise;
   std::vector<ImagePair> pairs;
   pairs.reserve(matches.size());
   for (const Match& match : matches) {
@@ -56,8 +59,7 @@ struct Support {
 };
 
 std::optional<Support> gather_support(const PoseFit& start, const KeyframeFeatures& from,
-                                      const KeyframeFeatures& to, const ImageNoise& noise,
-                                      double max_distance) {
+                                      const KeyframeFeatures& to) {
   Support support{start, {}, {}};
   const auto refine = [&] {
     support.inliers = inliers_of(support.fit.T_a_b, support.pairs);
@@ -67,8 +69,8 @@ std::optional<Support> gather_support(const PoseFit& start, const KeyframeFeatur
     return fit.has_value();
   };
   for (const double radius_px : kGuidedRadii_px) {
-    const GuidedMatchRules rules{radius_px, kGuidedRatio, max_distance};
-    support.pairs = pairs_of(match_guided(support.fit.T_a_b, from, to, rules), from, to, noise);
+    support.pairs =
+        pairs_of(match_guided(support.fit.T_a_b, from, to, {.radius_px = radius_px}), from, to);
     if (!refine()) return std::nullopt;
   }
   if (!refine()) return std::nullopt;
@@ -99,8 +101,8 @@ const char* to_string(VerificationStatus status) {
       "matches do not agree on a pose",
       "matches leave the pose undetermined",
       "too few inliers",
-      "pose hangs on a few inliers: without them its sigma exceeds max_position_sigma_m, "
-      "max_rotation_sigma_rad or, inside a robot, max_own_rotation_sigma_rad"};
+      "the pose depends on a few inliers: without them its standard deviation exceeds "
+      "max_position_sigma_m or max_rotation_sigma_rad, or the smaller bound inside a robot"};
   return kWords[static_cast<std::size_t>(status)];
 }
 
@@ -112,32 +114,28 @@ Verification Verifier::verify(const KeyframeFeatures& from, const KeyframeFeatur
     result.status = status;
     return result;
   };
-  const ImageNoise noise{config_.keypoint_noise_px, config_.disparity_noise_px};
-  const MatchRules rules{config_.max_match_ratio, static_cast<double>(config_.max_match_distance)};
-  const std::vector<ImagePair> pairs =
-      pairs_of(match_descriptors(from, to, rules), from, to, noise);
+  const std::vector<ImagePair> pairs = pairs_of(match_descriptors(from, to, {}), from, to);
   result.matches = static_cast<int>(pairs.size());
-  if (result.matches < config_.min_consensus) return refused(VerificationStatus::kTooFewMatches);
+  if (result.matches < kMinConsensus) return refused(VerificationStatus::kTooFewMatches);
 
   std::mt19937 rng(config_.seed);
-  const RansacResult<SE3> consensus =
-      ransac_pose(pairs, {kRansacConfidence, config_.max_ransac_iterations}, rng);
+  const RansacResult consensus = ransac_pose(pairs, {}, rng);
   result.consensus = static_cast<int>(consensus.inliers.size());
   result.iterations = consensus.iterations;
-  if (!consensus.model || result.consensus < config_.min_consensus)
+  if (!consensus.T_a_b || result.consensus < kMinConsensus)
     return refused(VerificationStatus::kNoConsensus);
 
   const std::optional<PoseFit> start =
-      refine_pose(*consensus.model, pairs, consensus.inliers, kRefineIterations);
+      refine_pose(*consensus.T_a_b, pairs, consensus.inliers, kRefineIterations);
   if (!start) return refused(VerificationStatus::kDegenerate);
-  const std::optional<Support> support =
-      gather_support(*start, from, to, noise, config_.max_match_distance);
+  const std::optional<Support> support = gather_support(*start, from, to);
   if (!support) return refused(VerificationStatus::kDegenerate);
   result.inliers = static_cast<int>(support->inliers.size());
   if (result.inliers < config_.min_inliers) return refused(VerificationStatus::kTooFewInliers);
 
   const PoseFit& fit = support->fit;
-  const double scale = std::max(1.0, fit.chi2 / std::max(1.0, fit.degrees_of_freedom - 6.0));
+  const double misfit = fit.chi2 / std::max(1.0, fit.degrees_of_freedom - 6.0);
+  const double scale = misfit <= 1.0 ? 1.0 : misfit;  // NaN stays NaN
   const Matrix6 weakened =
       information_without_strongest(fit, support->pairs, support->inliers, kStrongestShare);
   if (!holds(weakened)) return refused(VerificationStatus::kUncertainPose);
@@ -150,10 +148,11 @@ Verification Verifier::verify(const KeyframeFeatures& from, const KeyframeFeatur
 
   result.T_from_to = from.T_body_cam * fit.T_a_b * to.T_body_cam.inverse();
   result.covariance = kCommonErrors * scale * body_covariance(fit.information, to.T_body_cam);
-  result.covariance.diagonal().head<3>().array() += std::pow(config_.systematic_rotation_rad, 2);
-  result.covariance.diagonal().tail<3>().array() += std::pow(config_.systematic_translation_m, 2);
+  result.covariance.diagonal().head<3>().array() += std::pow(kSystematicRotation_rad, 2);
+  result.covariance.diagonal().tail<3>().array() += std::pow(kSystematicTranslation_m, 2);
   result.covariance = 0.5 * (result.covariance + result.covariance.transpose()).eval();
-  return refused(VerificationStatus::kAccepted);
+  result.status = VerificationStatus::kAccepted;
+  return result;
 }
 
 }  // namespace km

@@ -53,6 +53,10 @@ struct Verification {
 /// Deterministic: equal features give equal results. verify() is safe to call from several threads.
 class Verifier {
  public:
+  /// Least number of matches, made without knowing the pose, that agree with the pose. About ten
+  /// may agree by chance.
+  static constexpr int kMinConsensus = 12;
+
   /// Throws ConfigError if `config` is out of bounds.
   explicit Verifier(const LoopClosureConfig& config);
 

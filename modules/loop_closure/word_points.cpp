@@ -12,8 +12,6 @@
 namespace km {
 namespace {
 
-constexpr double kWordConfidence = 0.999;
-
 using PointsOfWords = std::map<std::uint32_t, std::vector<std::size_t>>;
 
 PointsOfWords with_depth(const KeyframeFeatures& features, const Vocabulary& vocabulary) {
@@ -78,7 +76,7 @@ std::size_t agreeing_word_points(const KeyframeFeatures& own, const Vocabulary& 
     others[point.word].push_back(other.keypoints.size());
     other.keypoints.push_back(point.keypoint);
   }
-  const ImageNoise noise{config.keypoint_noise_px, config.disparity_noise_px};
+  const ImageNoise noise;
   std::vector<ImagePair> pairs;
   std::vector<std::pair<std::size_t, std::size_t>> ends;
   for (const auto& [word, points] : with_depth(own, vocabulary)) {
@@ -91,7 +89,7 @@ std::size_t agreeing_word_points(const KeyframeFeatures& own, const Vocabulary& 
       }
   }
   std::mt19937 rng(config.seed);
-  const auto found = ransac_pose(pairs, {kWordConfidence, config.max_ransac_iterations}, rng);
+  const auto found = ransac_pose(pairs, {}, rng);
   std::set<std::size_t> in_own, in_other;
   for (const std::size_t i : found.inliers) {
     in_own.insert(ends[i].first);
@@ -104,7 +102,7 @@ bool may_show_one_place(const KeyframeFeatures& own, const Vocabulary& vocabular
                         const WordPoints& theirs, const LoopClosureConfig& config) {
   const auto agreeing = static_cast<double>(agreeing_word_points(own, vocabulary, theirs, config));
   return agreeing >= config.min_word_points &&
-         agreeing >= config.min_word_share * static_cast<double>(theirs.points.size());
+         agreeing >= kMinWordShare * static_cast<double>(theirs.points.size());
 }
 
 }  // namespace km

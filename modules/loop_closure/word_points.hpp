@@ -46,13 +46,16 @@ inline constexpr std::size_t kMaxWordRepeats = 4;
 /// Number of points of `theirs` that are where `own` has points of the same words, under the
 /// relative pose of the cameras with which most agree (ransac_pose()). Points are pairs if they
 /// have the same word, and at most kMaxWordRepeats pairs have this word. Each point counts once.
-/// The noise is that of `config`. Equal arguments give equal results.
+/// Equal arguments give equal results.
 [[nodiscard]] std::size_t agreeing_word_points(const KeyframeFeatures& own,
                                                const Vocabulary& vocabulary,
                                                const WordPoints& theirs,
                                                const LoopClosureConfig& config);
 
-/// True if LoopClosureConfig::min_word_points and min_word_share of `theirs` agree with `own`. By
+/// Least share of the points of another keyframe that must agree.
+inline constexpr double kMinWordShare = 0.07;
+
+/// True if LoopClosureConfig::min_word_points and kMinWordShare of `theirs` agree with `own`. By
 /// chance, the number that agree grows with that of the points.
 [[nodiscard]] bool may_show_one_place(const KeyframeFeatures& own, const Vocabulary& vocabulary,
                                       const WordPoints& theirs, const LoopClosureConfig& config);

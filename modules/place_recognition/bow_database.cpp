@@ -39,45 +39,27 @@ std::size_t BowDatabase::add(const BowVector& vector) {
   return size_++;
 }
 
-std::vector<float> BowDatabase::accumulate(const BowVector& vector, std::size_t first,
-                                           std::size_t last) const {
-  std::vector<float> scores(last - first, 0.0F);
-  const auto is_before = [](const Posting& posting, std::size_t image) {
-    return posting.image < image;
-  };
-  for (std::size_t i = 0; i < vector.words.size(); ++i) {
-    const std::vector<Posting>& postings = postings_[vector.words[i]];
-    // The postings of the next word are loaded while those of this word are added.
-    if (i + 1 < vector.words.size()) __builtin_prefetch(postings_[vector.words[i + 1]].data());
-    const float weight = vector.weights[i];
-    auto posting = postings.begin();
-    auto end = postings.end();
-    if (first > 0) posting = std::lower_bound(posting, end, first, is_before);
-    if (last < size_) end = std::lower_bound(posting, end, last, is_before);
-    for (; posting != end; ++posting)
-      scores[posting->image - first] += std::min(weight, posting->weight);
-  }
+std::vector<float> BowDatabase::accumulate(const BowVector& vector, std::size_t last) const {
+  std::vector<float> scores(last, 0.0F);
+  for (std::size_t i = 0; i < vector.words.size(); ++i)
+    for (const auto& [image, weight] : postings_[vector.words[i]]) {
+      if (image >= last) break;
+      scores[image] += std::min(vector.weights[i], weight);
+    }
   return scores;
 }
 
-BowMatches BowDatabase::query(const BowVector& vector, const BowQuery& query) const {
-  BowMatches result;
-  const std::size_t last = std::min(query.last, size_);
-  if (query.first >= last) return result;
-  const std::vector<float> scores = accumulate(vector, query.first, last);
-  for (std::size_t i = 0; i < scores.size(); ++i) {
-    if (scores[i] <= 0.0F) continue;
-    ++result.compared;
-    result.best_score = std::max(result.best_score, scores[i]);
-    if (static_cast<double>(scores[i]) >= query.min_score)
-      result.best.push_back({query.first + i, scores[i]});
-  }
-  result.above = result.best.size();
-  const std::size_t kept = std::min(query.max_matches, result.best.size());
-  std::partial_sort(result.best.begin(), result.best.begin() + static_cast<std::ptrdiff_t>(kept),
-                    result.best.end(), better);
-  result.best.resize(kept);
-  return result;
+std::vector<BowMatch> BowDatabase::query(const BowVector& vector, const BowQuery& query) const {
+  std::vector<BowMatch> found;
+  const std::vector<float> scores = accumulate(vector, std::min(query.last, size_));
+  for (std::size_t i = 0; i < scores.size(); ++i)
+    if (scores[i] > 0.0F && static_cast<double>(scores[i]) >= query.min_score)
+      found.push_back({i, scores[i]});
+  const std::size_t kept = std::min(query.max_matches, found.size());
+  std::partial_sort(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(kept), found.end(),
+                    better);
+  found.resize(kept);
+  return found;
 }
 
 }  // namespace km

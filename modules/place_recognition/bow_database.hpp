@@ -19,18 +19,10 @@ struct BowMatch {
 
 /// Range and bounds of a query.
 struct BowQuery {
-  std::size_t first = 0;  ///< Only images first, ..., last - 1 are compared.
+  /// Only images 0, ..., last - 1 are compared.
   std::size_t last = std::numeric_limits<std::size_t>::max();
-  double min_score = 0.0;  ///< Least score of an image in BowMatches::best.
+  double min_score = 0.0;  ///< Least score of a result, which also shares a word with the query.
   std::size_t max_matches = std::numeric_limits<std::size_t>::max();
-};
-
-/// Result of a query.
-struct BowMatches {
-  std::vector<BowMatch> best;  ///< By descending score, then ascending index.
-  std::size_t compared = 0;    ///< Number of images that share a word with the query.
-  std::size_t above = 0;       ///< Number of compared images with at least min_score.
-  float best_score = 0.0F;     ///< Best score of all compared images.
 };
 
 /// Inverted index of images by their words, for finding the most similar images.
@@ -48,8 +40,10 @@ class BowDatabase {
   /// numbers of words and weights differ. The state is then unchanged.
   std::size_t add(const BowVector& vector);
 
-  /// Precondition: `vector` would be accepted by add().
-  BowMatches query(const BowVector& vector, const BowQuery& query = {}) const;
+  /// The best images, by descending score, then ascending index. Precondition: `vector` would be
+  /// accepted by add().
+  [[nodiscard]] std::vector<BowMatch> query(const BowVector& vector,
+                                            const BowQuery& query = {}) const;
 
   /// Number of images.
   std::size_t size() const { return size_; }
@@ -59,8 +53,8 @@ class BowDatabase {
     std::uint32_t image;
     float weight;
   };
-  // Scores of images [first, last) against `vector`.
-  std::vector<float> accumulate(const BowVector& vector, std::size_t first, std::size_t last) const;
+  // Scores of images [0, last) against `vector`.
+  std::vector<float> accumulate(const BowVector& vector, std::size_t last) const;
 
   std::vector<std::vector<Posting>> postings_;  // postings of each word, ascending by image
   std::size_t size_ = 0;

@@ -43,7 +43,7 @@ void KnownPlaces::add_closure(const Closure& closure) {
     tie.T_early_late = inverse(tie.T_early_late);
   }
   const auto early = views_.find(tie.early.id.index);
-  if (early != views_.end() && early->second.median_depth_m <= 0.0) return;
+  if (early != views_.end() && !(early->second.median_depth_m > 0.0)) return;
   if (!tie_ || tie_->late.id.index <= tie.late.id.index) tie_ = tie;
 }
 

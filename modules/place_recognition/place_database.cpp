@@ -56,7 +56,7 @@ CandidateSearch PlaceDatabase::search(const BowVector& query, double normalizer)
 }
 
 CandidateSearch PlaceDatabase::search_own(const BowVector& query, Stamp stamp) const {
-  const Stamp newest = stamp - nanoseconds(config_.min_gap_s);
+  const Stamp newest = stamp - nanoseconds(kMinGap_s);
   const auto end = std::upper_bound(stamps_.begin(), stamps_.end(), newest);
   return search_among(query, score(query, last_),
                       std::max(static_cast<std::size_t>(end - stamps_.begin()), known_from_));
@@ -64,34 +64,16 @@ CandidateSearch PlaceDatabase::search_own(const BowVector& query, Stamp stamp) c
 
 CandidateSearch PlaceDatabase::search_among(const BowVector& query, double normalizer,
                                             std::size_t count) const {
-  CandidateSearch result;
-  result.normalizer = normalizer;
-  if (result.normalizer <= 0.0 || result.normalizer < config_.min_normalizer) {
-    result.status = SearchStatus::kLowNormalizer;
-    return result;
-  }
-  const BowMatches matches = database_.query(
-      query, {.last = count, .min_score = config_.similarity_threshold * result.normalizer});
-  result.compared = matches.compared;
-  result.above = matches.above;
-  result.best_similarity = static_cast<double>(matches.best_score) / result.normalizer;
-  for (const BowMatch& match : matches.best)
-    choose(
-        {.index = match.index, .similarity = static_cast<double>(match.score) / result.normalizer},
-        result.candidates);
+  CandidateSearch result{.normalizer = normalizer, .candidates = {}};
+  if (!(normalizer >= kMinNormalizer)) return result;
+  for (const auto& [index, score] :
+       database_.query(query, {.last = count,
+                              .min_score = config_.similarity_threshold * normalizer,
+                              .max_matches = static_cast<std::size_t>(config_.max_candidates)}))
+    result.candidates.push_back(
+        {.index = index, .similarity = static_cast<double>(score) / normalizer});
   count_support(result.candidates);
   return result;
-}
-
-// Adds a keyframe to the chosen ones if there is room, and if it is far enough from them in time.
-void PlaceDatabase::choose(const PlaceCandidate& found, std::vector<PlaceCandidate>& chosen) const {
-  if (chosen.size() == static_cast<std::size_t>(config_.max_candidates)) return;
-  const bool is_new = std::ranges::all_of(chosen, [&](const PlaceCandidate& other) {
-    return other.index != found.index &&
-           std::abs(seconds_between(stamps_[other.index], stamps_[found.index])) >=
-               config_.candidate_separation_s;
-  });
-  if (is_new) chosen.push_back(found);
 }
 
 }  // namespace km

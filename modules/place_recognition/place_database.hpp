@@ -19,18 +19,9 @@ struct PlaceCandidate {
                             ///< candidate, including itself.
 };
 
-enum class SearchStatus {
-  kSearched,
-  kLowNormalizer,  ///< The query has no predecessor, or is too dissimilar to it.
-};
-
 /// Result of one query.
 struct CandidateSearch {
-  SearchStatus status = SearchStatus::kSearched;
-  double normalizer = 0.0;       ///< s(query, keyframe before it); 0 if there is none.
-  std::size_t compared = 0;      ///< Number of keyframes that share a word with the query.
-  std::size_t above = 0;         ///< Number of these at or above the threshold.
-  double best_similarity = 0.0;  ///< Best similarity of all compared keyframes.
+  double normalizer = 0.0;                 ///< s(query, keyframe before it); 0 if there is none.
   std::vector<PlaceCandidate> candidates;  ///< At most max_candidates, by descending similarity.
 };
 
@@ -48,6 +39,11 @@ struct CandidateSearch {
 /// members are thread-safe.
 class PlaceDatabase {
  public:
+  /// Smallest normaliser. A query with a lower one (fast rotation, darkness) is not used.
+  static constexpr double kMinNormalizer = 0.05;
+  /// Smallest time between two keyframes of one robot for a candidate [s].
+  static constexpr double kMinGap_s = 10.0;
+
   /// For vectors of a vocabulary of `words` words. Throws ConfigError if `config` is out of bounds.
   PlaceDatabase(const PlaceRecognitionConfig& config, std::size_t words);
 
@@ -56,7 +52,7 @@ class PlaceDatabase {
   CandidateSearch search(const BowVector& query, double normalizer) const;
 
   /// Candidates for a keyframe of this robot taken at `stamp`, not yet added. The search covers the
-  /// keyframes that are at least min_gap_s older or were added before mark_odometry_break(). The
+  /// keyframes that are at least kMinGap_s older or were added before mark_odometry_break(). The
   /// keyframe that was added or passed last normalises the score.
   CandidateSearch search_own(const BowVector& query, Stamp stamp) const;
 
@@ -84,7 +80,6 @@ class PlaceDatabase {
  private:
   CandidateSearch search_among(const BowVector& query, double normalizer, std::size_t count) const;
   void expect_order(Stamp stamp) const;
-  void choose(const PlaceCandidate& found, std::vector<PlaceCandidate>& chosen) const;
 
   PlaceRecognitionConfig config_;
   BowDatabase database_;
@@ -95,19 +90,18 @@ class PlaceDatabase {
   BowVector view_;  // the keyframe added last
 };
 
-/// Result of the place recognition node for one keyframe.
+/// Whether the place recognition node could search the places of a keyframe.
 enum class PlaceQueryStatus {
-  kSearched,         ///< PlaceQuery::search contains the result.
+  kSearched,
   kOtherVocabulary,  ///< The peer uses another vocabulary, so its keyframes cannot be compared.
   kUnknownWords,     ///< The peer states the same vocabulary but sent words outside of it.
   kRepeated,         ///< This keyframe has arrived before.
 };
 
-/// A searched keyframe, or the reason why it was not searched, for statistics.
+/// A received keyframe, for statistics.
 struct PlaceQuery {
   KeyframeId query;
   PlaceQueryStatus status = PlaceQueryStatus::kSearched;
-  CandidateSearch search;  ///< Indices are those of own keyframes.
 };
 
 }  // namespace km

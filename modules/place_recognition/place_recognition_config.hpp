@@ -10,10 +10,7 @@ struct PlaceRecognitionConfig {
 
   int word_keypoints = 350;
   double similarity_threshold = 0.4;
-  double min_normalizer = 0.05;
   int max_candidates = 5;
-  double min_gap_s = 10.0;
-  double candidate_separation_s = 0.0;
   double new_view_score = 0.24;
   bool known_places = true;
 
@@ -24,15 +21,8 @@ struct PlaceRecognitionConfig {
     visitor.field("similarity_threshold", similarity_threshold, {0.0, 10.0},
                   "least similarity of a candidate: its score over the query's score against the "
                   "keyframe before it; lower: more candidates, more work for verification");
-    visitor.field("min_normalizer", min_normalizer, {0.0, 1.0},
-                  "smallest score of a query against the keyframe before it; with a lower score "
-                  "(fast rotation, darkness) the query is not used");
     visitor.field("max_candidates", max_candidates, {1, 1000},
                   "maximum number of candidates per query, the most similar ones");
-    visitor.field("min_gap_s", min_gap_s, {0.0, 1e6},
-                  "[s] smallest time between two keyframes of one robot for a candidate");
-    visitor.field("candidate_separation_s", candidate_separation_s, {0.0, 1e6},
-                  "[s] smallest time between the candidates of a query; 0: no limit");
     visitor.field("new_view_score", new_view_score, {0.0, 2.0},
                   "the words of a keyframe are sent and searched if its score against the last "
                   "keyframe so sent is below this; otherwise it shows nearly the view of that one; "

@@ -9,25 +9,10 @@
 #include <stdexcept>
 #include <utility>
 
+#include "modules/core/bytes.hpp"
+
 namespace km {
 namespace {
-
-class Fnv1a {
- public:
-  void add(std::span<const std::uint8_t> bytes) {
-    for (const std::uint8_t byte : bytes) hash_ = (hash_ ^ byte) * 0x100000001B3ULL;
-  }
-  void add(std::uint32_t value) {  // little-endian
-    for (int shift = 0; shift < 32; shift += 8) {
-      const auto byte = static_cast<std::uint8_t>(value >> shift);
-      add({&byte, 1});
-    }
-  }
-  std::uint64_t hash() const { return hash_; }
-
- private:
-  std::uint64_t hash_ = 0xCBF29CE484222325ULL;
-};
 
 std::string problem_of_sizes(const VocabularyData& data) {
   const auto outside = [](const char* what, int value, int max) {
@@ -75,25 +60,6 @@ std::string problem_of_tree(const VocabularyData& data) {
   return {};
 }
 
-// Number of descriptors that descend together: while one descriptor waits for the memory of its
-// next node, the others compute.
-constexpr std::size_t kBatch = 32;
-
-void sort_words(std::vector<std::uint32_t>& words, std::size_t vocabulary_size) {
-  // Radix sort, 11 bits a pass: words are small numbers, and comparing them costs as much as
-  // finding them.
-  constexpr unsigned kBits = 11;
-  constexpr std::uint32_t kMask = (1U << kBits) - 1U;
-  std::vector<std::uint32_t> other(words.size());
-  for (unsigned shift = 0; shift < 32 && (vocabulary_size - 1) >> shift != 0; shift += kBits) {
-    std::array<std::uint32_t, kMask + 2> start{};
-    for (const std::uint32_t word : words) ++start[((word >> shift) & kMask) + 1];
-    for (std::size_t i = 1; i < start.size(); ++i) start[i] += start[i - 1];
-    for (const std::uint32_t word : words) other[start[(word >> shift) & kMask]++] = word;
-    words.swap(other);
-  }
-}
-
 }  // namespace
 
 std::string problem_of(const VocabularyData& data) {
@@ -106,13 +72,20 @@ std::string problem_of(const VocabularyData& data) {
 }
 
 std::uint64_t fingerprint(const VocabularyData& data) {
-  Fnv1a hash;
-  hash.add(static_cast<std::uint32_t>(data.branching));
-  hash.add(static_cast<std::uint32_t>(data.depth));
-  hash.add(data.children);
-  for (std::size_t i = 1; i < data.centers.size(); ++i) hash.add(data.centers[i]);
-  for (const float idf : data.idf) hash.add(std::bit_cast<std::uint32_t>(idf));
-  return hash.hash();
+  static_assert(std::endian::native == std::endian::little, "numbers are mixed as in the file");
+  std::uint64_t hash = kFnv1aBasis;
+  const auto add = [&hash](std::span<const std::uint8_t> bytes) {
+    for (const std::uint8_t byte : bytes) hash = (hash ^ byte) * 0x100000001B3ULL;
+  };
+  const auto add_number = [&add](auto number) {
+    add(std::bit_cast<std::array<std::uint8_t, sizeof number>>(number));
+  };
+  add_number(data.branching);
+  add_number(data.depth);
+  add(data.children);
+  for (std::size_t i = 1; i < data.centers.size(); ++i) add(data.centers[i]);
+  for (const float idf : data.idf) add_number(idf);
+  return hash;
 }
 
 std::string fingerprint_text(std::uint64_t fingerprint) {
@@ -124,43 +97,20 @@ std::string fingerprint_text(std::uint64_t fingerprint) {
 
 // The descent of many descriptors, compiled twice (see has_popcount()).
 struct Vocabulary::Descent {
-  const Node* nodes;
-  const DescriptorBits* centers;
+  const Vocabulary& tree;
   std::span<const BinaryDescriptor> descriptors;
-  std::uint32_t* words;
-
-  [[gnu::always_inline]] void batch(std::size_t begin, std::size_t size) const {
-    std::array<DescriptorBits, kBatch> query;
-    std::array<Node, kBatch> at;
-    for (std::size_t i = 0; i < size; ++i) {
-      query[i] = to_bits(descriptors[begin + i]);
-      at[i] = nodes[0];
-    }
-    for (bool descended = true; descended;) {
-      descended = false;
-      std::array<std::uint32_t, kBatch> child{};
-      for (std::size_t i = 0; i < size; ++i) {
-        if (at[i].children == 0) continue;
-        child[i] = at[i].first + nearest(query[i], centers + at[i].first, at[i].children).index;
-        __builtin_prefetch(nodes + child[i]);
-        descended = true;
-      }
-      for (std::size_t i = 0; i < size; ++i) {
-        if (at[i].children == 0) continue;
-        at[i] = nodes[child[i]];
-        // A cache line holds two descriptors.
-        for (std::uint32_t c = 0; c < at[i].children; c += 2)
-          __builtin_prefetch(centers + at[i].first + c);
-      }
-    }
-    for (std::size_t i = 0; i < size; ++i) words[begin + i] = at[i].first;
-  }
+  std::vector<std::uint32_t>& words;
 
   [[gnu::always_inline]] void run() const {
-    for (std::size_t begin = 0; begin < descriptors.size(); begin += kBatch)
-      batch(begin, std::min(kBatch, descriptors.size() - begin));
+    for (const BinaryDescriptor& descriptor : descriptors) {
+      const DescriptorBits query = to_bits(descriptor);
+      Node at = tree.nodes_[0];
+      while (at.children != 0)
+        at = tree.nodes_[at.first +
+                         nearest(query, tree.centers_.data() + at.first, at.children).index];
+      words.push_back(at.first);
+    }
   }
-
   void portable() const { run(); }
 #if defined(__x86_64__)
   [[gnu::target("popcnt")]] void with_popcount() const {
@@ -186,8 +136,9 @@ Vocabulary::Vocabulary(VocabularyData data) : data_(std::move(data)) {
 }
 
 std::vector<std::uint32_t> Vocabulary::words(std::span<const BinaryDescriptor> descriptors) const {
-  std::vector<std::uint32_t> result(descriptors.size());
-  const Descent descent{nodes_.data(), centers_.data(), descriptors, result.data()};
+  std::vector<std::uint32_t> result;
+  result.reserve(descriptors.size());
+  const Descent descent{*this, descriptors, result};
 #if defined(__x86_64__)
   if (has_popcount()) {
     descent.with_popcount();
@@ -200,7 +151,7 @@ std::vector<std::uint32_t> Vocabulary::words(std::span<const BinaryDescriptor> d
 
 BagOfWords Vocabulary::count(std::span<const BinaryDescriptor> descriptors) const {
   std::vector<std::uint32_t> sorted = words(descriptors);
-  sort_words(sorted, size());
+  std::ranges::sort(sorted);
   BagOfWords bag;
   bag.reserve(sorted.size());
   for (const std::uint32_t word : sorted) {

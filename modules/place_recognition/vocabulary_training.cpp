@@ -15,47 +15,28 @@ namespace {
 
 constexpr int kMaxRounds = 20;  // rounds of Lloyd's iteration; few nodes need more than ten
 
-// Byte b of entry v is bit b of v: eight counters of one byte in a machine word.
-constexpr std::array<std::uint64_t, 256> kSpread = [] {
-  std::array<std::uint64_t, 256> spread{};
-  for (std::uint64_t value = 0; value < 256; ++value)
-    for (unsigned bit = 0; bit < 8; ++bit) spread[value] |= ((value >> bit) & 1U) << (8 * bit);
-  return spread;
-}();
-
 // Counts how many descriptors have each bit set.
 class BitCounter {
  public:
   void add(const DescriptorBits& bits) {
-    for (std::size_t byte = 0; byte < 32; ++byte)
-      small_[byte] += kSpread[(bits.word[byte / 8] >> (8 * (byte % 8))) & 0xFFU];
+    for (std::size_t i = 0; i < counts_.size(); ++i)
+      counts_[i] += static_cast<std::uint32_t>((bits.word[i / 64] >> (i % 64)) & 1U);
     ++total_;
-    if (++pending_ == 255) flush();
   }
 
   // Bits set in more than half of the descriptors.
-  DescriptorBits majority() {
-    flush();
+  DescriptorBits majority() const {
     DescriptorBits bits;
     for (std::size_t i = 0; i < counts_.size(); ++i)
-      if (2 * counts_[i] > total_) bits.word[i / 64] |= std::uint64_t{1} << (i % 64);
+      if (2 * std::uint64_t{counts_[i]} > total_) bits.word[i / 64] |= std::uint64_t{1} << (i % 64);
     return bits;
   }
 
   bool empty() const { return total_ == 0; }
 
  private:
-  void flush() {
-    for (std::size_t i = 0; i < counts_.size(); ++i)
-      counts_[i] += (small_[i / 8] >> (8 * (i % 8))) & 0xFFU;
-    small_ = {};
-    pending_ = 0;
-  }
-
-  std::array<std::uint64_t, 32> small_{};
-  std::array<std::uint64_t, 256> counts_{};
+  std::array<std::uint32_t, 256> counts_{};
   std::uint64_t total_ = 0;
-  int pending_ = 0;
 };
 
 // Up to k different centres. Each further centre is drawn with a probability proportional to its

@@ -167,9 +167,9 @@ TEST_CASE("changes of decisions, poses and cells become events, each once", "[ro
 TEST_CASE("keyframes that another vocabulary keeps from being compared are counted", "[robot]") {
   RunRecord record(1);
   for (KeyframeIndex i = 0; i < 3; ++i)
-    record.add(PlaceQuery{{2, i}, PlaceQueryStatus::kOtherVocabulary, {}});
-  record.add(PlaceQuery{{2, 3}, PlaceQueryStatus::kSearched, {}});
-  record.add(PlaceQuery{{3, 0}, PlaceQueryStatus::kRepeated, {}});
+    record.add(PlaceQuery{{2, i}, PlaceQueryStatus::kOtherVocabulary});
+  record.add(PlaceQuery{{2, 3}, PlaceQueryStatus::kSearched});
+  record.add(PlaceQuery{{3, 0}, PlaceQueryStatus::kRepeated});
   CHECK(record.other_vocabulary() == std::map<RobotId, std::uint64_t>{{2, 3}});
   PeerEvent event{PeerEventKind::kRestarted, {}, {}};
   event.identity.robot = 2;

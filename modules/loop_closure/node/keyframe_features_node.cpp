@@ -4,8 +4,6 @@
 #include <string>
 #include <utility>
 
-#include "modules/loop_closure/rolling_shutter.hpp"
-
 namespace km {
 namespace {
 

@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "modules/loop_closure/packed_features.hpp"
-#include "modules/loop_closure/packed_word_points.hpp"
 #include "runtime/dds/codec.hpp"
 #include "runtime/dds/wire_pose.hpp"
 

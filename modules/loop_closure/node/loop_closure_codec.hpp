@@ -9,8 +9,7 @@
 #include "modules/core/pose_graph.hpp"
 #include "modules/loop_closure/keyframe_requests.hpp"
 #include "modules/loop_closure/matching.hpp"
-#include "modules/loop_closure/packed_features.hpp"
-#include "modules/loop_closure/packed_word_points.hpp"
+#include "modules/loop_closure/packed_keypoints.hpp"
 #include "runtime/dds/codec.hpp"
 
 namespace km {
@@ -57,7 +56,7 @@ struct Codec<KeyframeWords> {
   using Wire = km_wire_KeyframeWords;
   static constexpr const char* kTopic = "keyframe_words";
   static constexpr std::uint16_t kVersion = 1;
-  static constexpr std::size_t kMaxBytes = 256 + 16 * kMaxWordPoints;
+  static constexpr std::size_t kMaxBytes = 256 + 16 * kMaxKeypoints;
   static const dds_topic_descriptor_t& descriptor() { return km_wire_KeyframeWords_desc; }
 
   struct Encoded {

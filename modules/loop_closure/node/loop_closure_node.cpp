@@ -23,6 +23,9 @@ namespace {
 constexpr std::size_t kQueueCapacity = 16384;
 constexpr std::chrono::milliseconds kTickPeriod(100);
 
+constexpr double kRequestTimeout_s = 2.0;   // after which an unanswered request is repeated
+constexpr int kMaxOutstandingRequests = 8;  // to one peer; further ones wait
+
 }  // namespace
 
 LoopClosureNode::LoopClosureNode(const LoopClosureConfig& config, RobotId self,
@@ -35,7 +38,7 @@ LoopClosureNode::LoopClosureNode(const LoopClosureConfig& config, RobotId self,
       verifier_(config),
       read_keyframe_(std::move(read_keyframe)),
       peers_(static_cast<std::size_t>(config.cached_keyframes)),
-      requests_(config.request_timeout_s, config.max_outstanding_requests),
+      requests_(kRequestTimeout_s, kMaxOutstandingRequests),
       policy_(config),
       reply_keypoints_(static_cast<std::size_t>(config.reply_keypoints)),
       full_keyframes_(static_cast<KeyframeIndex>(config.full_keyframes)),
@@ -323,7 +326,7 @@ bool LoopClosureNode::complete(const Work& work, const Keyframe& from, const Key
     numbers = is_inside
                   ? verifier_.verify(without_network(from.features), without_network(to.features))
                   : verifier_.verify(from.features, to.features);
-    if (is_inside && numbers.rotation_sigma_rad > config_.max_own_rotation_sigma_rad)
+    if (is_inside && !(numbers.rotation_sigma_rad <= kMaxOwnRotationSigma_rad))
       numbers.status = VerificationStatus::kUncertainPose;
     if (numbers.status != VerificationStatus::kAccepted) {
       report(work, ClosureStage::kReceived, to_string(numbers.status), numbers);

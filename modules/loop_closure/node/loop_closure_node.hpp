@@ -77,6 +77,10 @@ class LoopClosureNode final : public Node {
   /// Reads an own keyframe from the disk; null if it is not there. Called on any thread.
   using ReadKeyframe = std::function<std::shared_ptr<const Keyframe>(KeyframeIndex)>;
 
+  /// Bound for a closure inside a robot, in place of LoopClosureConfig::max_rotation_sigma_rad if
+  /// it is smaller: odometry and other closures join such keyframes, too.
+  static constexpr double kMaxOwnRotationSigma_rad = 0.015;
+
   /// If `vocabulary` is null, the choice of keypoints does not depend on words. Without
   /// `read_keyframe`, older own keyframes stay in memory with some of their keypoints. Throws
   /// ConfigError if `config` is out of bounds.

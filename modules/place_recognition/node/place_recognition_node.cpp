@@ -29,7 +29,7 @@ void keep_due(PlaceNovelty novelty, std::vector<PlaceCandidate>& candidates) {
 
 bool breaks_odometry(const UncertainPose& before, const UncertainPose& now) {
   const Matrix6 step = between_on_chain(before, now).Sigma;
-  return step.bottomRightCorner<3, 3>().trace() > 3.0 * kLostWay_m * kLostWay_m;
+  return !(step.bottomRightCorner<3, 3>().trace() <= 3.0 * kLostWay_m * kLostWay_m);
 }
 
 }  // namespace
@@ -90,7 +90,7 @@ void PlaceRecognitionNode::step(const Keyframe& keyframe) {
     own_.pass(std::move(vector), keyframe.stamp);
   }
   topics_.own_bows.publish(std::move(bow));
-  publish(id, std::move(search));
+  publish(id, search);
 }
 
 void PlaceRecognitionNode::step(const KeyframeBow& peer_bow) {
@@ -101,15 +101,15 @@ void PlaceRecognitionNode::step(const KeyframeBow& peer_bow) {
         << "robot " << id.robot << " uses another vocabulary ("
         << fingerprint_text(peer_bow.vocabulary) << ", here " << fingerprint_text(vocabulary_->id())
         << "): its keyframes cannot be compared";
-    return publish_refusal(id, PlaceQueryStatus::kOtherVocabulary);
+    return topics_.queries.publish(PlaceQuery{id, PlaceQueryStatus::kOtherVocabulary});
   }
   if (!vocabulary_->knows(peer_bow.words)) {
     log::limited(log::Level::kWarn, name(), "words of " + std::to_string(id.robot))
         << "keyframe " << to_string(id) << " has words beyond the vocabulary: not used";
-    return publish_refusal(id, PlaceQueryStatus::kUnknownWords);
+    return topics_.queries.publish(PlaceQuery{id, PlaceQueryStatus::kUnknownWords});
   }
   if (!searched_[id.robot].insert(id.index).second)
-    return publish_refusal(id, PlaceQueryStatus::kRepeated);
+    return topics_.queries.publish(PlaceQuery{id, PlaceQueryStatus::kRepeated});
   if (peer_bow.words.empty()) return publish(id, {});
   publish(id, own_.search(vocabulary_->weigh(peer_bow.words), peer_bow.normalizer));
 }
@@ -129,17 +129,13 @@ PlaceNovelty PlaceRecognitionNode::novelty_of(const OdometryPose& keyframe,
   return known_.novelty_of(keyframe, similar);
 }
 
-void PlaceRecognitionNode::publish(const KeyframeId& query, CandidateSearch search) const {
+void PlaceRecognitionNode::publish(const KeyframeId& query, const CandidateSearch& search) const {
   for (const PlaceCandidate& found : search.candidates)
     topics_.candidates.publish(LoopCandidate{.query = query,
                                              .match = own_ids_[found.index],
                                              .similarity = found.similarity,
                                              .support = found.support});
-  topics_.queries.publish(PlaceQuery{query, PlaceQueryStatus::kSearched, std::move(search)});
-}
-
-void PlaceRecognitionNode::publish_refusal(const KeyframeId& query, PlaceQueryStatus status) const {
-  topics_.queries.publish(PlaceQuery{query, status, {}});
+  topics_.queries.publish(PlaceQuery{query, PlaceQueryStatus::kSearched});
 }
 
 }  // namespace km

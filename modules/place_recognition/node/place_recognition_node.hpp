@@ -86,8 +86,7 @@ class PlaceRecognitionNode final : public Node {
   [[nodiscard]] BagOfWords words_of(const KeyframeFeatures& features) const;
   [[nodiscard]] PlaceNovelty novelty_of(const OdometryPose& keyframe,
                                         const CandidateSearch& search) const;
-  void publish(const KeyframeId& query, CandidateSearch search) const;
-  void publish_refusal(const KeyframeId& query, PlaceQueryStatus status) const;
+  void publish(const KeyframeId& query, const CandidateSearch& search) const;
 
   const PlaceRecognitionConfig config_;
   const RobotId self_;

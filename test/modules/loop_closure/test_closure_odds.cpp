@@ -27,22 +27,6 @@ TEST_CASE("Similarity and support make a closure more probable", "[closure_odds]
   CHECK(odds.probability(found_with(1.0, 9)) == odds.probability(found_with(1.0, 5)));
 }
 
-TEST_CASE("The difficulty of an environment is learned from results", "[closure_odds]") {
-  const double difficulty = GENERATE(12.0, 14.0, 17.0, 20.0);
-  CAPTURE(difficulty);
-  std::mt19937 engine(5);
-  std::uniform_real_distribution<double> similarity(0.5, 1.4), unit(0.0, 1.0);
-  std::uniform_int_distribution<int> support(1, 5);
-  ClosureOdds odds;
-  for (int i = 0; i < 3000; ++i) {
-    const LoopCandidate drawn = found_with(similarity(engine), support(engine));
-    odds.add(drawn, unit(engine) < logistic(evidence_of(drawn) - difficulty));
-  }
-  // The information of the results is above 100 in all cases: the standard deviation is below 0.1.
-  const LoopCandidate even = found_with((difficulty - 3.3) / 11.7, 3);
-  CHECK(odds.probability(even) == Approx(0.5).margin(0.07));
-}
-
 TEST_CASE("The estimate is the maximum of the posterior distribution", "[closure_odds]") {
   // Results as in a room: few closures among 40 requests.
   std::mt19937 engine(11);

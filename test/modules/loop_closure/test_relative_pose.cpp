@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
-#include <numbers>
 #include <numeric>
 
 #include "modules/core/symmetric_eigen.hpp"
@@ -10,8 +9,6 @@
 
 namespace km {
 namespace {
-
-constexpr double kExact = 1e-9;  // [m], [rad]: rounding of a closed form on points of a few metres
 
 std::vector<Eigen::Vector3d> random_points(std::mt19937& rng, int count) {
   std::vector<Eigen::Vector3d> points;
@@ -42,17 +39,6 @@ SE3 camera_pose(const KeyframePair& keyframes) {
   return keyframes.from.T_body_cam.inverse() * keyframes.T_from_to * keyframes.to.T_body_cam;
 }
 
-TEST_CASE("aligning points recovers a quarter turn and a shift exactly", "[relative_pose]") {
-  std::mt19937 rng(1);
-  const Eigen::Matrix3d R =
-      Eigen::AngleAxisd(-std::numbers::pi / 2, Eigen::Vector3d::UnitZ()).toRotationMatrix();
-  const SE3 T_a_b = make_pose(R, {1.0, 2.0, 3.0});
-  const auto points_b = random_points(rng, 40);
-  const std::optional<SE3> found = align_points(moved(T_a_b, points_b), points_b);
-  REQUIRE(found);
-  CHECK(found->isApprox(T_a_b, kExact));
-}
-
 TEST_CASE("aligning points recovers any pose from three points", "[relative_pose]") {
   const auto seed = GENERATE(range(1U, 21U));
   CAPTURE(seed);
@@ -75,13 +61,8 @@ TEST_CASE("points on a line, in one place, or too few have no alignment", "[rela
   SECTION("two points") {
     points = {{0, 0, 1}, {1, 0, 1}};
   }
+  CHECK_THROWS_AS(align_points(points, {}), std::invalid_argument);
   CHECK_FALSE(align_points(points, points));
-}
-
-TEST_CASE("aligning lists of unequal length is misuse", "[relative_pose]") {
-  const std::vector<Eigen::Vector3d> three(3, Eigen::Vector3d::Ones());
-  const std::vector<Eigen::Vector3d> four(4, Eigen::Vector3d::Ones());
-  CHECK_THROWS_AS(align_points(three, four), std::invalid_argument);
 }
 
 TEST_CASE("the transfer Jacobian is the derivative of the error", "[relative_pose]") {
@@ -135,9 +116,9 @@ TEST_CASE("RANSAC finds the pose and the inliers among 70 % outliers", "[relativ
     pairs[i].b = image_point(keyframes.to, i + 1 < pairs.size() ? i + 1 : kInliers, noise);
 
   std::mt19937 draws(7);
-  const RansacResult<SE3> result = ransac_pose(pairs, {0.999, 5000}, draws);
-  REQUIRE(result.model);
-  const Vector6 error = se3_log(camera_pose(keyframes).inverse() * *result.model);
+  const RansacResult result = ransac_pose(pairs, {0.999, 5000}, draws);
+  REQUIRE(result.T_a_b);
+  const Vector6 error = se3_log(camera_pose(keyframes).inverse() * *result.T_a_b);
   CHECK(error.head<3>().norm() < 0.03);  // 0.7 px over 458 px, 30 points: 3 sigma is below 0.01
   CHECK(error.tail<3>().norm() < 0.08);
   const auto true_inliers = std::count_if(result.inliers.begin(), result.inliers.end(),
@@ -146,19 +127,7 @@ TEST_CASE("RANSAC finds the pose and the inliers among 70 % outliers", "[relativ
   CHECK(static_cast<std::size_t>(true_inliers) + 3 >= result.inliers.size());
   for (std::size_t i = 0; i < pairs.size(); ++i)
     CHECK(std::ranges::binary_search(result.inliers, i) ==
-          (pair_error(*result.model, pairs[i]).relative() <= 1.0));
-}
-
-TEST_CASE("RANSAC with the same seed gives the same result", "[relative_pose]") {
-  std::mt19937 rng(3);
-  const KeyframePair keyframes = make_keyframe_pair(rng, 60, {0.7, 0.3}, 1.0);
-  const std::vector<ImagePair> pairs = image_pairs(keyframes, {0.7, 0.3});
-  std::mt19937 first(5), second(5);
-  const auto a = ransac_pose(pairs, {}, first);
-  const auto b = ransac_pose(pairs, {}, second);
-  REQUIRE(a.model);
-  CHECK(a.model->matrix() == b.model->matrix());
-  CHECK(a.inliers == b.inliers);
+          (pair_error(*result.T_a_b, pairs[i]).relative() <= 1.0));
 }
 
 // 400 trials: 95 % of a chi-squared variable lie below its quantile, with a standard deviation of
@@ -225,47 +194,13 @@ TEST_CASE("a pose held by two points loses its information with them", "[relativ
   CHECK(symmetric_eigen(left).values(0) < 1e-6 * symmetric_eigen(fit->information).values(0));
 }
 
-// A number that most of the data agree on.
-struct ConstantProblem {
-  static constexpr std::size_t kSampleSize = 1;
-  std::vector<double> data;
-
-  std::size_t size() const { return data.size(); }
-  std::size_t drawable() const { return data.size(); }
-  std::optional<double> solve(std::span<const std::size_t> sample) const { return data[sample[0]]; }
-  double error(double model, std::size_t i) const {
-    return (data[i] - model) * (data[i] - model);  // inlier within 1
-  }
-  std::optional<double> polish(double, std::span<const std::size_t> inliers) const {
-    double sum = 0.0;
-    for (const std::size_t i : inliers) sum += data[i] / static_cast<double>(inliers.size());
-    return sum;
-  }
-};
-
-TEST_CASE("RANSAC returns the model of the largest agreement", "[ransac]") {
-  const ConstantProblem problem{{5.0, 5.2, 4.8, 5.1, 4.9, 40.0, -3.0, 17.0, 17.3}};
-  const auto seed = GENERATE(range(1U, 11U));
-  CAPTURE(seed);
-  std::mt19937 rng(seed);
-  const RansacResult<double> result = ransac<double>(problem, {0.999999, 1000}, rng);
-  REQUIRE(result.model);
-  CHECK(*result.model == Approx(5.0));
-  CHECK(result.inliers == std::vector<std::size_t>{0, 1, 2, 3, 4});
-  CHECK(result.cost == Approx(0.1 + 4.0));  // squares of the inliers, 1 for each outlier
-}
-
-TEST_CASE("RANSAC stops as soon as its confidence allows", "[ransac]") {
-  const ConstantProblem problem{std::vector<double>(20, 3.0)};
+TEST_CASE("RANSAC stops as soon as its confidence allows", "[relative_pose]") {
   std::mt19937 rng(1);
-  CHECK(ransac<double>(problem, {0.99, 1000}, rng).iterations == 1);
-}
-
-TEST_CASE("RANSAC without data has no model", "[ransac]") {
-  std::mt19937 rng(1);
-  const RansacResult<double> result = ransac<double>(ConstantProblem{}, {}, rng);
-  CHECK_FALSE(result.model);
-  CHECK(result.iterations == 0);
+  const KeyframePair keyframes = make_keyframe_pair(rng, 50, {}, 0.0);
+  const RansacResult result = ransac_pose(image_pairs(keyframes, {}), {}, rng);
+  CHECK(result.inliers.size() == 50);
+  CHECK(result.iterations <= 3);  // a sample on a line gives no pose
+  CHECK_FALSE(ransac_pose({}, {}, rng).T_a_b);
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <catch2/catch.hpp>
+#include <cmath>
 
 namespace km {
 namespace {
@@ -152,16 +153,14 @@ TEST_CASE("Robots without closures request less probable candidates", "[request_
     CHECK(decide(query, kTenth) == Decision::kImprobable);
 }
 
-TEST_CASE("With all bounds at 0 every candidate is requested", "[request_policy]") {
-  LoopClosureConfig config;
-  config.max_closure_separation = config.max_request_separation = 0;
-  config.min_closure_probability = 0.0;
-  RequestPolicy policy(config);
-  succeed(policy, 1, 1);
-  for (KeyframeIndex query = 2; query < 20; ++query) {
-    CHECK(policy.decide(candidate(query, 1)) == Decision::kRequest);
-    policy.add_result({kPeer, query}, false);
-  }
+TEST_CASE("A candidate whose probability is not a number is requested as one that is improbable",
+          "[request_policy]") {
+  RequestPolicy policy{LoopClosureConfig{}};
+  for (KeyframeIndex query = 100; query < 103; ++query) succeed(policy, query, query);
+  int requests = 0;
+  for (KeyframeIndex query = 1000; query < 3000; query += 100)
+    requests += policy.decide({{kPeer, query}, {kSelf, 7}, std::nan(""), 1}) == Decision::kRequest;
+  CHECK(requests <= 1);
 }
 
 }  // namespace

