@@ -11,20 +11,12 @@ struct VocabularyCommand {
   std::string vocabulary;  ///< The file to write or to read.
   std::string json;        ///< Results for programs; none if empty.
   int features = 1000;     ///< ORB features per image.
-  int every = 1;           ///< Use every n-th image.
 
   void define(CLI::App& app) {
-    define_images(app);
-    app.add_option("--json", json, "Also write the results to this file, as JSON");
-  }
-  /// Without --json.
-  void define_images(CLI::App& app) {
     app.add_option("--features", features, "ORB features per image")
         ->check(CLI::Range(1, 100000))
         ->capture_default_str();
-    app.add_option("--every", every, "Use every N-th image of an input")
-        ->check(CLI::Range(1, 1000000))
-        ->capture_default_str();
+    app.add_option("--json", json, "Also write the results to this file, as JSON");
   }
 };
 
@@ -32,6 +24,5 @@ struct VocabularyCommand {
 /// Unusable input throws a std::exception.
 void add_train(CLI::App& app);
 void add_inspect(CLI::App& app);
-void add_evaluate(CLI::App& app);
 
 }  // namespace km

@@ -70,14 +70,6 @@ std::vector<fs::path> list_images(const std::vector<std::string>& inputs, int st
   return images;
 }
 
-Stamp stamp_of_image(const std::filesystem::path& image) {
-  const std::string name = image.filename().string();
-  const std::string digits = name.substr(0, name.find_first_not_of("0123456789"));
-  const std::optional<std::int64_t> stamp = parse_int64(digits);
-  if (!stamp) throw std::runtime_error(image.string() + ": the name does not start with a stamp");
-  return *stamp;
-}
-
 std::vector<BinaryDescriptor> image_descriptors(const std::filesystem::path& image, int features) {
   const cv::Mat grey = read_pixels(image, DecodedPixels::kGray);
   std::vector<cv::KeyPoint> keypoints;

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "modules/core/keyframe.hpp"
-#include "modules/core/stamp.hpp"
 
 namespace km {
 
@@ -17,9 +16,6 @@ namespace km {
 ///   - a text file (.txt, .csv): one image per line, its last field, relative to the text file.
 /// Throws std::runtime_error that names an input which does not exist or has no image.
 std::vector<std::filesystem::path> list_images(const std::vector<std::string>& inputs, int stride);
-
-/// The stamp in an image's name: its leading digits [ns]. Throws std::runtime_error without digits.
-Stamp stamp_of_image(const std::filesystem::path& image);
 
 /// Descriptors of an image by make_keypoint_extractor(), at most `features`. Throws
 /// std::runtime_error that names the file if it cannot be decoded.

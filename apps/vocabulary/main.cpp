@@ -10,13 +10,11 @@ All robots of a team need the same vocabulary file.
 IMAGES are image files, folders of .png or .jpg, EuRoC/ASL folders (their left camera), or
 text files that list one image per line. Examples:
   kimera_multi_vocabulary train -o site.kmvoc -k 10 -L 4 recording_1 recording_2
-  kimera_multi_vocabulary inspect site.kmvoc --pair a.png b.png
-  kimera_multi_vocabulary evaluate site.kmvoc --known robot_1 --queries robot_2 \
-      --truth state_groundtruth_estimate0/data.csv)";
+  kimera_multi_vocabulary inspect site.kmvoc --pair a.png b.png)";
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  return km::run_subcommands("kimera_multi_vocabulary", kAbout,
-                             {km::add_train, km::add_inspect, km::add_evaluate}, argc, argv);
+  return km::run_subcommands("kimera_multi_vocabulary", kAbout, {km::add_train, km::add_inspect},
+                             argc, argv);
 }

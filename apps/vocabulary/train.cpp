@@ -16,6 +16,7 @@ struct TrainCommand : VocabularyCommand {
   int branching = 10;
   int depth = 5;
   std::uint32_t seed = 1;
+  int every = 1;
 };
 
 void define(CLI::App& app, TrainCommand& command) {
@@ -28,6 +29,9 @@ void define(CLI::App& app, TrainCommand& command) {
                  "Levels of the tree: at most k^L words, about 37 bytes each")
       ->capture_default_str();
   app.add_option("--seed", command.seed, "Seed of the random start of clustering")
+      ->capture_default_str();
+  app.add_option("--every", command.every, "Use every N-th image of an input")
+      ->check(CLI::Range(1, 1000000))
       ->capture_default_str();
   command.VocabularyCommand::define(app);
 }

@@ -8,7 +8,7 @@
 #include "modules/images/configured_network.hpp"
 #include "modules/images/keypoint_patches.hpp"
 #include "modules/images/network.hpp"
-#include "modules/loop_closure/matched_numbers.hpp"
+#include "modules/loop_closure/matching.hpp"
 
 namespace km {
 namespace {

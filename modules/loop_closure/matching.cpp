@@ -9,11 +9,13 @@
 #include <tuple>
 #include <utility>
 
-#include "modules/loop_closure/matched_numbers.hpp"
 #include "modules/place_recognition/hamming.hpp"
 
 namespace km {
 namespace {
+
+constexpr int kLargest = 7;  // number of 4 bits
+constexpr int kZero = 8;     // is stored for a number of 0
 
 // Tests of ORB as machine words.
 struct Bits {
@@ -107,6 +109,7 @@ class KeypointGrid {
       pixels_.push_back(features.focal_px * keypoint.bearing.cast<double>());
     Eigen::Vector2d high = Eigen::Vector2d::Zero();
     for (const Eigen::Vector2d& pixel : pixels_) {
+      if (!pixel.allFinite()) continue;  // never found
       low_ = low_.cwiseMin(pixel);
       high = high.cwiseMax(pixel);
     }
@@ -117,6 +120,7 @@ class KeypointGrid {
     rows_ = static_cast<int>((high.y() - low_.y()) / cell_) + 1;
     cells_.resize(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_));
     for (std::uint32_t i = 0; i < pixels_.size(); ++i) {
+      if (!pixels_[i].allFinite()) continue;
       const Eigen::Vector2i cell = cell_of(pixels_[i]);
       cells_[index(cell.x(), cell.y())].push_back(i);
     }
@@ -241,6 +245,31 @@ std::vector<MatchedDescriptor> orb_bits(std::span<const BinaryDescriptor> descri
   for (std::size_t i = 0; i < bits.size(); ++i)
     std::copy_n(descriptors[i].begin(), kMatchedBytes, bits[i].begin());
   return bits;
+}
+
+MatchedDescriptor descriptor_of_numbers(std::span<const float> numbers) {
+  double squares = 0.0;
+  for (const float x : numbers) squares += static_cast<double>(x) * static_cast<double>(x);
+  const double factor =
+      squares > 0.0 ? kNumberSteps * std::sqrt(static_cast<double>(kMatchedNumbers) / squares)
+                    : 0.0;
+  MatchedDescriptor descriptor{};
+  for (std::size_t i = 0; i < kMatchedNumbers; ++i) {
+    const double steps = std::clamp<double>(std::round(factor * static_cast<double>(numbers[i])),
+                                            -kLargest, kLargest);
+    const auto stored = static_cast<unsigned>(static_cast<int>(steps) + kZero);
+    descriptor[i / 2] |= static_cast<std::uint8_t>(stored << (i % 2 == 0 ? 0U : 4U));
+  }
+  return descriptor;
+}
+
+std::array<std::int16_t, kMatchedNumbers> numbers_of(const MatchedDescriptor& descriptor) {
+  std::array<std::int16_t, kMatchedNumbers> numbers{};
+  for (std::size_t i = 0; i < kMatchedNumbers; ++i) {
+    const unsigned stored = descriptor[i / 2] >> (i % 2 == 0 ? 0U : 4U) & 0xFU;
+    numbers[i] = static_cast<std::int16_t>(static_cast<int>(stored) - kZero);
+  }
+  return numbers;
 }
 
 std::vector<MatchedDescriptor> matched_by(std::uint16_t network, const KeyframeFeatures& features) {

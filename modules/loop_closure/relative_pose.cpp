@@ -329,8 +329,9 @@ RansacResult ransac_pose(std::span<const ImagePair> pairs, const RansacOptions& 
     std::vector<std::size_t> inliers;
     for (std::size_t i = 0; i < n && cost < best.cost; ++i) {
       const double error = problem.error(T_a_b, i);
-      if (error <= 1.0) inliers.push_back(i);
-      cost += std::min(error, 1.0);
+      const bool is_inlier = error <= 1.0;
+      if (is_inlier) inliers.push_back(i);
+      cost += is_inlier ? error : 1.0;
     }
     if (!(cost < best.cost)) return false;
     best.T_a_b = T_a_b;

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -43,6 +45,18 @@ struct BowVector {
 /// Tardos, "Bags of Binary Words for Fast Place Recognition in Image Sequences", TRO 2012; Nister
 /// and Stewenius, CVPR 2006). For vectors of norm 1 without negative entries this is the sum of
 /// min(v_i, w_i) over the common words. Linear in the number of words.
-[[nodiscard]] double score(const BowVector& v, const BowVector& w);
+[[nodiscard]] inline double score(const BowVector& v, const BowVector& w) {
+  double sum = 0.0;
+  std::size_t i = 0;
+  std::size_t k = 0;
+  while (i < v.words.size() && k < w.words.size()) {
+    const std::uint32_t a = v.words[i];
+    const std::uint32_t b = w.words[k];
+    if (a == b) sum += static_cast<double>(std::min(v.weights[i], w.weights[k]));
+    i += a <= b ? 1U : 0U;
+    k += b <= a ? 1U : 0U;
+  }
+  return sum;
+}
 
 }  // namespace km

@@ -31,16 +31,6 @@ TEST_CASE("the time-out doubles up to eightfold", "[keyframe_requests]") {
     CHECK(asked[i] == Approx(expected[i]).margin(0.15));
 }
 
-TEST_CASE("a peer that returns is asked at once", "[keyframe_requests]") {
-  KeyframeRequests requests(1.0, 1);
-  requests.want({7, 1});
-  requests.want({8, 1});
-  for (int tick = 0; tick < 10; ++tick) (void)requests.due(tick);
-  REQUIRE(requests.due(10.5).empty());
-  requests.returned(7);
-  CHECK(requests.due(10.6) == Ids{{7, 1}});
-}
-
 TEST_CASE("the number of unanswered requests to one peer is bounded", "[keyframe_requests]") {
   KeyframeRequests requests(2.0, 2);
   for (std::uint32_t i = 0; i < 5; ++i) requests.want({7, i});

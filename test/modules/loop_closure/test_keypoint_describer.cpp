@@ -7,7 +7,7 @@
 #include "modules/core/config.hpp"
 #include "modules/images/keypoint_patches.hpp"
 #include "modules/loop_closure/keypoint_describer.hpp"
-#include "modules/loop_closure/matched_numbers.hpp"
+#include "modules/loop_closure/matching.hpp"
 #include "test/support/onnx_model.hpp"
 #include "test/support/temporary_folder.hpp"
 

@@ -190,18 +190,6 @@ TEST_CASE("work for a peer is dropped when it restarts and requested again when 
   }
 }
 
-TEST_CASE("a candidate that fails verification has a reason", "[loop_closure_node]") {
-  Scene views(7);
-  for (BinaryDescriptor& descriptor : views.peer.features.descriptors) descriptor = {};
-  Meeting meeting(views);
-  auto& [scene, robot, peer] = meeting;
-  robot.give(scene.candidate());
-  deliver(robot, peer);
-  CHECK(robot.closures.empty());
-  REQUIRE(stages_of(robot.reports) == Stages{kCandidate, kRequested, kReceived});
-  CHECK(robot.reports.back().reason == "too few matches");
-}
-
 // Keyframes 0 and 50 of the robot itself see the same place.
 Scene scene_of_one_robot() {
   Scene scene(8);

@@ -4,7 +4,6 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
-#include "modules/loop_closure/matched_numbers.hpp"
 #include "modules/loop_closure/matching.hpp"
 #include "test/modules/loop_closure/synthetic_keyframes.hpp"
 

@@ -156,7 +156,7 @@ TEST_CASE("Robots without closures request less probable candidates", "[request_
 TEST_CASE("A candidate whose probability is not a number is requested as one that is improbable",
           "[request_policy]") {
   RequestPolicy policy{LoopClosureConfig{}};
-  for (KeyframeIndex query = 100; query < 103; ++query) succeed(policy, query, query);
+  for (KeyframeIndex query = 100; query < 400; query += 100) succeed(policy, query, query);
   int requests = 0;
   for (KeyframeIndex query = 1000; query < 3000; query += 100)
     requests += policy.decide({{kPeer, query}, {kSelf, 7}, std::nan(""), 1}) == Decision::kRequest;

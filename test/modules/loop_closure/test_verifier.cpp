@@ -1,5 +1,6 @@
 #include <Eigen/LU>
 #include <catch2/catch.hpp>
+#include <cmath>
 
 #include "modules/core/covariance.hpp"
 #include "modules/loop_closure/verifier.hpp"
@@ -34,6 +35,18 @@ TEST_CASE("the same keyframes give the same result", "[verifier]") {
   const Verification second = verifier.verify(pair.from, pair.to);
   CHECK(first.T_from_to.matrix() == second.T_from_to.matrix());
   CHECK(first.covariance == second.covariance);
+}
+
+TEST_CASE("a keypoint that is not a number is no inlier", "[verifier]") {
+  std::mt19937 rng(2);
+  KeyframePair pair = make_keyframe_pair(rng, 100, kNoise, 0.0);
+  pair.to.keypoints[7].bearing.x() = std::nanf("");
+  pair.from.keypoints[9].inverse_depth = std::nanf("");
+  const Verification result = Verifier({}).verify(pair.from, pair.to);
+  REQUIRE(result.status == VerificationStatus::kAccepted);
+  CHECK(result.inliers >= 97);
+  CHECK(result.inliers < 100);
+  CHECK(is_covariance(result.covariance));
 }
 
 TEST_CASE("keyframes of different places are refused", "[verifier]") {

@@ -76,17 +76,6 @@ Matrix6 random_covariance(std::mt19937& rng) {
   return root * root.transpose();
 }
 
-TEST_CASE("A covariance by blocks moves as with the adjoint", "[pcm]") {
-  const unsigned seed = GENERATE(range(0U, 10U));
-  CAPTURE(seed);
-  std::mt19937 rng(seed);
-  const Matrix6 Sigma = random_covariance(rng);
-  const SE3 T = random_pose(rng, 5.0);
-  const Matrix6 expected = adjoint(T) * Sigma * adjoint(T).transpose();
-  const Matrix6 moved = transported(T, BlockCovariance(Sigma)).matrix();
-  CHECK((moved - expected).norm() <= 1e-12 * expected.norm());
-}
-
 struct Pair {
   OrientedClosure i, k;
 };

@@ -85,20 +85,6 @@ TEST_CASE("The bound is valid and the result a clique for all limits", "[clique]
   }
 }
 
-TEST_CASE("Incremental search finds the same size as a search from scratch", "[clique]") {
-  const unsigned seed = GENERATE(range(0U, 4U));
-  const double density = GENERATE(0.1, 0.5, 0.7);
-  CAPTURE(seed, density);
-  std::mt19937 rng(100 + seed);
-  const Rows rows = random_graph(90, density, rng);
-  MaxClique clique(kNoLimit);
-  for (std::size_t n = 1; n <= rows.size(); ++n) {
-    clique.add(rows[n - 1]);
-    REQUIRE(clique.clique().size() == from_scratch(rows, n));
-    REQUIRE(is_clique(rows, clique.clique()));
-  }
-}
-
 TEST_CASE("The older of equally large cliques is kept", "[clique]") {
   MaxClique clique(kNoLimit);  // 0-1, then 1-2, then 2-3
   CHECK(clique.add({}));

@@ -28,21 +28,6 @@ TEST_CASE("Random outliers join keyframes that odometry does not, in their box",
   CHECK(farthest > 2.9);  // 500 x 2 coordinates: below it with probability 1e-14
 }
 
-TEST_CASE("Outliers of one seed are the same, of two seeds are not", "[outliers]") {
-  const RandomOutlierModel model{.robot = 0, .keyframes = 100};
-  std::mt19937 one(3), same(3), other(4);
-  const auto first = random_outliers(20, model, one);
-  const auto second = random_outliers(20, model, same);
-  const auto third = random_outliers(20, model, other);
-  bool all_alike = true;
-  for (std::size_t n = 0; n < first.size(); ++n) {
-    CHECK(first[n].from == second[n].from);
-    CHECK(first[n].T_from_to.matrix() == second[n].T_from_to.matrix());
-    all_alike = all_alike && first[n].from == third[n].from;
-  }
-  CHECK_FALSE(all_alike);
-}
-
 TEST_CASE("Two keyframes are too few for an outlier", "[outliers]") {
   std::mt19937 rng(1);
   CHECK_THROWS_WITH(random_outliers(1, {.robot = 0, .keyframes = 2}, rng),

@@ -8,15 +8,10 @@
 #include <utility>
 #include <vector>
 
-#include "apps/lab/pgo/member_team.hpp"
-#include "apps/lab/pgo/odometry_start.hpp"
-#include "apps/lab/pgo/team_graph_file.hpp"
 #include "modules/outlier_rejection/pcm.hpp"
 #include "modules/outlier_rejection/witnessed_pair.hpp"
-#include "modules/pose_graph/tree_newton.hpp"
 #include "modules/recorded_graph/recorded_graph.hpp"
 #include "runtime/yaml_config.hpp"
-#include "test/modules/outlier_rejection/chain.hpp"
 #include "test/support/shared_data.hpp"
 
 namespace km {
@@ -92,55 +87,6 @@ TEST_CASE("PCM keeps exactly the true half of DOOR-SLAM's simulated closures", "
     CHECK(pcm.inliers().size() == true_per_pair);
     CHECK(pcm.size() == (name.starts_with("clean") ? 1 : 2) * true_per_pair);
   }
-}
-
-// The closures that the robust optimiser keeps, which sees the graph of the whole team and finds
-// out itself how noisy closures are.
-std::set<ClosureId> kept_by_optimiser(const std::filesystem::path& folder) {
-  const TeamGraph graph = read_team_folder(folder);
-  MemberTeam team(graph, 3, odometry_start(graph), [](SessionGraph part, TreePlace place) {
-    return std::make_unique<TreeNewton>(std::move(part), std::move(place), TreeNewtonOptions{});
-  });
-  RoundMeter meter(graph.robots(), {});
-  while (team.rounds() < 200 && team.step(meter)) {
-  }
-  REQUIRE(team.done());
-  const std::vector<bool> kept = team.kept();
-  std::set<ClosureId> closures;
-  for (std::size_t k = 0; k < kept.size(); ++k) {
-    const auto id_of = [&](Eigen::Index pose) { return graph.ids[static_cast<std::size_t>(pose)]; };
-    if (kept[k]) closures.insert(closure_id(id_of(graph.edges[k].i), id_of(graph.edges[k].j)));
-  }
-  return closures;
-}
-
-TEST_CASE("The shipped configuration keeps a good set of the tunnels closures", "[recorded]") {
-  const auto files = team("multi_robot/tunnels_8robots/robot", 8, ".csv");
-  if (files.empty()) return;
-  const auto config = load_config<PcmConfig>(YAML::LoadFile("config/datasets/tunnels.yaml"));
-  const std::vector<Closure> closures = recorded_closures(files);
-  REQUIRE(closures.size() == 96 + 3548);
-  const std::set<ClosureId> good = kept_by_optimiser(files.front().parent_path());
-
-  std::size_t kept = 0, kept_good = 0, all_good = 0;
-  for (const Closure& closure : closures)
-    if (closure.from.id.robot != closure.to.id.robot && good.contains(closure.id())) ++all_good;
-  for (const auto& [pair, pcm] : reject_outliers(closures, config)) {
-    CAPTURE(pair.first, pair.second);
-    CHECK(pcm.clique().proven());
-    if (pair.first == pair.second) continue;
-    const std::vector<ClosureId> inliers = pcm.inliers();
-    const auto among_good = static_cast<std::size_t>(std::count_if(
-        inliers.begin(), inliers.end(), [&](const ClosureId& id) { return good.contains(id); }));
-    CHECK(among_good * 100 >= inliers.size() * 88);  // measured: 91 % or more
-    kept += inliers.size();
-    kept_good += among_good;
-    // Every pair of robots has a fifth of its closures agreeing: all end in one frame.
-    CHECK(inliers.size() * 5 >= pcm.size());
-  }
-  // Measured: 2322 are kept, of which 2284 are among the 2855 good ones.
-  CHECK(kept_good * 100 >= kept * 97);
-  CHECK(kept_good * 100 >= all_good * 75);
 }
 
 TEST_CASE("Every two robots in tunnels are joined by witnesses", "[recorded]") {

@@ -7,9 +7,6 @@
 
 #include "modules/place_recognition/bow_database.hpp"
 #include "modules/place_recognition/place_database.hpp"
-#include "modules/place_recognition/vocabulary_file.hpp"
-#include "modules/place_recognition/vocabulary_training.hpp"
-#include "test/modules/place_recognition/synthetic_orb.hpp"
 #include "test/modules/place_recognition/toy_vocabulary.hpp"
 
 namespace km {
@@ -104,14 +101,6 @@ TEST_CASE("The inverted index finds the same images as comparing every pair",
   CHECK(std::equal(few.begin(), few.end(), found.begin()));
 }
 
-TEST_CASE("Equal scores are listed by index", "[place_recognition]") {
-  BowDatabase database(10);
-  for (int i = 0; i < 5; ++i) database.add(toy_vector({2, 4}));
-  const auto found = database.query(toy_vector({4, 5}), {.max_matches = 3});
-  REQUIRE(found.size() == 3);
-  for (std::size_t i = 0; i < 3; ++i) CHECK(found[i] == BowMatch{i, 0.5F});
-}
-
 TEST_CASE("An empty database, range or vector matches nothing", "[place_recognition]") {
   BowDatabase database(10);
   CHECK(database.query(toy_vector({4})).empty());
@@ -136,42 +125,10 @@ TEST_CASE("An invalid vector is refused and changes nothing", "[place_recognitio
   CHECK(database.query(toy_vector({1})).empty());
 }
 
-// checks.md L5: the demonstration of DBoW2.
-TEST_CASE("Each of four images matches itself best, after a file as before",
-          "[place_recognition]") {
-  SyntheticOrb world(3, 4);
-  const auto images = world.images(4, 300, 5);
-  const VocabularyData trained = train_vocabulary(images, {.branching = 9, .depth = 3});
-  const Vocabulary vocabulary(trained);
-  const Vocabulary loaded(deserialize(serialize(trained), "memory"));
-  BowDatabase database(vocabulary.size());
-  for (const auto& image : images) database.add(vocabulary.transform(image));
-  for (std::size_t i = 0; i < images.size(); ++i) {
-    const auto found = database.query(loaded.transform(images[i]));
-    REQUIRE_FALSE(found.empty());
-    CHECK(found[0].index == i);
-    CHECK(found[0].score == Approx(1.0F).margin(1e-5));  // sum of 300 floats
-  }
-}
-
 constexpr std::size_t kWords = 100;
 
 Stamp at_s(double seconds) {
   return nanoseconds(1000.0 + seconds);
-}
-
-// checks.md L1.
-TEST_CASE("The same view seen by two robots is found once", "[place_recognition]") {
-  PlaceDatabase robot_0({}, kWords);
-  const BowVector view = toy_vector({1, 2, 3, 4});
-  robot_0.add(view, at_s(0));
-  const CandidateSearch first = robot_0.search(view, 0.0);  // robot 1, pose 0
-  CHECK(first.candidates.empty());
-  const CandidateSearch second = robot_0.search(view, score(view, view));  // robot 1, pose 1
-  CHECK(second.normalizer == Approx(1.0));
-  REQUIRE(second.candidates.size() == 1);
-  CHECK(second.candidates[0].index == 0);
-  CHECK(second.candidates[0].similarity == Approx(1.0));
 }
 
 TEST_CASE("The threshold applies to the ratio of scores", "[place_recognition]") {

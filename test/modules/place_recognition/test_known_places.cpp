@@ -1,6 +1,7 @@
 #include "modules/place_recognition/known_places.hpp"
 
 #include <catch2/catch.hpp>
+#include <cmath>
 #include <vector>
 
 namespace km {
@@ -98,8 +99,10 @@ TEST_CASE("A place is new if its pose is far, turned, uncertain or of unknown de
   uncertain.covariance.diagonal().tail<3>().array() += 0.04;  // three times 0.2 m
   CHECK(places.novelty_of(uncertain, std::vector<KeyframeIndex>{5}) == PlaceNovelty::kNew);
 
-  places.add_view(keyframe(5), 0.0);
-  CHECK(novelty(places, 25, {5}) == PlaceNovelty::kNew);
+  for (const double unknown_m : {0.0, std::nan("")}) {
+    places.add_view(keyframe(5), unknown_m);
+    CHECK(novelty(places, 25, {5}) == PlaceNovelty::kNew);
+  }
 }
 
 TEST_CASE("A closure holds in either direction", "[place_recognition]") {

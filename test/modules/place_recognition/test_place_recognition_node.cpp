@@ -224,27 +224,6 @@ TEST_CASE("Keyframes before a loss of odometry are candidates at once",
     CHECK(robot.candidates.received[k].match.index < 3);
 }
 
-TEST_CASE("A history that arrives backwards gives the candidates of one in order",
-          "[place_recognition][node]") {
-  const auto candidates_of = [](bool backwards) {
-    Robot robot(kSelf, {.similarity_threshold = 0.2, .new_view_score = 2.0});
-    for (std::uint32_t i = 0; i < 20; ++i)
-      robot.node.step(keyframe({kSelf, i}, {i, i + 1, i + 2, i + 3}));
-    for (std::uint32_t k = 0; k < 30; ++k) {
-      const std::uint32_t i = backwards ? 29 - k : k;
-      robot.node.step(bow({kPeer, i}, {i, i + 1, i + 2, i + 3}, 0.75));
-    }
-    std::map<std::pair<KeyframeId, KeyframeId>, double> found;
-    for (const LoopCandidate& c : robot.candidates.received)
-      found[{c.query, c.match}] = c.similarity;
-    CHECK(found.size() == robot.candidates.received.size());
-    return found;
-  };
-  const auto in_order = candidates_of(false);
-  CHECK(in_order.size() > 20);
-  CHECK(candidates_of(true) == in_order);
-}
-
 TEST_CASE("Keyframes that cannot be compared are reported and change nothing",
           "[place_recognition][node]") {
   Robot robot(kSelf);

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -6,14 +7,13 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
-#include <numeric>
+#include <random>
 #include <set>
 #include <string>
 
 #include "modules/place_recognition/vocabulary.hpp"
 #include "modules/place_recognition/vocabulary_file.hpp"
 #include "modules/place_recognition/vocabulary_training.hpp"
-#include "test/modules/place_recognition/synthetic_orb.hpp"
 #include "test/support/corrupted_input.hpp"
 #include "test/support/temporary_folder.hpp"
 
@@ -32,6 +32,34 @@ int distance(const BinaryDescriptor& a, const BinaryDescriptor& b) {
     bits += std::popcount(static_cast<unsigned>(a[i] ^ b[i]));
   return bits;
 }
+
+// Images of the points of a world: each sighting changes some bits of the descriptor of a point.
+class World {
+ public:
+  explicit World(unsigned seed) : rng_(seed) {
+    for (BinaryDescriptor& point : points_)
+      for (std::uint8_t& byte : point) byte = static_cast<std::uint8_t>(rng_());
+  }
+
+  std::vector<BinaryDescriptor> image(std::size_t sightings) {
+    std::vector<BinaryDescriptor> result;
+    for (std::size_t i = 0; i < sightings; ++i) {
+      result.push_back(points_[rng_() % points_.size()]);
+      for (int flip = 0; flip < 5; ++flip)
+        result.back()[rng_() % 32] ^= static_cast<std::uint8_t>(1U << (rng_() % 8));
+    }
+    return result;
+  }
+  Images images(std::size_t number, std::size_t sightings) {
+    Images result;
+    for (std::size_t i = 0; i < number; ++i) result.push_back(image(sightings));
+    return result;
+  }
+
+ private:
+  std::mt19937 rng_;
+  std::array<BinaryDescriptor, 500> points_;
+};
 
 // Descriptor whose first `bits` bits are set.
 BinaryDescriptor ladder(int bits) {
@@ -75,10 +103,10 @@ TEST_CASE("A descriptor gets the word that plain descent finds", "[place_recogni
   const auto seed = GENERATE(1U, 2U, 3U);
   const int branching = GENERATE(2, 7, 10, 40);
   CAPTURE(seed, branching);
-  SyntheticOrb world(3, seed);
-  const Vocabulary vocabulary(train_vocabulary(world.images(20, 100, 5),
-                                               {.branching = branching, .depth = 3, .seed = seed}));
-  const auto image = world.image(301, 8);
+  World world(seed);
+  const Vocabulary vocabulary(
+      train_vocabulary(world.images(20, 100), {.branching = branching, .depth = 3, .seed = seed}));
+  const auto image = world.image(301);
   const std::vector<std::uint32_t> words = vocabulary.words(image);
   REQUIRE(words.size() == image.size());
   for (std::size_t i = 0; i < image.size(); ++i)
@@ -86,9 +114,9 @@ TEST_CASE("A descriptor gets the word that plain descent finds", "[place_recogni
 }
 
 TEST_CASE("A bag counts every descriptor once, words ascending", "[place_recognition]") {
-  SyntheticOrb world(4, 1);
-  const Vocabulary vocabulary(train_vocabulary(world.images(30, 300, 5), {.depth = 4}));
-  const auto image = world.image(1000, 8);
+  World world(1);
+  const Vocabulary vocabulary(train_vocabulary(world.images(30, 300), {.depth = 4}));
+  const auto image = world.image(1000);
   std::vector<std::uint32_t> words = vocabulary.words(image);
   std::sort(words.begin(), words.end());
   std::vector<std::uint32_t> from_bag;
@@ -139,8 +167,8 @@ TEST_CASE("Weights are term counts times ln(N / n), scaled to norm 1", "[place_r
 }
 
 TEST_CASE("Training depends only on input and seed", "[place_recognition]") {
-  SyntheticOrb world(3, 5);
-  const Images images = world.images(10, 200, 5);
+  World world(5);
+  const Images images = world.images(10, 200);
   const VocabularyTrainingConfig config{.branching = 6, .depth = 3, .seed = 11};
   const VocabularyData first = train_vocabulary(images, config);
   CHECK(train_vocabulary(images, config) == first);
@@ -184,8 +212,8 @@ TEST_CASE("An invalid vocabulary is refused with the reason", "[place_recognitio
 }
 
 VocabularyData small_vocabulary() {
-  SyntheticOrb world(2, 1);
-  return train_vocabulary(world.images(5, 40, 5), {.branching = 4, .depth = 2});
+  World world(1);
+  return train_vocabulary(world.images(5, 40), {.branching = 4, .depth = 2});
 }
 
 TEST_CASE("A vocabulary survives its file, identity and scores included", "[place_recognition]") {
@@ -196,8 +224,8 @@ TEST_CASE("A vocabulary survives its file, identity and scores included", "[plac
   const Vocabulary after = load_vocabulary(folder.path() / "v.kmvoc");
   CHECK(after.data() == data);
   CHECK(after.id() == before.id());
-  SyntheticOrb world(2, 1);
-  const auto image = world.image(100, 8);
+  World world(1);
+  const auto image = world.image(100);
   CHECK(after.transform(image) == before.transform(image));
 }
 
@@ -264,8 +292,8 @@ TEST_CASE("The shipped vocabulary loads, is the documented one, and is small",
   const std::string text(std::istreambuf_iterator<char>(readme), {});
   CHECK_THAT(text, Contains(fingerprint_text(vocabulary.id())));
   CHECK(std::filesystem::file_size(file) < kMaxShippedBytes);
-  SyntheticOrb world(2, 1);
-  const auto image = world.image(100, 5);
+  World world(1);
+  const auto image = world.image(100);
   CHECK(score(vocabulary.transform(image), vocabulary.transform(image)) ==
         Approx(1.0).margin(1e-5));
 }
