@@ -297,7 +297,7 @@ constexpr std::uint32_t kMax = ~0U;
 
 TEST_CASE("Bags survive packing, at about six bits a word", "[place_recognition]") {
   for (const BagOfWords& bag :
-       {BagOfWords{}, {{0, 2}, {1, 1}, {2, 3}}, {{0, kMax}, {kMax - 1, 1}, {kMax, 2}}})
+       std::vector<BagOfWords>{{}, {{0, 2}, {1, 1}, {2, 3}}, {{0, kMax}, {kMax - 1, 1}, {kMax, 2}}})
     CHECK(unpack(pack(bag)) == bag);
   const auto seed = GENERATE(range(0U, 10U));
   const double mean_gap = GENERATE(0.1, 1.0, 8.0, 1e6);
@@ -375,19 +375,13 @@ TEST_CASE("A message that contradicts itself is refused with the reason", "[plac
   constexpr const char* kReason = "the normaliser is no score";
   check_refusals<KeyframeBow>(
       make, {{"of another robot", "a keyframe of another robot than the writer",
-              [](Message& m) {
-      m.writer.robot = 8; }},
-             {"no words", "the words cannot be decoded", [](Message& m) {
-      m.bag[0] = 0x00; }},
+              [](Message& m) { m.writer.robot = 8; }},
+             {"no words", "the words cannot be decoded", [](Message& m) { m.bag[0] = 0x00; }},
              {"no buffer", "words are missing or too many",
-              [](Message& m) {
-      m.wire.bag._buffer = nullptr; }},
-             {{"negative", kReason, [](Message& m) {
-      m.wire.normalizer = -0.1F; }},
-             {"above one", kReason, [](Message& m) {
-      m.wire.normalizer = 1.1F; }},
-             {"not a number", kReason, [](Message& m) {
-      m.wire.normalizer = NAN; }}});
+              [](Message& m) { m.wire.bag._buffer = nullptr; }},
+             {"negative", kReason, [](Message& m) { m.wire.normalizer = -0.1F; }},
+             {"above one", kReason, [](Message& m) { m.wire.normalizer = 1.1F; }},
+             {"not a number", kReason, [](Message& m) { m.wire.normalizer = NAN; }}});
 }
 
 }  // namespace
