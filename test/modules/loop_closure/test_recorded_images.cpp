@@ -8,8 +8,8 @@
 #include "modules/evaluation/trajectory_file.hpp"
 #include "modules/loop_closure/keyframe_features.hpp"
 #include "modules/loop_closure/verifier.hpp"
-#include "modules/sensors/frame_files.hpp"
 #include "modules/sensors/node/euroc_rig.hpp"
+#include "test/support/keyframe_pairs.hpp"
 #include "test/support/random_pose.hpp"
 #include "test/support/recorded_kitchen.hpp"
 #include "test/support/shared_data.hpp"
@@ -35,10 +35,10 @@ std::vector<RecordedKeyframe> load_v1_01(const std::filesystem::path& sequence) 
   const auto files = list_keyframe_pairs(sequence / "keyframes", report);
   std::vector<RecordedKeyframe> keyframes;
   for (std::size_t i = 0; i < files.size(); i += 2) {
-    const StereoPairResult pair = load_stereo_pair(files[i], rig.stereo);
+    const auto pair = load_stereo_pair(files[i], rig.stereo);
     if (pair.status != ImageStatus::kOk) throw std::runtime_error(pair.problem);
     keyframes.push_back({files[i].stamp, pose_at(truth, files[i].stamp, 0.1, 0.0).value(),
-                         extractor.extract(pair.frame)});
+                         extractor.extract(pair.image)});
   }
   return keyframes;
 }
