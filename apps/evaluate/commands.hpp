@@ -10,7 +10,6 @@ namespace km {
 void add_trajectory(CLI::App& app);
 void add_closures(CLI::App& app);
 void add_consistency(CLI::App& app);
-void add_images(CLI::App& app);
 void add_mesh(CLI::App& app);
 void add_copies(CLI::App& app);
 void add_render(CLI::App& app);

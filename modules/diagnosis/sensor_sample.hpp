@@ -7,7 +7,7 @@
 #include "modules/core/frame.hpp"
 #include "modules/core/image_size.hpp"
 #include "modules/core/keyframe.hpp"
-#include "modules/evaluation/images/forward_backward.hpp"
+#include "modules/diagnosis/forward_backward.hpp"
 
 namespace km {
 

@@ -41,7 +41,7 @@ const std::map<std::string, std::set<std::string>> kModuleUses = {
     {"rbcd", {"pose_graph"}},
     {"ros_dds", {"images", "mesh", "objects", "recordings"}},
     {"sensors", {"images", "recordings"}},
-    {"evaluation", {"charts", "images", "mesh", "objects"}},
+    {"evaluation", {"charts", "mesh", "objects"}},
     {"simulation", {"images", "mesh"}},
     {"semantic_mapping", {"mesh"}},
     {"team_map", {"mesh", "semantic_mapping"}},

@@ -1,7 +1,6 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <filesystem>
-#include <sstream>
 #include <string>
 
 #include "test/modules/sensors/euroc_folder.hpp"
@@ -83,62 +82,6 @@ TEST_CASE("Several truths belong to the estimates one by one", "[evaluate]") {
   CHECK_THAT(mismatch.output, Catch::Contains("give one --truth"));
 }
 
-TEST_CASE("images prints the figures of a recording, in any format", "[evaluate]") {
-  const std::string extension = GENERATE(".png", ".jpg");
-  const EurocFolder recording(extension);
-  const TemporaryFolder folder;
-  const std::string json = (folder.path() / "out.json").string();
-  const auto result = run_command(kTool + "images --dataset " + recording.root().string() +
-                                  " --stride 2 --json " + json);
-  CAPTURE(result.output);
-  REQUIRE(result.exit_code == 0);
-  CHECK_THAT(result.output, Catch::Contains("corners a frame") && Catch::Contains("image mean"));
-  CHECK_THAT(folder.read("out.json"),
-             Catch::Contains("\"image mean\": 45") && Catch::Contains("\"frames\": 8"));
-}
-
-TEST_CASE("images compares two recordings over one window", "[evaluate]") {
-  const EurocFolder recording;
-  const EurocFolder other;
-  for (const char* camera : {"cam0/data/", "cam1/data/"})
-    for (int i = 0; i < EurocFolder::kPairs; ++i)
-      other.write_image(camera + std::to_string(EurocFolder::image_stamp(i)) + ".png", 32, 24, 90);
-  const auto result = run_command(kTool + "images --dataset " + recording.root().string() +
-                                  " --compare " + other.root().string() + " --to 0.2");
-  CAPTURE(result.output);
-  REQUIRE(result.exit_code == 0);
-  CHECK_THAT(result.output, Catch::Contains("ratio") && Catch::Contains("  <--\n") &&
-                                Catch::Contains("rows differ by more than 25 %"));
-  const auto frames = [&](const std::string& window) {
-    const std::string output = run_command(kTool + "images --dataset " + recording.root().string() +
-                                           " --compare " + other.root().string() + window)
-                                   .output;
-    std::istringstream row(output.substr(output.find("  frames ") + 9));
-    int reference = 0;
-    int compared = 0;
-    row >> reference >> compared;
-    return std::pair(reference, compared);
-  };
-  CHECK(frames(" --to 0.2") == std::pair(4, 4));
-  CHECK(frames(" --to 0.2 --compare-from 0.1") == std::pair(4, 6));
-}
-
-TEST_CASE("images refuses unreadable input", "[evaluate]") {
-  const auto missing = run_command(kTool + "images --dataset /none");
-  CHECK(missing.exit_code == 1);
-  CHECK_THAT(missing.output, Catch::StartsWith("kimera_multi_evaluate: /none"));
-  const EurocFolder recording;
-  const std::string command = kTool + "images --dataset " + recording.root().string();
-  // The error comes before the first recording is read, which would show this fault of it.
-  std::filesystem::remove(recording.image("cam1", 3));
-  const auto other = run_command(command + " --compare /none");
-  CHECK(other.exit_code == 1);
-  CHECK_THAT(other.output, Catch::StartsWith("kimera_multi_evaluate: /none: no such folder"));
-  CHECK(run_command(command + " --stride 0").exit_code == 1);
-  CHECK(run_command(command + " --from 5").exit_code == 1);
-  CHECK(run_command(command + " --json /none/out.json").exit_code == 1);
-}
-
 TEST_CASE("closures judges the folders of a run", "[evaluate]") {
   const EurocFolder recording;
   const Files files;
@@ -187,7 +130,7 @@ TEST_CASE("Bad input ends with code 1 and one line that names it", "[evaluate]")
   CHECK_THAT(broken.output, Catch::Contains("bad.tum line 2: 1 fields, expected 8"));
   CHECK(run_command(kTool).exit_code == 1);
   CHECK(run_command(kTool + "trajectory --truth " + files.truth).exit_code == 1);
-  for (const char* word : {"bogus", "trajectory --bogus", "images --dataset /none --bogus"}) {
+  for (const char* word : {"bogus", "trajectory --bogus"}) {
     const auto unknown = run_command(kTool + word);
     CAPTURE(unknown.output);
     CHECK(unknown.exit_code == 1);

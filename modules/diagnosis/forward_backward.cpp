@@ -1,4 +1,4 @@
-#include "modules/evaluation/images/forward_backward.hpp"
+#include "modules/diagnosis/forward_backward.hpp"
 
 #include <cmath>
 #include <limits>

@@ -29,7 +29,7 @@ struct ForwardBackward {
                                                             const std::vector<cv::Point2f>& points,
                                                             std::vector<cv::Point2f> starts_b = {});
 
-/// Corners for all figures: Shi-Tomasi, quality 0.01, 15 px apart, without a limit on their number.
+/// Shi-Tomasi corners, strongest first, quality 0.01, 15 px apart, without a limit on their number.
 [[nodiscard]] std::vector<cv::Point2f> corners_of(const cv::Mat& image);
 
 }  // namespace km
