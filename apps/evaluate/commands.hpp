@@ -11,7 +11,6 @@ void add_trajectory(CLI::App& app);
 void add_closures(CLI::App& app);
 void add_consistency(CLI::App& app);
 void add_mesh(CLI::App& app);
-void add_copies(CLI::App& app);
 void add_render(CLI::App& app);
 void add_objects(CLI::App& app);
 void add_colmap(CLI::App& app);
