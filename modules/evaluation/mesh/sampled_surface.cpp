@@ -172,7 +172,24 @@ std::uint64_t edge_key(std::uint32_t a, std::uint32_t b) {
   return std::uint64_t{std::min(a, b)} << 32 | std::max(a, b);
 }
 
-}  // namespace
+// Boundary of a mesh: edges that only one face has. Vertices at the same position count as one.
+class MeshBoundary {
+ public:
+  explicit MeshBoundary(const LabelledMesh& mesh);
+
+  // The edge from corner k to corner k + 1 (of 3) of a face.
+  [[nodiscard]] bool has_edge(std::size_t face, int k) const {
+    return (faces_[face] >> k & 1U) != 0;
+  }
+
+  // Whether corner k of a face is on an edge of the boundary, possibly of another face.
+  [[nodiscard]] bool has_corner(std::size_t face, int k) const {
+    return (faces_[face] >> (3 + k) & 1U) != 0;
+  }
+
+ private:
+  std::vector<std::uint8_t> faces_;  // three bits of edges, three of corners
+};
 
 MeshBoundary::MeshBoundary(const LabelledMesh& mesh) : faces_(mesh.faces.size(), 0) {
   const std::vector<std::uint32_t> vertex = first_at_place(mesh);
@@ -199,8 +216,6 @@ MeshBoundary::MeshBoundary(const LabelledMesh& mesh) : faces_(mesh.faces.size(),
       if (on_rim[corner(face, k)])
         faces_[face] = static_cast<std::uint8_t>(faces_[face] | 1U << (3 + k));
 }
-
-namespace {
 
 constexpr std::size_t kNeighbours = 8;  // samples whose faces are measured
 
@@ -231,6 +246,13 @@ class NearestWithin : public nanoflann::KNNResultSet<float, std::uint32_t> {
   float limit2_;
 };
 
+// The point of a triangle nearest to a given point.
+struct TrianglePoint {
+  double distance_m = 0.0;
+  int edge = -1;    // The point is on the edge between corners `edge` and `edge` + 1 (of 3).
+  int corner = -1;  // The point is on this corner. If both are -1, it is inside the face.
+};
+
 // Nearest point on the edge from corner `edge`, at a, to the next corner, at b.
 TrianglePoint nearest_on_edge(const Eigen::Vector3d& point, const Eigen::Vector3d& a,
                               const Eigen::Vector3d& b, int edge) {
@@ -243,8 +265,7 @@ TrianglePoint nearest_on_edge(const Eigen::Vector3d& point, const Eigen::Vector3
   return {distance_m, edge, -1};
 }
 
-}  // namespace
-
+// Nearest point of the triangle a, b, c, which may be degenerate.
 TrianglePoint nearest_on_triangle(const Eigen::Vector3d& point, const Eigen::Vector3d& a,
                                   const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
   const Eigen::Vector3d normal = (b - a).cross(c - a);
@@ -261,6 +282,8 @@ TrianglePoint nearest_on_triangle(const Eigen::Vector3d& point, const Eigen::Vec
        nearest_on_edge(point, c, a, 2)},
       [](const TrianglePoint& p, const TrianglePoint& q) { return p.distance_m < q.distance_m; });
 }
+
+}  // namespace
 
 struct NearestSurface::Tree {
   Tree(const LabelledMesh& of, const SurfaceSamples& samples_of)

@@ -64,25 +64,6 @@ struct SurfaceSamples {
     const NearbyCells* only_near = nullptr,
     std::size_t max_points = std::numeric_limits<std::size_t>::max());
 
-/// Boundary of a mesh: edges that only one face has. Vertices at the same position count as one.
-class MeshBoundary {
- public:
-  explicit MeshBoundary(const LabelledMesh& mesh);
-
-  /// The edge from corner k to corner k + 1 (of 3) of a face.
-  [[nodiscard]] bool has_edge(std::size_t face, int k) const {
-    return (faces_[face] >> k & 1U) != 0;
-  }
-
-  /// Whether corner k of a face is on an edge of the boundary, possibly of another face.
-  [[nodiscard]] bool has_corner(std::size_t face, int k) const {
-    return (faces_[face] >> (3 + k) & 1U) != 0;
-  }
-
- private:
-  std::vector<std::uint8_t> faces_;  // three bits of edges, three of corners
-};
-
 /// The nearest sample and face for a point.
 struct NearestSample {
   std::uint32_t sample = 0;  ///< The nearest sample.
@@ -113,17 +94,5 @@ class NearestSurface {
   struct Tree;
   std::unique_ptr<Tree> tree_;
 };
-
-/// The point of a triangle nearest to a given point.
-struct TrianglePoint {
-  double distance_m = 0.0;
-  int edge = -1;    ///< The point is on the edge between corners `edge` and `edge` + 1 (of 3).
-  int corner = -1;  ///< The point is on this corner. If both are -1, it is inside the face.
-};
-
-/// Nearest point of the triangle a, b, c, which may be degenerate.
-[[nodiscard]] TrianglePoint nearest_on_triangle(const Eigen::Vector3d& point,
-                                                const Eigen::Vector3d& a, const Eigen::Vector3d& b,
-                                                const Eigen::Vector3d& c);
 
 }  // namespace km

@@ -3,6 +3,8 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "modules/mesh/mesh_file.hpp"
 #include "test/modules/evaluation/mesh/shapes.hpp"
@@ -81,27 +83,6 @@ TEST_CASE("mesh starts registration at the transform of the trajectories", "[eva
              Catch::Contains("give one --trajectory-truth for all --trajectory"));
 }
 
-TEST_CASE("mesh refuses incomparable input by name", "[evaluate]") {
-  const Meshes meshes;
-  const std::string truth = kMeshTool + "mesh --truth " + meshes.truth.string() + " --estimate ";
-  CHECK(run_command(truth + "/none.ply").output ==
-        "kimera_multi_evaluate: /none.ply: cannot be opened: no such file\n");
-  const auto palette =
-      meshes.folder.write("few.csv", "name,red,green,blue,alpha,id\nfloor,1,2,3,255,1\n");
-  const auto mismatch = run_command(truth + meshes.b.string() + " --palette " + palette.string());
-  CHECK(mismatch.exit_code == 1);
-  CHECK_THAT(mismatch.output,
-             Catch::Contains("world.ply: label 2 is not in") && Catch::Contains("few.csv"));
-  CHECK_THAT(run_command(truth + meshes.b.string() + " --palette /none.csv").output,
-             Catch::Contains("/none.csv: no such file"));
-  LabelledMesh cloud = room();
-  cloud.faces.clear();
-  write_mesh(meshes.a, cloud);
-  CHECK_THAT(run_command(truth + meshes.a.string()).output,
-             Catch::Contains("a/mesh: no faces, so no surface to compare"));
-  CHECK(run_command(truth + meshes.b.string() + " --crop 0").exit_code == 1);
-}
-
 TEST_CASE("render draws one picture per view", "[evaluate]") {
   const Meshes meshes;
   meshes.folder.write("label_palette.csv", kPalette);
@@ -150,19 +131,36 @@ TEST_CASE("render stands a map upright by a reference trajectory", "[evaluate]")
   CHECK_THAT(many.output, Catch::Contains("more --reference than --trajectory"));
 }
 
-TEST_CASE("render refuses input that it cannot draw", "[evaluate]") {
+TEST_CASE("mesh and render refuse input by name", "[evaluate]") {
   const Meshes meshes;
-  const std::string command = kMeshTool + "render --mesh " + meshes.truth.string() + " --output ";
-  CHECK_THAT(run_command(command + "out.jpg").output, Catch::Contains("out.jpg: pictures are PNG"));
-  CHECK_THAT(run_command(command + "/none/out.png").output,
-             Catch::Contains("/none/out.png: cannot be written"));
-  const std::string good = command + meshes.png.string();
-  CHECK_THAT(run_command(good + " --size 10x10").output, Catch::Contains("--size 10x10: not"));
-  CHECK_THAT(run_command(good + " --size 320").output, Catch::Contains("--size 320: not"));
-  CHECK_THAT(run_command(good + " --view below").output, Catch::Contains("no view 'below'"));
-  CHECK_THAT(run_command(good + " --color own").output,
-             Catch::Contains("its vertices have no colours"));
-  CHECK(run_command(good + " --color red").exit_code == 1);
+  LabelledMesh cloud = room();
+  cloud.faces.clear();
+  write_mesh(meshes.a, cloud);
+  const std::string few =
+      meshes.folder.write("few.csv", "name,red,green,blue,alpha,id\nfloor,1,2,3,255,1\n").string();
+  const std::string b = meshes.b.string();
+  const std::string mesh = "mesh --truth " + meshes.truth.string() + " --estimate ";
+  const std::string render = "render --mesh " + meshes.truth.string() + " --output ";
+  const std::string drawn = render + meshes.png.string();
+  const std::vector<std::pair<std::string, std::string>> refused = {
+      {mesh + "/none.ply", "kimera_multi_evaluate: /none.ply: cannot be opened: no such file"},
+      {mesh + b + " --palette " + few, "world.ply: label 2 is not in " + few},
+      {mesh + b + " --palette /none.csv", "/none.csv: no such file"},
+      {mesh + meshes.a.string(), "a/mesh: no faces, so no surface to compare"},
+      {mesh + b + " --crop 0", "--crop"},
+      {render + "out.jpg", "out.jpg: pictures are PNG"},
+      {render + "/none/out.png", "/none/out.png: cannot be written"},
+      {drawn + " --size 10x10", "--size 10x10: not"},
+      {drawn + " --size 320", "--size 320: not"},
+      {drawn + " --view below", "no view 'below'"},
+      {drawn + " --color own", "its vertices have no colours"},
+      {drawn + " --color red", "--color"}};
+  for (const auto& [arguments, message] : refused) {
+    const auto result = run_command(kMeshTool + arguments);
+    CAPTURE(arguments);
+    CHECK(result.exit_code == 1);
+    CHECK_THAT(result.output, Catch::Contains(message));
+  }
 }
 
 }  // namespace km

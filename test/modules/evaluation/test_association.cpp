@@ -26,7 +26,7 @@ TEST_CASE("Poses between stamps are interpolated", "[evaluation]") {
   CHECK(pose_at(poses, kSecond / 2, 0.0, 0.0)->isApprox(screw(0.5), 1e-12));  // exact stamp
 }
 
-TEST_CASE("Across a gap only a near pose counts", "[evaluation]") {
+TEST_CASE("Across a gap and outside the trajectory only a near pose counts", "[evaluation]") {
   const auto poses = sample(0.0, 1.0, 3, screw);
   CHECK_FALSE(pose_at(poses, kSecond * 3 / 2, 0.9, 0.1));
   CHECK(pose_at(poses, kSecond * 3 / 2, 1.0, 0.1));
@@ -36,12 +36,8 @@ TEST_CASE("Across a gap only a near pose counts", "[evaluation]") {
   const auto near_third = pose_at(poses, 2 * kSecond - kSecond / 20, 0.9, 0.1);
   REQUIRE(near_third);
   CHECK(near_third->isApprox(screw(2.0), 1e-12));
-}
-
-TEST_CASE("Outside the trajectory only a pose close in time is returned", "[evaluation]") {
-  const auto poses = sample(1.0, 10.0, 11, screw);
-  CHECK(pose_at(poses, kSecond - 1000, 0.1, 0.01));
-  CHECK_FALSE(pose_at(poses, kSecond - kSecond / 10, 0.1, 0.01));
+  CHECK(pose_at(poses, -1000, 0.1, 0.01));
+  CHECK_FALSE(pose_at(poses, -kSecond / 10, 0.1, 0.01));
   CHECK(pose_at(poses, 2 * kSecond + 1000, 0.1, 0.01));
   CHECK_FALSE(pose_at(poses, 3 * kSecond, 0.1, 0.01));
   CHECK_FALSE(pose_at({}, 0, 0.1, 0.01));

@@ -28,17 +28,14 @@ TeamError error_of(const std::vector<StampedPose>& truth, const std::vector<Stam
   return trajectory_error({&input, 1}, options);
 }
 
-// Corners of a square in the plane, visited in turn. Heights of (+d, -d, +d, -d) correlate neither
-// with x nor with y and have mean zero, so that the best alignment is the identity.
-SE3 corner(int i, double raise) {
-  const double x = i % 4 == 0 || i % 4 == 3 ? 1.0 : -1.0;
-  const double y = i % 4 < 2 ? 1.0 : -1.0;
-  return make_pose(Eigen::Matrix3d::Identity(), {x, y, i % 2 == 0 ? raise : -raise});
-}
-
-std::vector<StampedPose> square(double raise) {
+// Corners of a square in the plane, visited in turn.
+std::vector<StampedPose> square() {
   std::vector<StampedPose> poses;
-  for (int i = 0; i < 8; ++i) poses.push_back({(i + 1) * kSecond, corner(i, raise)});
+  for (int i = 0; i < 8; ++i) {
+    const double x = i % 4 == 0 || i % 4 == 3 ? 1.0 : -1.0;
+    const double y = i % 4 < 2 ? 1.0 : -1.0;
+    poses.push_back({(i + 1) * kSecond, make_pose(Eigen::Matrix3d::Identity(), {x, y, 0.0})});
+  }
   return poses;
 }
 
@@ -63,15 +60,6 @@ TEST_CASE("A moved copy of the truth has no error", "[evaluation]") {
   CHECK(similar.joint.position_m.max < 1e-9);
   CHECK(similar.joint.rpe_translation_m.max < 1e-9);
   CHECK(error_of(truth, moved(truth, T, 0.25)).joint.position_m.rmse > 0.1);
-}
-
-TEST_CASE("The absolute error of a saddle is its height", "[evaluation]") {
-  const TeamError team = error_of(square(0.0), square(0.05));
-  CHECK(team.joint.position_m.rmse == Approx(0.05));
-  CHECK(team.joint.position_m.mean == Approx(0.05));
-  CHECK(team.joint.position_m.median == Approx(0.05));
-  CHECK(team.joint.position_m.max == Approx(0.05));
-  CHECK(team.joint.rotation_deg.max < 1e-4);
 }
 
 TEST_CASE("Relative errors are the drift over the delta", "[evaluation]") {
@@ -99,7 +87,7 @@ TEST_CASE("Relative errors are the drift over the delta", "[evaluation]") {
 
 TEST_CASE("One alignment for a team shows the distance between its robots", "[evaluation]") {
   // Two perfect estimates, the second 6 cm too high: the best compromise errs by 3 cm everywhere.
-  const auto truth = square(0.0);
+  const auto truth = square();
   const auto lifted =
       moved(truth, make_pose(Eigen::Matrix3d::Identity(), Eigen::Vector3d(0.0, 0.0, 0.06)));
   const std::vector<TrajectoryInput> inputs = {{"a", truth, truth, {}}, {"b", truth, lifted, {}}};
@@ -128,6 +116,10 @@ TEST_CASE("Trajectories that cannot be compared are refused by name", "[evaluati
   const auto elsewhere = sample(100.0, 10.0, 100, curve);
   CHECK_THROWS_WITH(error_of(truth, elsewhere),
                     Catch::StartsWith("robot: only 0 of its 100 poses fall on the truth's time"));
+  const std::vector<TrajectoryInput> late = {{"late", truth, elsewhere, std::nullopt}};
+  CHECK_THROWS_WITH(align_surroundings(late),
+                    "late: none of its 100 poses falls on the truth's time");
+  CHECK_THROWS_AS(align_surroundings({}), std::invalid_argument);
   CHECK_THROWS_AS(error_of(truth, {}), std::invalid_argument);
   CHECK_THROWS_AS(error_of({}, truth), std::invalid_argument);
   CHECK_THROWS_AS(trajectory_error({}), std::invalid_argument);
@@ -169,70 +161,36 @@ std::vector<PosePair> pairs_of(int count, const Truth& truth, const Estimate& es
   return pairs;
 }
 
-TEST_CASE("Drift lengths are the multiples of 1, 2 and 5 up to half the path", "[segment_error]") {
+TEST_CASE("Drift is measured over multiples of 1, 2 and 5 up to half the path", "[segment_error]") {
   CHECK(segment_lengths(300.0) == std::vector<double>{10.0, 20.0, 50.0, 100.0});
   CHECK(segment_lengths(5.43) == std::vector<double>{0.2, 0.5, 1.0, 2.0});
   CHECK(segment_lengths(0.05).size() == 2);
   CHECK(segment_lengths(0.0).empty());
+  CHECK(segment_errors(std::vector<PosePair>{}).lengths_m.empty());
 }
 
-TEST_CASE("A straight line of the wrong scale drifts by exactly its scale error",
+TEST_CASE("Drift has the error of the scale, and of the rotation per metre, in any frame",
           "[segment_error]") {
   const double scale = GENERATE(0.9, 1.0, 1.03);
-  const double step_m = 0.3;  // no divisor of the lengths
-  const auto line = [=](double by) {
-    return [=](int i) { return make_pose(so3_exp({0.1, 0.2, 0.3}), {by * step_m * i, 0.0, 0.0}); };
+  const double step_m = 0.3;   // no divisor of the lengths
+  const double turn = 0.0005;  // [rad] a step, about the direction of motion
+  const SE3 T_other = make_pose(so3_exp({0.5, -0.3, 1.1}), {10.0, -4.0, 2.0});
+  const auto truth = [=](int i) {
+    return make_pose(Eigen::Matrix3d::Identity(), {step_m * i, 0.0, 0.0});
   };
-  const auto errors = segment_errors(pairs_of(200, line(1.0), line(scale)));
-  REQUIRE_FALSE(errors.translation_percent.empty());
+  const auto estimate = [=](int i) {
+    return T_other * make_pose(so3_exp({turn * i, 0.0, 0.0}), {scale * step_m * i, 0.0, 0.0});
+  };
+  const auto pairs = pairs_of(200, truth, estimate);
+  const auto errors = segment_errors(pairs);
   CHECK(errors.lengths_m == std::vector<double>{2.0, 5.0, 10.0, 20.0});
+  REQUIRE_FALSE(errors.translation_percent.empty());
   for (std::size_t i = 0; i < errors.translation_percent.size(); ++i) {
     CHECK(errors.translation_percent[i] == Approx(100.0 * std::abs(scale - 1.0)).margin(1e-9));
-    CHECK(errors.rotation_deg_per_m[i] == Approx(0.0).margin(1e-6));
+    CHECK(errors.rotation_deg_per_m[i] == Approx(kDegrees * turn / step_m).epsilon(1e-6));
   }
-  const auto corrected = segment_errors(pairs_of(200, line(1.0), line(scale)), 1.0 / scale);
-  for (const double percent : corrected.translation_percent)
+  for (const double percent : segment_errors(pairs, 1.0 / scale).translation_percent)
     CHECK(percent == Approx(0.0).margin(1e-9));
-}
-
-TEST_CASE("A constant error of rotation is measured per metre", "[segment_error]") {
-  const double step_m = 0.25;
-  const double turn = 0.002;  // [rad] a step
-  const auto truth = [=](int i) {
-    return make_pose(Eigen::Matrix3d::Identity(), {step_m * i, 0, 0});
-  };
-  const auto turned = [=](int i) {
-    return make_pose(so3_exp({0.0, 0.0, turn * i}), {step_m * i, 0, 0});
-  };
-  const auto errors = segment_errors(pairs_of(100, truth, turned));
-  for (const double rate : errors.rotation_deg_per_m)
-    CHECK(rate == Approx(kDegrees * turn / step_m).epsilon(1e-9));
-}
-
-TEST_CASE("Drift does not depend on the frame of the estimate", "[segment_error]") {
-  const SE3 T_other = make_pose(so3_exp({0.5, -0.3, 1.1}), {10.0, -4.0, 2.0});
-  const auto truth = [](int i) { return curve(0.05 * i); };
-  const auto estimate = [](int i) {
-    return curve(0.05 * i) * make_pose(so3_exp({0.001 * i, 0.0, 0.0}), {0.0, 0.002 * i, 0.0});
-  };
-  const auto moved = [&](int i) { return T_other * estimate(i); };
-  const auto a = segment_errors(pairs_of(200, truth, estimate));
-  const auto b = segment_errors(pairs_of(200, truth, moved));
-  REQUIRE(a.translation_percent.size() == b.translation_percent.size());
-  for (std::size_t i = 0; i < a.translation_percent.size(); ++i)
-    CHECK(a.translation_percent[i] == Approx(b.translation_percent[i]).margin(1e-9));
-}
-
-TEST_CASE("Lengths beyond the path give no errors and invalid lengths are refused",
-          "[segment_error]") {
-  const auto line = [](int i) { return make_pose(Eigen::Matrix3d::Identity(), {0.1 * i, 0, 0}); };
-  const auto pairs = pairs_of(11, line, line);
-  const double lengths_m[] = {0.5, 2.0};
-  const auto errors = segment_errors(pairs, lengths_m);
-  CHECK(errors.lengths_m == std::vector<double>{0.5});
-  const double bad[] = {0.0};
-  CHECK_THROWS_AS(segment_errors(pairs, bad), std::invalid_argument);
-  CHECK(segment_errors(std::vector<PosePair>{}).lengths_m.empty());
 }
 
 constexpr Stamp kStep = 100'000'000;
@@ -267,16 +225,6 @@ TEST_CASE("A wrong heading has less effect on a long path than on a short one",
   };
   CHECK(heading_error(2) > 0.09);
   CHECK(heading_error(200) < 0.005);
-}
-
-TEST_CASE("Trajectories without common time are refused by name", "[surroundings_alignment]") {
-  const auto truth = straight_way(3);
-  auto late = truth;
-  for (StampedPose& pose : late) pose.stamp += 1000 * kStep;
-  const std::vector<TrajectoryInput> inputs = {{"late", truth, late, std::nullopt}};
-  CHECK_THROWS_WITH(align_surroundings(inputs),
-                    "late: none of its 3 poses falls on the truth's time");
-  CHECK_THROWS_AS(align_surroundings({}), std::invalid_argument);
 }
 
 }  // namespace

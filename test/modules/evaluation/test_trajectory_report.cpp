@@ -15,7 +15,8 @@ const std::vector<TrajectoryInput> kInputs = {{"alpha", kTruePoses, kTruePoses, 
 
 }  // namespace
 
-TEST_CASE("The table has a line per estimate and one for a team", "[evaluation]") {
+TEST_CASE("The table has a line per estimate and one for a team, the JSON an object",
+          "[evaluation]") {
   const std::string team = to_table(trajectory_error(kInputs));
   CHECK(occurrences(team, "\n") == 5);
   CHECK_THAT(team, Catch::Contains("alpha") && Catch::Contains("\nteam"));
@@ -23,12 +24,9 @@ TEST_CASE("The table has a line per estimate and one for a team", "[evaluation]"
   const std::string one = to_table(trajectory_error({kInputs.data(), 1}));
   CHECK(occurrences(one, "\n") == 3);
   CHECK_THAT(one, !Catch::Contains("team"));
-}
-
-TEST_CASE("The JSON holds every robot and the team", "[evaluation]") {
-  const std::string text = json_text(trajectory_error(kInputs));
-  CHECK(occurrences(text, "\"position_m\"") == 3);
-  CHECK_THAT(text, Catch::Contains("\"name\": \"alpha\"") &&
+  const std::string json = json_text(trajectory_error(kInputs));
+  CHECK(occurrences(json, "\"position_m\"") == 3);
+  CHECK_THAT(json, Catch::Contains("\"name\": \"alpha\"") &&
                        Catch::Contains("\"completeness\": 1") && Catch::Contains("\"pairs\": 200"));
 }
 
@@ -63,13 +61,10 @@ TEST_CASE("The plot draws a shared truth once and every estimate", "[evaluation]
       CHECK(series.points[i].y == Approx(kTruePoses[i].T.translation().y()).margin(kRounding_m));
     }
   }
-}
-
-TEST_CASE("The plot omits the truth before and after the estimates", "[evaluation]") {
+  // The truth before and after the estimates is left out.
   const std::vector<StampedPose> part(kTruePoses.begin() + 40, kTruePoses.begin() + 60);
   const std::vector<TrajectoryInput> inputs = {{"part", kTruePoses, part, {}}};
-  const Plot plot = plot_from_above(inputs, trajectory_error(inputs));
-  CHECK(plot.series[0].points.size() == part.size());
+  CHECK(plot_from_above(inputs, trajectory_error(inputs)).series[0].points.size() == part.size());
 }
 
 }  // namespace km

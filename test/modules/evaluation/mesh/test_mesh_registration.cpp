@@ -45,38 +45,6 @@ TEST_CASE("Registration finds the motion of a room", "[mesh_error]") {
   CHECK(difference(found.T_truth_estimate, T_truth_estimate) < kError_m);
 }
 
-// The registration of 40 points in checks of this kind: a rotation by 90 degrees about z and (1, 2,
-// 3).
-TEST_CASE("A rotation by 90 degrees is found exactly from known pairs and by ICP from nearby",
-          "[mesh_error]") {
-  const SE3 T = make_pose(so3_exp({0, 0, -M_PI / 2}), {1, 2, 3});
-  std::mt19937 random(GENERATE(1U, 2U, 3U));
-  std::uniform_real_distribution<float> uniform(-1.0F, 1.0F);
-  LabelledMesh estimate;
-  std::vector<PosePair> pairs;
-  for (std::uint32_t i = 0; i < 40; ++i) {
-    const float x = uniform(random), y = uniform(random), z = uniform(random);
-    estimate.vertices.emplace_back(x, y, z);
-    if (i % 3 == 2) estimate.faces.push_back({i - 2, i - 1, i});
-    const Eigen::Vector3d point = estimate.vertices.back().cast<double>();
-    PosePair pair;
-    pair.T_truth_body.translation() = T * point;
-    pair.T_estimate_body.translation() = point;
-    pairs.push_back(pair);
-  }
-  const SE3 by_pairs = align(pairs, false).T_truth_estimate;
-  CHECK(difference(by_pairs, T) < 1e-12);
-
-  LabelledMesh truth = estimate;
-  truth.transform(T);
-  Vector6 off;
-  off << 0.01, -0.01, 0.02, 0.02, 0.01, -0.03;
-  const MeshReport report = report_of(truth, estimate, T * se3_exp(off));
-  // Triangles that cross each other pair points wrongly, but less while they approach.
-  CHECK(difference(report.registration.T_truth_estimate, T) < 3e-4);
-  CHECK(report.merged.truth.surface.mean_m < 1e-4);
-}
-
 TEST_CASE("Registration does not move along undetermined directions", "[mesh_error]") {
   LabelledMesh estimate = square(4.0F, 0.0F);
   estimate.transform(make_pose(Eigen::Matrix3d::Identity(), {0.3, 0.0, 0.05}));

@@ -56,76 +56,6 @@ TEST_CASE("Faces smaller than the area per sample are sampled correctly on avera
   CHECK(std::abs(static_cast<double>(left) - 500.0) <= 11.0);  // a row of cells is 10 samples
 }
 
-TEST_CASE("The same seed gives the same samples and another seed gives different ones",
-          "[mesh_error]") {
-  const LabelledMesh mesh = room();
-  const SurfaceSamples a = sample_surface(mesh, 100.0, 7);
-  const SurfaceSamples b = sample_surface(mesh, 100.0, 7);
-  const SurfaceSamples c = sample_surface(mesh, 100.0, 8);
-  CHECK(a.points == b.points);
-  CHECK(a.faces == b.faces);
-  CHECK(a.points != c.points);
-}
-
-TEST_CASE("Samples elsewhere are dropped but counted", "[mesh_error]") {
-  const LabelledMesh mesh = square(10.0F, 0.0F, 20);
-  NearbyCells nearby(0.5);
-  const std::vector<Eigen::Vector3f> at = {{5, 5, 0}};
-  nearby.add(at);
-  const SurfaceSamples samples = sample_surface(mesh, 100.0, 1, &nearby);
-  CHECK(std::abs(static_cast<double>(samples.total) - 10'000.0) <= 1.0);
-  CHECK(samples.near == samples.points.size());
-  int within = 0;
-  for (const Eigen::Vector3f& point : samples.points) {
-    CHECK((point - at[0]).norm() < 2.0 * std::sqrt(3.0) * 0.5);
-    within += (point - at[0]).norm() <= 0.5F ? 1 : 0;
-  }
-  CHECK(std::abs(within - 25.0 * M_PI) < 5.0 * std::sqrt(25.0 * M_PI));  // all samples of the disc
-  const SurfaceSamples few = sample_surface(mesh, 100.0, 1, &nearby, 20);
-  CHECK(few.points.size() == 20);
-  CHECK(few.near == samples.near);
-}
-
-TEST_CASE("Cells near points contain everything within reach", "[mesh_error]") {
-  const float x = GENERATE(-3.0F, -0.01F, 0.49F, 1000.0F);
-  NearbyCells nearby(0.5);
-  const std::vector<Eigen::Vector3f> at = {{x, 2, 3}};
-  CHECK_FALSE(nearby.contains(at[0]));
-  nearby.add(at);
-  for (const float d : {-0.499F, 0.0F, 0.499F}) {
-    CHECK(nearby.contains({x + d, 2, 3}));
-    CHECK(nearby.contains({x, 2 + d, 3}));
-    CHECK(nearby.may_touch({Eigen::Vector3f(x + d, 2, 3), Eigen::Vector3f(x + d, 2, 3)}));
-  }
-  CHECK_FALSE(nearby.contains({x + 1.8F, 2, 3}));
-  CHECK_FALSE(nearby.may_touch({Eigen::Vector3f(x + 1, 2, 3), Eigen::Vector3f(x + 2, 3, 4)}));
-  CHECK(nearby.may_touch({Eigen::Vector3f(x - 100, -100, -100), Eigen::Vector3f(x + 100, 99, 99)}));
-  CHECK_THROWS_AS(NearbyCells(0.0), std::invalid_argument);
-}
-
-TEST_CASE(
-    "The nearest point of a triangle is found inside and on edges and corners and if degenerate",
-    "[mesh_error]") {
-  const Eigen::Vector3d a(0, 0, 0), b(2, 0, 0), c(0, 2, 0);
-  const auto expect = [&](const Eigen::Vector3d& point, double distance_m, int edge, int corner) {
-    const TrianglePoint found = nearest_on_triangle(point, a, b, c);
-    CHECK(found.distance_m == Approx(distance_m));
-    CHECK(found.edge == edge);
-    CHECK(found.corner == corner);
-  };
-  expect({0.5, 0.5, 0.3}, 0.3, -1, -1);
-  expect({0.5, 0.5, -0.3}, 0.3, -1, -1);
-  expect({1, -1, 0}, 1.0, 0, -1);
-  expect({1, -3, 4}, 5.0, 0, -1);
-  expect({2, 2, 0}, std::sqrt(2.0), 1, -1);
-  expect({-1, 1, 0}, 1.0, 2, -1);
-  expect({-3, -4, 0}, 5.0, -1, 0);
-  expect({5, 0, 4}, 5.0, -1, 1);
-  expect({0, 5, 4}, 5.0, -1, 2);
-  CHECK(nearest_on_triangle({0, 3, 4}, a, b, b).distance_m == Approx(5.0));
-  CHECK(nearest_on_triangle({0, 3, 4}, a, a, a).distance_m == Approx(5.0));
-}
-
 TEST_CASE("A mesh ends at an edge of one face with shared and with separate vertices",
           "[mesh_error]") {
   const bool shared = GENERATE(true, false);
@@ -139,21 +69,13 @@ TEST_CASE("A mesh ends at an edge of one face with shared and with separate vert
     }
     mesh = soup;
   }
-  const MeshBoundary rim(mesh);
-  int edges = 0;
-  for (std::size_t face = 0; face < mesh.faces.size(); ++face)
-    for (int k = 0; k < 3; ++k) {
-      edges += rim.has_edge(face, k) ? 1 : 0;
-      const Eigen::Vector3f& place = mesh.vertices[mesh.faces[face][static_cast<std::size_t>(k)]];
-      const bool outside = place.head<2>().minCoeff() == 0.0F || place.maxCoeff() == 3.0F;
-      CHECK(rim.has_corner(face, k) == outside);
-    }
-  CHECK(edges == 12);
   const SurfaceSamples samples = sample_surface(mesh, 1000.0, 1);
   const NearestSurface nearest(mesh, samples);
-  CHECK_FALSE(nearest.find({1.5F, 1.0F, 0.2F}, 1.0)->past_boundary);
+  for (const float x : {0.1F, 1.0F, 1.5F, 2.9F})  // also at edges and corners of faces
+    CHECK_FALSE(nearest.find({x, 1.0F, 0.2F}, 1.0)->past_boundary);
   CHECK(nearest.find({3.1F, 1.0F, 0.2F}, 1.0)->past_boundary);
   CHECK(nearest.find({3.1F, 3.1F, 0.0F}, 1.0)->past_boundary);
+  CHECK(nearest.find({3.3F, 3.4F, 0.0F}, 1.0)->surface_m == Approx(0.5F));
 }
 
 TEST_CASE("The nearest sample is that of brute force", "[mesh_error]") {
@@ -177,6 +99,7 @@ TEST_CASE("The nearest sample is that of brute force", "[mesh_error]") {
     CHECK_FALSE(nearest.find(point, 0.99 * static_cast<double>(best)));
     CHECK(nearest.find(point, 1.01 * static_cast<double>(best)));
   }
+  CHECK_FALSE(NearestSurface({}, {}).find({0, 0, 0}, 10.0));
 }
 
 TEST_CASE("The distance to the surface has no lower limit from sampling", "[mesh_error]") {
@@ -191,12 +114,6 @@ TEST_CASE("The distance to the surface has no lower limit from sampling", "[mesh
     REQUIRE(found);
     CHECK(found->surface_m == Approx(0.001F).margin(1e-6));
   }
-}
-
-TEST_CASE("No point is near an empty mesh", "[mesh_error]") {
-  const LabelledMesh mesh;
-  const SurfaceSamples samples;
-  CHECK_FALSE(NearestSurface(mesh, samples).find({0, 0, 0}, 10.0));
 }
 
 }  // namespace

@@ -14,20 +14,17 @@ bool in_picture(const PictureView& view, const Eigen::Vector3d& pixel) {
 
 }  // namespace
 
-TEST_CASE("From above x is to the right and y up and high points are near", "[mesh_picture]") {
+TEST_CASE("From above y is up and from the front z, and x is to the right", "[mesh_picture]") {
   const PictureView view = parse_view("top", kBox, 520, 400);
   CHECK(view.scale == Approx(50.0));  // 10 m and 4 % in 520 px
   CHECK(view.project({5, 2.5, 0}).head<2>().isApprox(Eigen::Vector2d(260, 200)));
   CHECK(view.project({6, 2.5, 0}).head<2>().isApprox(Eigen::Vector2d(310, 200)));
   CHECK(view.project({5, 3.5, 0}).head<2>().isApprox(Eigen::Vector2d(260, 150)));
   CHECK(view.project({5, 2.5, 0}).z() - view.project({5, 2.5, 1.5}).z() == Approx(1.5));
-}
-
-TEST_CASE("From the front x is to the right and z up", "[mesh_picture]") {
-  const PictureView view = parse_view("front", kBox, 520, 400);
-  CHECK(view.project({6, 0, 1}).head<2>().isApprox(Eigen::Vector2d(310, 200)));
-  CHECK(view.project({5, 0, 2}).head<2>().isApprox(Eigen::Vector2d(260, 150)));
-  CHECK(view.project({5, 4, 1}).z() - view.project({5, 1, 1}).z() == Approx(3.0));
+  const PictureView front = parse_view("front", kBox, 520, 400);
+  CHECK(front.project({6, 0, 1}).isApprox(Eigen::Vector3d(310, 200, front.project({5, 0, 2}).z())));
+  CHECK(front.project({5, 0, 2}).y() == Approx(150));
+  CHECK(front.project({5, 4, 1}).z() - front.project({5, 1, 1}).z() == Approx(3.0));
 }
 
 TEST_CASE("Parallel views contain all of the extent", "[mesh_picture]") {
