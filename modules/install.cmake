@@ -8,9 +8,8 @@ set(config_dir ${CMAKE_INSTALL_LIBDIR}/cmake/kimera_multi)
 
 set(modules core images vio_frontend vio place_recognition loop_closure outlier_rejection pose_graph
   rbcd recorded_graph mesh semantic_mapping mesh_deformation team_map recordings sensors charts evaluation)
-# sensors_node reads calibrations, team_plan reads team files and starts programs, program and heap
-# are parts of every program. The others are libraries of these.
-set(KM_EXPORTED ${modules} sensors_node team_plan program heap runtime security idl opencv chart_files)
+# sensors_node reads calibrations, program and heap are parts of every program. The others are libraries of these.
+set(KM_EXPORTED ${modules} sensors_node program heap runtime security idl opencv chart_files)
 list(TRANSFORM KM_EXPORTED PREPEND km_ OUTPUT_VARIABLE targets)
 foreach(name ${KM_EXPORTED})
   set_target_properties(km_${name} PROPERTIES EXPORT_NAME ${name})
@@ -33,10 +32,8 @@ foreach(module ${modules})
     endif()
   endforeach()
 endforeach()
-foreach(header apps/centralised_system.hpp apps/descriptor.hpp
-               apps/output_file.hpp apps/program_folder.hpp apps/program_options.hpp apps/program_version.hpp
+foreach(header apps/output_file.hpp apps/program_options.hpp apps/program_version.hpp
                apps/report_files.hpp apps/stage_progress.hpp
-               apps/team/robot_process.hpp apps/team/team_file.hpp
                runtime/clock.hpp runtime/config_layers.hpp runtime/config_text.hpp
                runtime/dds/status_pace.hpp runtime/signal_watch.hpp runtime/yaml_config.hpp)
   get_filename_component(folder ${header} DIRECTORY)

@@ -31,4 +31,4 @@ _kimera_multi() {
 
 complete -o default -F _kimera_multi kimera_multi_robot kimera_multi_team kimera_multi_doctor kimera_multi_publish \
   kimera_multi_viewer kimera_multi_evaluate kimera_multi_simulate kimera_multi_keys kimera_multi_vocabulary \
-  kimera_multi_pgo kimera_multi_experiments
+  kimera_multi_pgo
