@@ -309,9 +309,10 @@ class Run:
     def __init__(self, name, title, results):
         self.name, self.title, self.results = name, title, results
         team = results.json(f"team-{name}.json")
-        original = results.has(f"teams/{name}.yaml")  # EuRoC's own images
-        recordings = os.path.join(results.data, re.sub(r"-(run\d+|paper)$", "", name))
-        truths = self.truths_of(results.file(f"teams/{name}.yaml") if original
+        world = re.sub(r"-(run\d+|paper)$", "", name)
+        recordings = os.path.join(results.data, world)
+        original = results.has(f"teams/{world}.yaml")  # EuRoC's own images
+        truths = self.truths_of(results.file(f"teams/{world}.yaml") if original
                                 else os.path.join(recordings, "team.yaml"))
         folder = os.path.join(results.data, name + ("_euroc_res" if original else "_res"))
         self.robots = [Robot(robot["name"], team, folder, truths.get(robot["name"]))
