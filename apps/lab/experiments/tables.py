@@ -586,9 +586,9 @@ def pcm_section(results):
         "paper shows two plots without numbers: incremental is much faster, and its cliques are of "
         "comparable size.\n\n"
         + table("Fig. 5 as numbers: search time and clique against vertices", columns, [*sizes, None],
-                "Times: processor time of one thread, median of the last 50 additions. Of "
-                f"{len(next(iter(searches.values())))} seeds of the false closures the median, and the "
-                "lowest and highest.")
+                "Times: processor time of one thread, median of the last 50 additions. Values are medians "
+                f"over {len(next(iter(searches.values())))} seeds of the false closures, with the lowest "
+                "and highest.")
         + figures)
 
 
@@ -723,10 +723,10 @@ def trajectory_tables(results, worlds):
                 "published by the robots": lambda run: run.joint_m,
                 "published, PCM then RBCD": lambda run: by_paper(run).joint_m if by_paper(run) else NAN,
                 "live": lambda run: run.live_m},
-            "Of all robots under one alignment, rmse. The best distributed result is bold; the paper's "
-            "centralised one is SE-Sync. Published by the robots: their optimized.tum at the end of the "
-            "run, a pose for every image. Live: their live.tum, the pose known when each image came, "
-            "since the robots joined.")
+            "Values are the RMSE of all robots under one alignment. The best distributed result is bold; "
+            "the paper's centralised one is SE-Sync. Published by the robots: their optimized.tum at the "
+            "end of the run, a pose for every image. Live: their live.tum, the pose known when each "
+            "image came, since the robots joined.")
         + half_table(
             worlds, "Table I: cost of pose graph optimisation", "cost", 5, PAPER_COST, {},
             "Chordal cost of rigid poses without 1/2, weights as SE-Sync reads them. Costs of two worlds "
@@ -747,7 +747,7 @@ def trajectory_tables(results, worlds):
             "odometry, aligned alone: ATE / distance [%]": lambda one: fixed(one[1].drift_percent(), 3),
             "in the team: ATE [m]": lambda one: fixed(one[1].optimized_m, 3)},
                 [(run, robot) for run in worlds for robot in run.robots],
-                "Of every image, rmse. In brackets: as published for Kimera-VIO on the original images.")
+                "RMSE over every image. In brackets: as published for Kimera-VIO on the original images.")
         + table("How much runs differ: median, and lowest to highest", {
             "world": title_of, "runs": lambda run: str(len(results.runs_of(run))),
             "ATE [m]: published by the robots": spread(4, lambda run: run.joint_m),
@@ -797,15 +797,15 @@ def trajectory_section(results):
     add_trajectory_targets(results, worlds)
     return worlds and (
         "A team runs in each world. The first columns have the trajectories that its robots published "
-        "at the end of the run: by their defaults, and in one more run by the paper's own pipeline, "
-        "consistent closures by PCM and then RBCD. Every method also solves the pose graph that the "
-        "team ends with by its defaults: odometry and the closures it kept. Local PGO joins the robots' "
-        "own solutions by one closure each. RBCD, RBCD stopped after 50 rounds and DGS see only their "
-        "robot's part and the messages of the others. The centralised method certifies its optimum. "
-        "RBCD, DGS and the centralised method start from the chordal initialisation of the whole graph, "
-        "which one computer makes and nobody counts. Like the paper's, they do not use the verticals "
-        "that robots know. The default, Newton's method, starts from odometry as the robots do, weighs "
-        "the closures, and uses the verticals.\n\n" + trajectory_tables(results, worlds))
+        "at the end of the run. One more run uses the paper's own pipeline: consistent closures by PCM, "
+        "then RBCD. Every method also solves the pose graph that the team ends with by its defaults: "
+        "odometry and the closures it kept. Local PGO joins the robots' own solutions by one closure "
+        "each. RBCD, RBCD stopped after 50 rounds and DGS see only their robot's part and the messages "
+        "of the others. The centralised method certifies its optimum. RBCD, DGS and the centralised "
+        "method start from the chordal initialisation of the whole graph. One computer makes it, and its "
+        "cost is not counted. Like the paper's, they do not use the verticals that robots know. The "
+        "default, Newton's method, starts from odometry as the robots do, weighs the closures, and uses "
+        "the verticals.\n\n" + trajectory_tables(results, worlds))
 
 
 # ---------------------------------------------------------------------------- resources
@@ -897,7 +897,7 @@ def processor_tables(worlds, alone):
     for title, robots in profiles:
         columns[title] = lambda module, robots=robots: fixed(share(robots, module), 1)
     return (
-        table("Processor and memory of a robot", {
+        table("Processor time and memory", {
             "robot": lambda one: one[0],
             "with its map": lambda one: "yes" if "semantic_mapping" in one[1].module_s else "no",
             "recording [s]": lambda one: fixed(one[1].recorded_s, 0),
@@ -909,11 +909,11 @@ def processor_tables(worlds, alone):
               "Recordings are played as fast as they are taken (--rate max), which is the same work. "
               "Odometry alone: one robot without others and with mapping.mode=off; place recognition "
               "and optimisation over its own closures still run.")
-        + table("Where the time goes: share of each module in that of all steps [%], mean of the robots",
+        + table("Share of each module in the time of all steps [%], mean of the robots",
                 columns, sorted((module for module in most if most[module] >= 0.5),
                                 key=lambda module: (-most[module], module)),
                 "By the clock on the wall: a step also waits for a core. Steps of the map wait longest, "
-                "because they give way to odometry."))
+                "because odometry has priority."))
 
 
 def resources_section(results):
@@ -989,7 +989,7 @@ GROUPS = ("as the paper measures it", "without what no robot saw", "the way back
 def mesh_section(results):
     worlds = [run for run in results.worlds() if (run.before.error or run.after.error) is not None]
     charts, pictures = "", "".join(
-        picture(f"{run.title}, all robots, {state} the correction.", f"mesh-{run.name}-{state}.png")
+        picture(f"{run.title}, {state} the correction", f"mesh-{run.name}-{state}.png")
         for run in results.worlds() for state in ("before", "after")
         if results.has(f"figures/mesh-{run.name}-{state}.png"))
     for run in worlds:
@@ -1003,19 +1003,19 @@ def mesh_section(results):
         add_change_target(results, run, what, "error", "cm", True)
         add_change_target(results, run, what + ", without what no robot saw", "seen", "cm", True)
     return (worlds or pictures) and (
-        "Each robot's mesh as its odometry built it, moved as a whole into the team's frame, and the "
-        "same mesh after local mesh optimisation bent it to the team's solution; and all robots' meshes "
+        "Meshes as odometry built them, moved as a whole into the team's frame. The same meshes after "
+        "local mesh optimisation bent them to the team's solution. \"Merged\" is the mesh of all robots "
         "together. The paper shows its errors as bars without numbers.\n\n"
         + charts
         + table("Fig. 7 as numbers: mesh error before and after the correction [cm]",
                 {**NAMED_MESH, **change_columns(GROUPS, ("error", "seen", "back"), True)},
                 mesh_rows(worlds),
-                "Mean distance from points of the true mesh, up to 1000 a square metre and two millions "
-                "in all, to the nearest of the estimated one, after ICP of all together. Only true "
-                "points within 0.5 m of it count. The middle leaves out true surface past the mesh's rim "
-                "or behind it. The way back: from points of the estimated mesh to the true one. Several "
-                "copies of a surface, spread about it, have a nearer one to most true points than copies "
-                "that agree: of a merged mesh only the way back distinguishes the two.")
+                "Mean distance from points of the true mesh to the nearest of the estimated one, after "
+                "ICP of all together. There are up to 1000 points a square metre, and two millions in "
+                "all. Only true points within 0.5 m of the estimate count. The middle leaves out true "
+                "surface past the mesh's rim or behind it. The way back: from points of the estimated "
+                "mesh to the true one. Copies of a surface that are spread about it have a nearer point "
+                "to most true points than copies that agree. Only the way back distinguishes the two.")
         + pictures)
 
 
@@ -1035,8 +1035,7 @@ def semantics_section(results):
         + table("Table III: right labels before and after the correction [%]",
                 {**NAMED_MESH, **change_columns(GROUPS[:2], ("labels", "seen_labels"), False)},
                 mesh_rows(worlds),
-                "Of the true points that count for the mesh error, those within 0.2 m of the mesh whose "
-                "nearest point has their label."))
+                "Share of the true points within 0.2 m of the mesh whose nearest point has their label."))
 
 
 # ---------------------------------------------------------------------------- levels of difficulty
@@ -1119,9 +1118,9 @@ def levels_section(results):
                 "Joint ATE: RMSE of all robots under one alignment, of runs in which all robots joined. "
                 "Before: odometry, placed by the first optimised keyframe of each robot. NEES: of the "
                 "published keyframes, over the median of its distribution; 1 is right. Bytes: sent in "
-                "the whole run, as a share of those of a server that receives each keyframe with as many "
-                "keypoints as the robots receive of a keyframe in the mean. Divergences: found and "
-                "logged by the robots.")
+                "the whole run, relative to a server. It receives each keyframe with as many keypoints "
+                "as the robots receive of a keyframe in the mean. Divergences: found and logged by the "
+                "robots.")
         + table("Recall by viewing angle: pairs of keyframes with a kept closure", {
             "level": title_of, **{f"{30 * k} to {30 * k + 30} degrees":
                                   lambda level, k=k: level.recall(k) for k in range(6)}},
