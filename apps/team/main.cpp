@@ -1,6 +1,11 @@
 #include <algorithm>
 #include <exception>
 #include <iostream>
+#include <memory>
+#include <optional>
+#include <span>
+#include <stdexcept>
+#include <utility>
 
 #include "apps/output_file.hpp"
 #include "apps/program_folder.hpp"
@@ -10,11 +15,14 @@
 #include "apps/team/links_file.hpp"
 #include "apps/team/report_page.hpp"
 #include "apps/team/run_team.hpp"
-#include "apps/team/team_record.hpp"
 #include "apps/team/team_report.hpp"
 #include "apps/team/team_results.hpp"
 #include "modules/core/write_file.hpp"
 #include "modules/mesh/mesh_file.hpp"
+#include "modules/recordings/mcap_reader.hpp"
+#include "modules/recordings/merged_reader.hpp"
+#include "modules/recordings/ros_messages.hpp"
+#include "modules/ros_dds/mcap_sink.hpp"
 #include "runtime/dds/dds_config.hpp"
 #include "runtime/dds/domain_draw.hpp"
 #include "runtime/unblocked_output.hpp"
@@ -183,12 +191,57 @@ void copy_palette(const km::TeamPlan& plan) {
   }
 }
 
+km::RosTFMessage root_transform(const std::string& root, km::Stamp stamp) {
+  return {{{{stamp, "map"}, km::ros_name(root) + "/map", {}}}};
+}
+
+// Records in the folder of a robot, in order.
+std::vector<fs::path> robot_records(const fs::path& folder) {
+  std::vector<fs::path> records;
+  fs::path file = folder / km::kRecord;
+  for (int number = 2; fs::exists(file); ++number) {
+    records.push_back(file);
+    file = km::numbered(folder / km::kRecord, number);
+  }
+  return records;
+}
+
+// Merges records into one file by time. Topics of equal name and type become one. Attached files
+// are named after the robots' folders, "alice/keyframes.csv". If `root` names a robot, its map
+// frame is that of the team: /tf_static publishes it as `map`.
+void merge_records(std::span<const fs::path> records, const std::string& root,
+                   const fs::path& file) {
+  std::vector<std::unique_ptr<km::BagReader>> readers;
+  for (const fs::path& record : records)
+    readers.push_back(std::make_unique<km::McapReader>(record));
+  km::MergedReader merged(std::move(readers));
+  std::optional<std::string> failure;
+  km::McapSink sink(file, [&failure](const std::string& why) { failure = why; });
+  const std::size_t statics = sink.open({"/tf_static", km::RosTFMessage::kType, true, 1});
+  std::vector<std::size_t> topics;
+  bool begun = root.empty();
+  while (const auto message = merged.next()) {
+    for (std::size_t k = topics.size(); k < merged.channels().size(); ++k)
+      topics.push_back(
+          sink.open({merged.channels()[k].topic, km::ros1_name(merged.channels()[k].type)}));
+    if (!std::exchange(begun, true))
+      sink.put(statics, message->log_time, km::encode_ros(root_transform(root, message->log_time)));
+    sink.put(topics[message->channel], message->log_time, message->bytes);
+    if (failure) break;
+  }
+  for (const fs::path& record : records)
+    for (const auto& [name, text] : km::read_mcap_attachments(record))
+      sink.attach(record.parent_path().filename().string() + '/' + name, text);
+  sink.finish();
+  if (failure) throw std::runtime_error(*failure);
+}
+
 // Merges the records of all robots, in the frame of the joined robots if there are some.
 void write_record(const km::TeamPlan& plan, const km::TeamResult& team, const fs::path& file) {
   std::vector<fs::path> records;
   std::string root;
   for (const km::RobotResult& robot : team.robots) {
-    const auto own = km::robot_records(plan.output / robot.plan.name);
+    const auto own = robot_records(plan.output / robot.plan.name);
     records.insert(records.end(), own.begin(), own.end());
     const auto frame = km::frame_of(robot);
     if (!frame || !robot.in_team_frame) continue;
@@ -196,7 +249,7 @@ void write_record(const km::TeamPlan& plan, const km::TeamResult& team, const fs
       if (other.id == *frame) root = other.name;
   }
   if (records.empty()) throw std::runtime_error("no robot has left a record");
-  km::merge_records(records, root, file);
+  merge_records(records, root, file);
 }
 
 // Writes the JSON, the report and the mesh of the whole team. Prints the files to `out`, except

@@ -1,5 +1,7 @@
 #include "apps/viewer/run_playback.hpp"
 
+#include <yaml-cpp/yaml.h>
+
 #include <algorithm>
 #include <map>
 #include <optional>
@@ -8,14 +10,14 @@
 #include <utility>
 
 #include "apps/result_files.hpp"
-#include "apps/viewer/optional_file.hpp"
-#include "apps/viewer/run_layers.hpp"
 #include "modules/core/input_file.hpp"
 #include "modules/core/robot_identity.hpp"
 #include "modules/journal/restored_run.hpp"
+#include "modules/map_2d/map_server_files.hpp"
 #include "modules/mesh/map_file.hpp"
 #include "modules/mesh/mesh_chunks.hpp"
 #include "modules/mesh/mesh_file.hpp"
+#include "modules/objects/object_file.hpp"
 #include "modules/view/view_selector.hpp"
 
 namespace km {
@@ -134,6 +136,67 @@ RobotPlayback read_robot(const fs::path& folder, std::vector<std::string>& notes
     notes.emplace_back(error.what());
   }
   return robot;
+}
+
+// The value of an optional file: a default value if there is none. `notes` names a file that
+// cannot be read, and states why.
+template <typename Read>
+auto read_if_there(const std::filesystem::path& file, std::vector<std::string>& notes,
+                   const Read& read) try {
+  return is_there(file) ? read(file) : decltype(read(file))();
+} catch (const std::exception& error) {
+  const std::string what = error.what(), name = file.string();
+  notes.push_back(what.starts_with(name) ? what : name + ": " + what);
+  return decltype(read(file))();
+}
+
+OccupancyGrid read_image(const fs::path& file) try {
+  return map_of_image(read_input_file(file));
+} catch (const std::invalid_argument& error) {
+  throw std::runtime_error(file.string() + ": " + error.what());
+}
+
+OccupancyGrid read_map_2d(const fs::path& file, RobotId anchor) {
+  OccupancyGrid map = read_image(file.parent_path() / kMap2dImage);
+  const YAML::Node yaml = YAML::Load(read_input_file(file));
+  map.resolution_m = yaml["resolution"].as<double>();
+  map.origin = {yaml["origin"][0].as<double>(), yaml["origin"][1].as<double>()};
+  map.z_m = yaml["floor_z"].as<double>(0.0);
+  map.anchor = anchor;
+  return map;
+}
+
+// The content if a robot could send it. Numbers in files may be impossible.
+std::optional<ViewContent> checked_content(std::optional<ViewContent> content) {
+  if (!content || !decode_view(encode_view(*content)))
+    throw std::runtime_error("its values are impossible");
+  return content;
+}
+
+// The objects, the 2D map and the slice of the distance field. `anchor`: robot whose odometry frame
+// is the frame of the 2D map. Files that are missing are left out.
+std::vector<ViewContent> read_layers(const fs::path& folder, RobotId robot, RobotId anchor,
+                                     std::vector<std::string>& notes) {
+  std::vector<ViewContent> layers;
+  const auto add = [&](const char* name, const auto& read) {
+    auto content = read_if_there(folder / name, notes,
+                                 [&](const fs::path& file) { return checked_content(read(file)); });
+    if (content) layers.push_back(*std::move(content));
+  };
+  add(kObjectsFile, [](const fs::path& file) { return view_objects(read_object_list(file)); });
+  add(kMap2d, [&](const fs::path& file) { return view_raster(read_map_2d(file, anchor)); });
+  add(kDistanceSlice, [&](const fs::path& file) { return view_raster(read_mesh(file), robot); });
+  return layers;
+}
+
+// The chunks of the fused mesh of the team. Their key has another robot id than `robot`, so that
+// they replace no chunk of the mesh of the robot.
+std::vector<MeshChunk> read_team_mesh(const fs::path& folder, RobotId robot, RobotId anchor,
+                                      std::vector<std::string>& notes) {
+  const auto other = static_cast<RobotId>(robot ^ 1U);
+  return read_if_there(folder / kTeamMesh, notes, [&](const fs::path& file) {
+    return split_mesh(read_mesh(file), other, anchor, ChunkGrid{}).chunks;
+  });
 }
 
 std::vector<fs::path> folders_of_robots(const fs::path& folder) {
