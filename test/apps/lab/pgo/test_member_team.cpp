@@ -134,7 +134,7 @@ struct AsRobots {
   std::size_t bytes = 0;  // sent by all robots
 };
 
-// What the members of a graph as robots keep and send in sessions.
+// Runs the members of a graph as robots do, in sessions.
 AsRobots run_as_robots(const TeamGraph& graph, TreeNewtonOptions options) {
   options.dimension = graph.dimension;
   MemberTeam team(
