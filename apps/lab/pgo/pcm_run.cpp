@@ -8,11 +8,11 @@
 #include <variant>
 
 #include "apps/lab/pgo/greedy_clique.hpp"
+#include "apps/lab/pgo/random_outliers.hpp"
 #include "apps/lab/pgo/solvers.hpp"
 #include "modules/outlier_rejection/cycle_test.hpp"
 #include "modules/outlier_rejection/max_clique.hpp"
 #include "modules/outlier_rejection/pcm.hpp"
-#include "modules/outlier_rejection/random_outliers.hpp"
 #include "modules/recorded_graph/g2o_io.hpp"
 #include "modules/recorded_graph/recorded_graph.hpp"
 

@@ -9,8 +9,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "apps/lab/pgo/random_outliers.hpp"
 #include "modules/core/lie.hpp"
-#include "modules/outlier_rejection/random_outliers.hpp"
 
 namespace km {
 namespace {

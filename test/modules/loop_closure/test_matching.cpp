@@ -4,6 +4,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
+#include "modules/loop_closure/keyframe_features.hpp"
 #include "modules/loop_closure/matching.hpp"
 #include "test/modules/loop_closure/synthetic_keyframes.hpp"
 
@@ -138,26 +139,20 @@ TEST_CASE("without a second descriptor there is no ratio and no match", "[matchi
 TEST_CASE("guided matching distinguishes equal descriptors by their place", "[matching]") {
   std::mt19937 rng(4);
   KeyframePair pair = make_keyframe_pair(rng, 50, {}, 0.0);
-  // Descriptors alone cannot match: there is only one.
-  for (auto* descriptors : {&pair.from.descriptors, &pair.to.descriptors})
-    for (BinaryDescriptor& descriptor : *descriptors) descriptor = {};
-  REQUIRE(match_descriptors(pair.from, pair.to, {}).empty());
-  // Far enough apart in the image not to compete.
-  KeyframePair sparse = pair;
-  for (KeyframeFeatures* features : {&sparse.from, &sparse.to}) features->keypoints.clear();
-  for (std::size_t i = 0; i < pair.from.keypoints.size(); ++i) {
-    const auto near = [&](const Keypoint& k) {
-      return (k.bearing - pair.from.keypoints[i].bearing).norm() * kFocal_px < 60.0;
-    };
-    const auto& kept = sparse.from.keypoints;
-    if (std::any_of(kept.begin(), kept.end(), near)) continue;
-    sparse.from.keypoints.push_back(pair.from.keypoints[i]);
-    sparse.to.keypoints.push_back(pair.to.keypoints[i]);
-  }
-  const std::size_t count = sparse.from.keypoints.size();
+  // Keypoints far enough apart in the image not to compete.
+  std::vector<std::size_t> apart;
+  for (std::size_t i = 0; i < pair.from.keypoints.size(); ++i)
+    if (std::ranges::none_of(apart, [&](std::size_t k) {
+          const auto offset = pair.from.keypoints[k].bearing - pair.from.keypoints[i].bearing;
+          return offset.norm() * kFocal_px < 60.0;
+        }))
+      apart.push_back(i);
+  const std::size_t count = apart.size();
   REQUIRE(count > 10);
-  sparse.from.descriptors.resize(count);
-  sparse.to.descriptors.resize(count);
+  KeyframePair sparse = {.from = selected(pair.from, apart), .to = selected(pair.to, apart)};
+  for (auto* descriptors : {&sparse.from.descriptors, &sparse.to.descriptors})
+    for (BinaryDescriptor& descriptor : *descriptors) descriptor = {};
+  REQUIRE(match_descriptors(sparse.from, sparse.to, {}).empty());
 
   const SE3 T_a_b = pair.from.T_body_cam.inverse() * pair.T_from_to * pair.to.T_body_cam;
   const std::vector<Match> matches = match_guided(T_a_b, sparse.from, sparse.to, {});

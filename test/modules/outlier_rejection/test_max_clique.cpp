@@ -151,21 +151,8 @@ TEST_CASE("The consistency graph of Manhattan has the clique numbers PMC proves"
 
 TEST_CASE("The greedy clique follows the degrees", "[clique]") {
   // A triangle 0 1 2 and a clique 0 3 4 5; 1 has the higher degree by its leaves 6 to 9.
-  BitGraph graph(10);
-  for (const auto& [u, v] : std::vector<std::pair<std::size_t, std::size_t>>{{0, 1},
-                                                                             {0, 2},
-                                                                             {1, 2},
-                                                                             {0, 3},
-                                                                             {0, 4},
-                                                                             {0, 5},
-                                                                             {3, 4},
-                                                                             {3, 5},
-                                                                             {4, 5},
-                                                                             {1, 6},
-                                                                             {1, 7},
-                                                                             {1, 8},
-                                                                             {1, 9}})
-    graph.connect(u, v);
+  const BitGraph graph =
+      bit_graph({{}, {0}, {0, 1}, {0}, {0, 3}, {0, 3, 4}, {1}, {1}, {1}, {1}}, 10);
   CHECK(greedy_extension(graph, {0}, 0) == Vertices{0, 1, 2});  // misled by vertex 1
   CHECK(greedy_extension(graph, {0}, 3).empty());
   CHECK(greedy_extension(graph, {3}, 0) == Vertices{0, 3, 4, 5});

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <set>
 
 #include "modules/outlier_rejection/pcm.hpp"
 #include "test/modules/outlier_rejection/chain.hpp"
@@ -77,27 +75,19 @@ TEST_CASE("PCM refuses closures it cannot weigh and keeps its state", "[pcm]") {
   const TwoRobots robots(0, 1, 5, 0.01, rng);
   Pcm pcm(0, 1, PcmConfig{});
   const Closure good = robots.measure(2, 3, 0.02, rng);
-  Closure bad = good;
-  SECTION("another pair") {
-    bad.to.id.robot = 2;
-  }
-  SECTION("inside one robot") {
-    bad.to.id.robot = 0;
-  }
-  SECTION("not finite") {
-    bad.T_from_to.translation().x() = std::numeric_limits<double>::quiet_NaN();
-  }
-  SECTION("not a rotation") {
-    bad.from.T_odom_kf.linear() *= 1.1;
-  }
-  SECTION("a reflection") {
-    bad.from.T_odom_kf.linear().col(0) *= -1.0;
-  }
-  SECTION("not a covariance") {
-    bad.covariance(2, 2) = -1.0;
-  }
-  CHECK_THROWS_AS(pcm.add(bad), std::invalid_argument);
-  CHECK(pcm.size() == 0);
+  const auto check_refused = [&](const char* what, const auto& change) {
+    CAPTURE(what);
+    Closure bad = good;
+    change(bad);
+    CHECK_THROWS_AS(pcm.add(bad), std::invalid_argument);
+    CHECK(pcm.size() == 0);
+  };
+  check_refused("another pair", [](Closure& c) { c.to.id.robot = 2; });
+  check_refused("inside one robot", [](Closure& c) { c.to.id.robot = 0; });
+  check_refused("not finite", [](Closure& c) { c.T_from_to.translation().x() = std::nan(""); });
+  check_refused("not a rotation", [](Closure& c) { c.from.T_odom_kf.linear() *= 1.1; });
+  check_refused("a reflection", [](Closure& c) { c.from.T_odom_kf.linear().col(0) *= -1.0; });
+  check_refused("not a covariance", [](Closure& c) { c.covariance(2, 2) = -1.0; });
   CHECK(pcm.add(good) == PcmAddResult::kGrew);
 }
 

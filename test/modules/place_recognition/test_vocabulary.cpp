@@ -197,18 +197,16 @@ TEST_CASE("An invalid vocabulary is refused with the reason", "[place_recognitio
   check_refused("node 0 has 2 children, branching is 1");
   bad.depth = 0;
   check_refused("depth 0 is outside");
-  bad = {.branching = 2, .depth = 1, .children = {2, 2, 0, 0, 0}, .centers = {}, .idf = {}};
-  bad.centers.resize(5);
-  bad.idf.resize(3);
-  check_refused("node 1 at depth 1 has children");
-  bad = {.branching = 9, .depth = 1, .children = {9, 0, 0}, .centers = {}, .idf = {}};
-  bad.centers.resize(3);
-  bad.idf.resize(2);
-  check_refused("lie beyond the last node");
-  bad = {.branching = 9, .depth = 2, .children = {1, 0, 0}, .centers = {}, .idf = {}};
-  bad.centers.resize(3);
-  bad.idf.resize(2);
-  check_refused("node 2 has no parent");
+  const auto check_tree_refused = [&](int branching, int depth, std::vector<std::uint8_t> children,
+                                      const char* reason) {
+    bad = {.branching = branching, .depth = depth, .children = std::move(children)};
+    bad.centers.resize(bad.children.size());
+    bad.idf.resize(static_cast<std::size_t>(std::ranges::count(bad.children, 0)));
+    check_refused(reason);
+  };
+  check_tree_refused(2, 1, {2, 2, 0, 0, 0}, "node 1 at depth 1 has children");
+  check_tree_refused(9, 1, {9, 0, 0}, "lie beyond the last node");
+  check_tree_refused(9, 2, {1, 0, 0}, "node 2 has no parent");
 }
 
 VocabularyData small_vocabulary() {

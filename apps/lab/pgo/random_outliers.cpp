@@ -1,4 +1,4 @@
-#include "modules/outlier_rejection/random_outliers.hpp"
+#include "apps/lab/pgo/random_outliers.hpp"
 
 #include <numbers>
 #include <stdexcept>
