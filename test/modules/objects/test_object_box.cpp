@@ -41,5 +41,14 @@ TEST_CASE("Shared volumes agree with counted points", "[objects]") {
   CHECK(shared_volume_m3(b, a) == Approx(shared_volume_m3(a, b)).margin(1e-9));
 }
 
+TEST_CASE("A box in a tilted frame is upright again in the world", "[objects]") {
+  const ObjectBox box{{3.0, -4.0, 0.5}, 0.4, {2.0, 0.7, 1.2}};
+  const SE3 T_world_kf = make_pose(
+      Eigen::AngleAxisd(1.1, Eigen::Vector3d(1, 2, 3).normalized()).toRotationMatrix(), {5, 6, 7});
+  const ObjectBox back = upright_box(T_world_kf * (T_world_kf.inverse() * box.pose()), box.size_m);
+  CHECK(back.yaw_rad == Approx(0.4));
+  CHECK((back.center - box.center).norm() < 1e-9);
+}
+
 }  // namespace
 }  // namespace km
