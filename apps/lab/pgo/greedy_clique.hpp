@@ -9,10 +9,10 @@
 namespace km {
 
 /// A large clique of a graph that grows by one vertex at a time, by the heuristics with which the
-/// paper compares: greedy_extension() from the new vertex (Chang et al., "Kimera-Multi", ICRA
-/// 2021), or from every vertex, from scratch (Pattabiraman et al., "Fast Algorithms for the Maximum
-/// Clique Problem on Massive Graphs", Internet Mathematics 2015). The older of equally large
-/// cliques is kept. Deterministic. Not thread-safe.
+/// paper compares. One is greedy_extension() from the new vertex (Chang et al., "Kimera-Multi",
+/// ICRA 2021). The other starts from every vertex, from scratch (Pattabiraman et al., "Fast
+/// Algorithms for the Maximum Clique Problem on Massive Graphs", Internet Mathematics 2015). The
+/// older of equally large cliques is kept. Deterministic. Not thread-safe.
 class GreedyClique {
  public:
   enum class Starts { kNewVertex, kAllVertices };

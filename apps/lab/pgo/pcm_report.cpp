@@ -71,7 +71,7 @@ std::string totals_text(const PcmRun& run) {
   text += "; " + std::to_string(run.search_nodes) + " search nodes\n";
   if (run.searches_ended > 0)
     text += std::to_string(run.searches_ended) +
-            " additions ended at --max-search-nodes and fell back to the heuristic\n";
+            " additions ended at the bound of nodes and fell back to the heuristic\n";
   const auto unproven = std::count_if(run.additions.begin(), run.additions.end(),
                                       [](const auto& a) { return a.clique < a.bound; });
   return text + (unproven == 0

@@ -11,7 +11,8 @@ namespace km {
 namespace {
 
 constexpr std::size_t kQueue = 256;
-constexpr std::chrono::milliseconds kPublishPeriod(500);  // of changed sets
+// Changed sets are published at this period.
+constexpr std::chrono::milliseconds kPublishPeriod(500);
 
 std::string text_of(RobotId a, RobotId b) {
   return "robots " + std::to_string(a) + ' ' + std::to_string(b) + ": ";
