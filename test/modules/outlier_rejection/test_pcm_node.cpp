@@ -10,7 +10,6 @@
 #include "test/modules/outlier_rejection/chain.hpp"
 #include "test/support/captured_log.hpp"
 #include "test/support/corrupted_message.hpp"
-#include "test/support/inbox.hpp"
 
 namespace km {
 namespace {
@@ -21,14 +20,40 @@ struct Team {
   Topic<KeyframeOdometry> keyframes;
   Topic<PeerEvent> restarts;
   Topic<InlierSet> restored, inlier_sets;
-  Inbox<InlierSet> sets{inlier_sets};
+  std::vector<InlierSet> sets;
+  PcmNode node;
 
-  PcmTopics topics() {
-    return {.closures = closures,
-            .keyframes = keyframes,
-            .restarts = restarts,
-            .restored = restored,
-            .inlier_sets = inlier_sets};
+  explicit Team(RobotId self, const PcmConfig& config = {}, std::uint32_t first_version = 0)
+      : node(config, self,
+             {.closures = closures,
+              .keyframes = keyframes,
+              .restarts = restarts,
+              .restored = restored,
+              .inlier_sets = inlier_sets},
+             first_version) {
+    inlier_sets.subscribe([this](const auto& set) { sets.push_back(*set); });
+  }
+
+  void give(const std::vector<Closure>& some) {
+    for (const Closure& closure : some) node.step(closure);
+  }
+  void keyframe_at(double at_s) {
+    KeyframeOdometry keyframe;
+    keyframe.stamp = nanoseconds(at_s);
+    node.step(keyframe);
+  }
+  void restart(RobotId robot) {
+    RobotIdentity identity;
+    identity.robot = robot;
+    node.step(PeerEvent{PeerEventKind::kRestarted, identity, {}});
+  }
+  // Sizes of the sets that are now published.
+  std::vector<std::size_t> publish() {
+    const std::size_t before = sets.size();
+    node.publish_changes();
+    std::vector<std::size_t> sizes;
+    for (std::size_t i = before; i < sets.size(); ++i) sizes.push_back(sets[i].closures.size());
+    return sizes;
   }
 
   // Exact to a millimetre, weighed as such: all agree.
@@ -51,12 +76,7 @@ struct Team {
   }
 };
 
-// A keyframe of this robot at a time.
-KeyframeOdometry keyframe_at(double at_s) {
-  KeyframeOdometry keyframe;
-  keyframe.stamp = nanoseconds(at_s);
-  return keyframe;
-}
+using Sizes = std::vector<std::size_t>;
 
 PcmConfig tolerant() {
   PcmConfig config;
@@ -68,225 +88,152 @@ PcmConfig tolerant() {
 
 TEST_CASE("The PCM node publishes sets that grew, with versions above those of a former process",
           "[node]") {
-  Team team;
   constexpr std::uint32_t kFirst = 3U << 16U;
-  PcmNode node(tolerant(), 2, team.topics(), kFirst);
+  Team team(2, tolerant(), kFirst);
   const auto closures = team.agreeing(2, 5, 5);
-
-  node.step(closures[0]);
-  node.step(closures[1]);
-  node.publish_changes();
-  CHECK(team.sets.messages().empty());  // below min_inliers
-  node.step(closures[2]);
-  node.publish_changes();
-  node.publish_changes();  // nothing new
-  node.step(closures[2]);  // repeated
-  node.publish_changes();
-  node.step(closures[3]);
-  node.step(closures[4]);
-  node.publish_changes();
-
-  const auto sets = team.sets.messages();
-  REQUIRE(sets.size() == 2);
-  CHECK(sets[0].closures.size() == 3);
-  CHECK(sets[1].closures.size() == 5);
-  CHECK(sets[0].version == kFirst + 1);
-  CHECK(sets[0].version < sets[1].version);
-  CHECK(std::ranges::is_sorted(sets[1].closures));
-  for (const InlierSet& set : sets) {
-    CHECK(set.a == 2);
-    CHECK(set.b == 5);
-  }
+  team.give({closures[0], closures[1]});
+  CHECK(team.publish().empty());  // below min_inliers
+  team.give({closures[2]});
+  CHECK(team.publish() == Sizes{3});
+  CHECK(team.publish().empty());
+  team.give({closures[2]});
+  CHECK(team.publish().empty());  // repeated
+  team.give({closures[3], closures[4]});
+  CHECK(team.publish() == Sizes{5});
+  CHECK(team.sets[0].version == kFirst + 1);
+  CHECK(team.sets[0].version < team.sets[1].version);
+  CHECK(std::ranges::is_sorted(team.sets[1].closures));
+  for (const InlierSet& set : team.sets) CHECK((set.a == 2 && set.b == 5));
 }
 
 TEST_CASE("The PCM node decides for the pairs in which it is the lower, and for itself", "[node]") {
-  Team team;
-  PcmNode node(tolerant(), 4, team.topics());
-  for (const Closure& closure : team.agreeing_inside(4, 4)) node.step(closure);
+  Team team(4, tolerant());
+  team.give(team.agreeing_inside(4, 4));
   for (const auto& [a, b] : {std::pair<RobotId, RobotId>{9, 4}, {3, 4}, {5, 6}})
-    for (const Closure& closure : team.agreeing(a, b, 4)) node.step(closure);
-  node.publish_changes();
-
-  const auto sets = team.sets.messages();
-  REQUIRE(sets.size() == 2);
-  CHECK((sets[0].a == 4 && sets[0].b == 4));
-  CHECK((sets[1].a == 4 && sets[1].b == 9));
+    team.give(team.agreeing(a, b, 4));
+  REQUIRE(team.publish().size() == 2);
+  CHECK((team.sets[0].a == 4 && team.sets[0].b == 4));
+  CHECK((team.sets[1].a == 4 && team.sets[1].b == 9));
 }
 
 TEST_CASE("The PCM node survives closures that cannot be weighed", "[node]") {
-  Team team;
-  PcmNode node(tolerant(), 0, team.topics());
+  Team team(0, tolerant());
   auto closures = team.agreeing(0, 1, 4);
   closures[1].T_from_to.translation().x() = std::numeric_limits<double>::quiet_NaN();
-  for (const Closure& closure : closures) node.step(closure);
-  node.publish_changes();
-  REQUIRE(team.sets.messages().size() == 1);
-  CHECK(team.sets.messages()[0].closures.size() == 3);
+  team.give(closures);
+  CHECK(team.publish() == Sizes{3});
 }
 
 TEST_CASE("The PCM node's thread handles what was published before it stops", "[node]") {
-  Team team;
-  PcmNode node(tolerant(), 0, team.topics());
-  node.start();
+  Team team(0, tolerant());
+  team.node.start();
   for (const Closure& closure : team.agreeing(0, 1, 40)) team.closures.publish(closure);
-  node.stop();  // drains the queue, then publishes the last set
-  CHECK(node.error() == nullptr);
-  const auto sets = team.sets.messages();
-  REQUIRE_FALSE(sets.empty());
-  CHECK(sets.back().closures.size() == 40);
-  CHECK(sets.size() == sets.back().version);
+  team.node.stop();  // drains the queue, then publishes the last set
+  CHECK(team.node.error() == nullptr);
+  REQUIRE_FALSE(team.sets.empty());
+  CHECK(team.sets.back().closures.size() == 40);
+  CHECK(team.sets.size() == team.sets.back().version);
 }
 
 TEST_CASE("All closures of two robots are published once independent ones agree", "[node]") {
-  Team team;
-  PcmNode node(PcmConfig{}, 2, team.topics());
+  Team team(2);
   auto closures = team.agreeing(2, 5, 20);
   closures[1].T_from_to = random_pose(team.rng);  // false, and a neighbour of the first
-  node.step(closures[0]);
-  node.step(closures[1]);
-  node.step(reversed(closures[0]));
-  node.publish_changes();
-  CHECK(team.sets.messages().empty());
-  node.step(closures[9]);
-  node.publish_changes();
-  node.publish_changes();  // nothing new
-  REQUIRE(team.sets.messages().size() == 1);
-  CHECK(team.sets.messages()[0].closures.size() == 3);
-  node.step(closures[10]);
-  node.publish_changes();
-  REQUIRE(team.sets.messages().size() == 2);
-  CHECK(team.sets.messages()[1].closures.size() == 4);
-  CHECK(std::ranges::is_sorted(team.sets.messages()[1].closures));
-  CHECK(team.sets.messages()[0].version < team.sets.messages()[1].version);
+  team.give({closures[0], closures[1], reversed(closures[0])});
+  CHECK(team.publish().empty());
+  team.give({closures[9]});
+  CHECK(team.publish() == Sizes{3});
+  CHECK(team.publish().empty());
+  team.give({closures[10]});
+  CHECK(team.publish() == Sizes{4});
+  CHECK(std::ranges::is_sorted(team.sets[1].closures));
+  CHECK(team.sets[0].version < team.sets[1].version);
 }
 
 TEST_CASE("Robots joined by one place wait for a second one, and it is said", "[node]") {
-  Team team;
   PcmConfig config;
   config.witness_wait_s = 30.0;
-  PcmNode node(config, 2, team.topics());
+  Team team(2, config);
   const CapturedLog log;
   const auto closures = team.agreeing(2, 5, 3);  // all neighbours
-  node.step(closures[0]);
-  node.publish_changes();  // without a keyframe there is no time
-  node.step(keyframe_at(1000.0));
-  node.publish_changes();
-  node.step(closures[1]);
-  node.step(keyframe_at(1029.9));
-  node.publish_changes();
-  CHECK(team.sets.messages().empty());
+  team.give({closures[0]});
+  CHECK(team.publish().empty());  // without a keyframe there is no time
+  team.keyframe_at(1000.0);
+  CHECK(team.publish().empty());
+  team.give({closures[1]});
+  team.keyframe_at(1029.9);
+  CHECK(team.publish().empty());
   CHECK(log.text().empty());
-  node.step(keyframe_at(1030.0));
-  node.publish_changes();
-  REQUIRE(team.sets.messages().size() == 1);
-  CHECK(team.sets.messages()[0].closures.size() == 2);
+  team.keyframe_at(1030.0);
+  CHECK(team.publish() == Sizes{2});
   CHECK_THAT(log.text(), Catch::Contains("robots 2 5: joined by one place only"));
-  node.step(closures[2]);
-  node.publish_changes();  // the wait is over permanently
-  REQUIRE(team.sets.messages().size() == 2);
-  CHECK(team.sets.messages()[1].closures.size() == 3);
+  team.give({closures[2]});
+  CHECK(team.publish() == Sizes{3});  // the wait is over permanently
 }
 
 TEST_CASE("Weak closures at one place join two robots only if one at another place agrees",
           "[node]") {
   const bool is_strong = GENERATE(false, true);
   const RobotId other = is_strong ? 21 : 22;  // a warning for each pair
-  Team team;
-  PcmNode node(PcmConfig{}, 2, team.topics());
+  Team team(2);
   const CapturedLog log;
   auto closures = team.agreeing(2, other, 20);
   for (Closure& closure : closures) closure.inliers = 70;
-  node.step(closures[0]);
-  node.step(closures[1]);  // a neighbour
-  node.expect_no_more();
-  node.publish_changes();
-  node.publish_changes();
-  CHECK(team.sets.messages().empty());
+  team.give({closures[0], closures[1]});  // neighbours
+  team.node.expect_no_more();
+  CHECK(team.publish().empty());
+  CHECK(team.publish().empty());
   CHECK_THAT(log.text(),
              Catch::Contains("not joined: at their best place closures have 140 inliers "
                              "of pcm.min_lone_support 150"));
   if (is_strong) closures[2].inliers = 10;  // a neighbour, too
-  node.step(closures[is_strong ? 2 : 9]);
-  node.publish_changes();
-  REQUIRE(team.sets.messages().size() == 1);
-  CHECK(team.sets.messages()[0].closures.size() == 3);
+  team.give({closures[is_strong ? 2 : 9]});
+  CHECK(team.publish() == Sizes{3});
   CHECK((log.text().find("the join is tentative") != std::string::npos) == is_strong);
 }
 
 TEST_CASE("Robots that a former process joined by one place remain joined", "[node]") {
-  PcmConfig config;
-  config.witness_wait_s = 30.0;
-  Team team;
-  PcmNode node(config, 2, team.topics());
+  Team team(2);
   const auto closures = team.agreeing(2, 5, 2);
-  node.step(closures[0]);
-  node.publish_changes();
-  CHECK(team.sets.messages().empty());
-  node.step(InlierSet{1, 2, 0, {}});  // decided by another robot
-  node.step(InlierSet{2, 5, 0, {closures[0].id()}});
-  node.publish_changes();
-  REQUIRE(team.sets.messages().size() == 1);
-  CHECK(team.sets.messages()[0].closures == std::vector<ClosureId>{closures[0].id()});
+  team.give({closures[0]});
+  CHECK(team.publish().empty());
+  team.node.step(InlierSet{1, 2, 0, {}});  // decided by another robot
+  team.node.step(InlierSet{2, 5, 0, {closures[0].id()}});
+  CHECK(team.publish() == Sizes{1});
+  CHECK(team.sets[0].closures[0] == closures[0].id());
 }
 
 TEST_CASE("At the end of all runs no pair waits for a witness", "[node]") {
-  Team team;
-  PcmNode node(PcmConfig{}, 2, team.topics());
+  Team team(2);
   const CapturedLog log;
-  node.step(keyframe_at(10.0));
-  node.step(team.agreeing(2, 5, 1)[0]);
-  node.publish_changes();
-  node.step(keyframe_at(12.0));
-  node.publish_changes();
-  CHECK(team.sets.messages().empty());
-  node.expect_no_more();
-  node.publish_changes();
-  CHECK(team.sets.messages().size() == 1);
+  team.keyframe_at(10.0);
+  team.give(team.agreeing(2, 5, 1));
+  CHECK(team.publish().empty());
+  team.keyframe_at(12.0);
+  CHECK(team.publish().empty());
+  team.node.expect_no_more();
+  CHECK(team.publish() == Sizes{1});
   CHECK_THAT(log.text(), Catch::Contains("no other place has agreed within 2 s"));
 }
 
 TEST_CASE("Closures inside the robot need no witness", "[node]") {
-  Team team;
-  PcmNode node(PcmConfig{}, 4, team.topics());
-  node.step(team.agreeing_inside(4, 4)[0]);
-  node.publish_changes();
-  REQUIRE(team.sets.messages().size() == 1);
-  CHECK(team.sets.messages()[0].closures.size() == 1);
+  Team team(4);
+  team.give({team.agreeing_inside(4, 4)[0]});
+  CHECK(team.publish() == Sizes{1});
 }
 
-TEST_CASE("The closures of a restarted peer are removed", "[node]") {
-  Team team;
-  PcmNode node(PcmConfig{}, 2, team.topics());
-  const auto before = team.agreeing(2, 5, 20);
-  const auto after = team.agreeing(2, 5, 20);
-  for (const Closure& closure : before) node.step(closure);
-  node.publish_changes();
-  RobotIdentity identity;
-  identity.robot = 5;
-  node.step(PeerEvent{PeerEventKind::kRestarted, identity, {}});
-  node.step(after[3]);
-  node.step(after[17]);
-  node.publish_changes();
-  const auto sets = team.sets.messages();
-  REQUIRE(sets.size() == 2);
-  CHECK(sets[0].closures.size() == 20);
-  CHECK(sets[1].closures.size() == 2);
-  CHECK(sets[0].version < sets[1].version);
-}
-
-TEST_CASE("When a robot restarts, its pair waits for a witness again", "[node]") {
-  Team team;
-  PcmNode node(PcmConfig{}, 2, team.topics());
-  node.expect_no_more();
-  RobotIdentity identity;
-  identity.robot = 5;
-  node.step(PeerEvent{PeerEventKind::kRestarted, identity, {}});
-  node.step(team.agreeing(2, 5, 20)[3]);
-  node.publish_changes();
-  CHECK(team.sets.messages().empty());
-  node.expect_no_more();
-  node.publish_changes();
-  CHECK(team.sets.messages().size() == 1);
+TEST_CASE("The closures of a restarted peer are removed, and its pair waits again", "[node]") {
+  Team team(2);
+  const auto before = team.agreeing(2, 5, 20), after = team.agreeing(2, 5, 20);
+  team.give(before);
+  CHECK(team.publish() == Sizes{20});
+  team.node.expect_no_more();
+  team.restart(5);
+  team.give({after[3]});
+  CHECK(team.publish().empty());
+  team.give({after[17]});
+  CHECK(team.publish() == Sizes{2});
+  CHECK(team.sets[0].version < team.sets[1].version);
 }
 
 const InlierSet kSet{.a = 3,
