@@ -13,6 +13,12 @@
 
 namespace km {
 
+/// Calls visitor.field(name, value) for each name and the value behind it.
+void visit_each(auto& visitor, const char* name, auto& value, auto&... more) {
+  visitor.field(name, value);
+  if constexpr (sizeof...(more) > 0) visit_each(visitor, more...);
+}
+
 /// Number of closures by the stage they reached; each number includes the next.
 struct ClosureCounts {
   std::uint64_t candidates = 0;
@@ -20,9 +26,7 @@ struct ClosureCounts {
   std::uint64_t inliers = 0;
 
   void visit_fields(auto& visitor) {
-    visitor.field("candidates", candidates);
-    visitor.field("verified", verified);
-    visitor.field("inliers", inliers);
+    visit_each(visitor, "candidates", candidates, "verified", verified, "inliers", inliers);
   }
   bool operator==(const ClosureCounts&) const = default;
 };
@@ -33,8 +37,7 @@ struct PeerKeyframeCounts {
   std::uint64_t keypoints = 0;
 
   void visit_fields(auto& visitor) {
-    visitor.field("keyframes", keyframes);
-    visitor.field("keypoints", keypoints);
+    visit_each(visitor, "keyframes", keyframes, "keypoints", keypoints);
   }
   bool operator==(const PeerKeyframeCounts&) const = default;
 };
@@ -54,20 +57,12 @@ struct OptimizerSummary {
   std::uint64_t odometry_breaks = 0;  ///< Wrong steps of odometry that closures corrected.
 
   void visit_fields(auto& visitor) {
-    visitor.field("rounds", rounds);
-    visitor.field("seconds", seconds);
-    visitor.field("cost", cost);
-    visitor.field("gradient_norm", gradient_norm);
-    visitor.field("anchor", anchor);
-    visitor.field("settled", settled);
-    visitor.field("members", members);
-    visitor.field("tentative", tentative);
-    visitor.field("not_joined", not_joined);
-    visitor.field("odometry_rotation_noise", odometry_rotation_noise);
-    visitor.field("odometry_translation_noise", odometry_translation_noise);
-    visitor.field("odometry_breaks", odometry_breaks);
+    visit_each(visitor, "rounds", rounds, "seconds", seconds, "cost", cost, "gradient_norm",
+               gradient_norm, "anchor", anchor, "settled", settled, "members", members, "tentative",
+               tentative, "not_joined", not_joined, "odometry_rotation_noise",
+               odometry_rotation_noise, "odometry_translation_noise", odometry_translation_noise,
+               "odometry_breaks", odometry_breaks);
   }
-  bool operator==(const OptimizerSummary&) const = default;
 };
 
 /// Frames that went into the map, reasons for skipped ones, and size of the final mesh.
@@ -84,35 +79,22 @@ struct MappingSummary {
   std::uint64_t unbound_vertices = 0;  ///< In the last correction.
 
   void visit_fields(auto& visitor) {
-    visitor.field("frames", frames);
-    visitor.field("dropped_under_load", dropped_under_load);
-    visitor.field("skipped_wrong_size", skipped_wrong_size);
-    visitor.field("skipped_bad_pose", skipped_bad_pose);
-    visitor.field("skipped_too_late", skipped_too_late);
-    visitor.field("without_labels", without_labels);
-    visitor.field("label_pixels_outside_palette", label_pixels_outside_palette);
-    visitor.field("blocks_refused", blocks_refused);
-    visitor.field("blocks", blocks);
-    visitor.field("vertices", vertices);
-    visitor.field("faces", faces);
-    visitor.field("superseded_faces_dropped", superseded_faces_dropped);
-    visitor.field("corrections", corrections);
-    visitor.field("moves_as_a_whole", moves_as_a_whole);
-    visitor.field("correction_seconds", correction_seconds);
-    visitor.field("unbound_vertices", unbound_vertices);
+    visit_each(visitor, "frames", frames, "dropped_under_load", dropped_under_load,
+               "skipped_wrong_size", skipped_wrong_size, "skipped_bad_pose", skipped_bad_pose,
+               "skipped_too_late", skipped_too_late, "without_labels", without_labels,
+               "label_pixels_outside_palette", label_pixels_outside_palette, "blocks_refused",
+               blocks_refused, "blocks", blocks, "vertices", vertices, "faces", faces,
+               "superseded_faces_dropped", superseded_faces_dropped, "corrections", corrections,
+               "moves_as_a_whole", moves_as_a_whole, "correction_seconds", correction_seconds,
+               "unbound_vertices", unbound_vertices);
   }
-  bool operator==(const MappingSummary&) const = default;
 };
 
 /// Sums by category of the traffic.
 struct TrafficSums {
   std::map<std::string, std::uint64_t> messages, bytes;
 
-  void visit_fields(auto& visitor) {
-    visitor.field("messages", messages);
-    visitor.field("bytes", bytes);
-  }
-  bool operator==(const TrafficSums&) const = default;
+  void visit_fields(auto& visitor) { visit_each(visitor, "messages", messages, "bytes", bytes); }
 };
 
 /// Messages that the budget held back, each counted once: see HeldBack of the runtime.
@@ -120,11 +102,8 @@ struct HeldBackSums {
   TrafficSums delayed, superseded, dropped;
 
   void visit_fields(auto& visitor) {
-    visitor.field("delayed", delayed);
-    visitor.field("superseded", superseded);
-    visitor.field("dropped", dropped);
+    visit_each(visitor, "delayed", delayed, "superseded", superseded, "dropped", dropped);
   }
-  bool operator==(const HeldBackSums&) const = default;
 };
 
 /// Processor time and memory of the process.
@@ -140,15 +119,11 @@ struct ProcessSummary {
   std::optional<double> memory_growth_bytes_per_minute;
 
   void visit_fields(auto& visitor) {
-    visitor.field("cpu_s", cpu_s);
-    visitor.field("system_s", system_s);
-    visitor.field("page_faults", page_faults);
-    visitor.field("peak_memory_bytes", peak_memory_bytes);
-    visitor.field("memory_at_start_bytes", memory_at_start_bytes);
-    visitor.field("memory_at_end_bytes", memory_at_end_bytes);
-    visitor.field("memory_growth_bytes_per_minute", memory_growth_bytes_per_minute);
+    visit_each(visitor, "cpu_s", cpu_s, "system_s", system_s, "page_faults", page_faults,
+               "peak_memory_bytes", peak_memory_bytes, "memory_at_start_bytes",
+               memory_at_start_bytes, "memory_at_end_bytes", memory_at_end_bytes,
+               "memory_growth_bytes_per_minute", memory_growth_bytes_per_minute);
   }
-  bool operator==(const ProcessSummary&) const = default;
 };
 
 /// Offset of both cameras to the inertial sensor relative to the rig, with standard deviations. The
@@ -166,20 +141,13 @@ struct CamerasSummary {
   double readout_s = 0.0, readout_sigma_s = 0.0;
 
   void visit_fields(auto& visitor) {
-    visitor.field("offset_s", offset_s);
-    visitor.field("offset_sigma_s", offset_sigma_s);
-    visitor.field("rotation_x_rad", rotation_x_rad);
-    visitor.field("rotation_y_rad", rotation_y_rad);
-    visitor.field("rotation_z_rad", rotation_z_rad);
-    visitor.field("rotation_sigma_rad", rotation_sigma_rad);
-    visitor.field("translation_x_m", translation_x_m);
-    visitor.field("translation_y_m", translation_y_m);
-    visitor.field("translation_z_m", translation_z_m);
-    visitor.field("translation_sigma_m", translation_sigma_m);
-    visitor.field("readout_s", readout_s);
-    visitor.field("readout_sigma_s", readout_sigma_s);
+    visit_each(visitor, "offset_s", offset_s, "offset_sigma_s", offset_sigma_s, "rotation_x_rad",
+               rotation_x_rad, "rotation_y_rad", rotation_y_rad, "rotation_z_rad", rotation_z_rad,
+               "rotation_sigma_rad", rotation_sigma_rad, "translation_x_m", translation_x_m,
+               "translation_y_m", translation_y_m, "translation_z_m", translation_z_m,
+               "translation_sigma_m", translation_sigma_m, "readout_s", readout_s,
+               "readout_sigma_s", readout_sigma_s);
   }
-  bool operator==(const CamerasSummary&) const = default;
 };
 
 /// Events of the odometry by cameras and, if there is one, inertial sensor.
@@ -194,17 +162,11 @@ struct OdometrySummary {
   double blind_seconds = 0.0;       ///< Total time of these periods.
 
   void visit_fields(auto& visitor) {
-    visitor.field("inertial_sensor", inertial_sensor);
-    visitor.field("starts", starts);
-    visitor.field("divergences", divergences);
-    visitor.field("inertial_gaps", inertial_gaps);
-    visitor.field("refused_images", refused_images);
-    visitor.field("refused_samples", refused_samples);
-    visitor.field("images_without_pose", images_without_pose);
-    visitor.field("vision_losses", vision_losses);
-    visitor.field("blind_seconds", blind_seconds);
+    visit_each(visitor, "inertial_sensor", inertial_sensor, "starts", starts, "divergences",
+               divergences, "inertial_gaps", inertial_gaps, "refused_images", refused_images,
+               "refused_samples", refused_samples, "images_without_pose", images_without_pose,
+               "vision_losses", vision_losses, "blind_seconds", blind_seconds);
   }
-  bool operator==(const OdometrySummary&) const = default;
 };
 
 /// Result of --localize.
@@ -216,13 +178,9 @@ struct LocalizationSummary {
   std::uint64_t matched = 0;      ///< Number of these that match a keyframe of the map.
 
   void visit_fields(auto& visitor) {
-    visitor.field("map", map);
-    visitor.field("localised", localised);
-    visitor.field("after_s", after_s);
-    visitor.field("compared", compared);
-    visitor.field("matched", matched);
+    visit_each(visitor, "map", map, "localised", localised, "after_s", after_s, "compared",
+               compared, "matched", matched);
   }
-  bool operator==(const LocalizationSummary&) const = default;
 };
 
 /// Result of absolute_fixes.
@@ -242,18 +200,10 @@ struct FixesSummary {
   std::vector<double> odometry_frame;
 
   void visit_fields(auto& visitor) {
-    visitor.field("located", located);
-    visitor.field("after_s", after_s);
-    visitor.field("used", used);
-    visitor.field("rejected", rejected);
-    visitor.field("residual_m", residual_m);
-    visitor.field("rotation_sigma_rad", rotation_sigma_rad);
-    visitor.field("received", received);
-    visitor.field("not_used", not_used);
-    visitor.field("datum", datum);
-    visitor.field("odometry_frame", odometry_frame);
+    visit_each(visitor, "located", located, "after_s", after_s, "used", used, "rejected", rejected,
+               "residual_m", residual_m, "rotation_sigma_rad", rotation_sigma_rad, "received",
+               received, "not_used", not_used, "datum", datum, "odometry_frame", odometry_frame);
   }
-  bool operator==(const FixesSummary&) const = default;
 };
 
 /// Times without a pose: see pose_holes().
@@ -264,12 +214,9 @@ struct HolesSummary {
   double longest_from_s = 0.0;  ///< Begin of the longest hole, since the first pose.
 
   void visit_fields(auto& visitor) {
-    visitor.field("count", count);
-    visitor.field("seconds", seconds);
-    visitor.field("longest_s", longest_s);
-    visitor.field("longest_from_s", longest_from_s);
+    visit_each(visitor, "count", count, "seconds", seconds, "longest_s", longest_s,
+               "longest_from_s", longest_from_s);
   }
-  bool operator==(const HolesSummary&) const = default;
 };
 
 /// Shorter pauses of a recording are not reported: an ordinary computer has them, too.
@@ -318,37 +265,16 @@ struct RunSummary {
   std::vector<Finding> findings;  ///< Findings, the gravest first: see findings_of().
 
   void visit_fields(auto& visitor) {
-    visitor.field("robot", robot);
-    visitor.field("name", name);
-    visitor.field("version", version);
-    visitor.field("commit", commit);
-    visitor.field("keyframes", keyframes);
-    visitor.field("keypoints", keypoints);
-    visitor.field("frames", frames);
-    visitor.field("frames_skipped", frames_skipped);
-    visitor.field("paused_s", paused_s);
-    visitor.field("sensor_faults", sensor_faults);
-    visitor.field("peer_keyframes", peer_keyframes);
-    visitor.field("closures", closures);
-    visitor.field("pgo", pgo);
-    visitor.field("odometry", odometry);
-    visitor.field("localization", localization);
-    visitor.field("absolute_fixes", fixes);
-    visitor.field("holes", holes);
-    visitor.field("cameras", cameras);
-    visitor.field("mapping", mapping);
-    visitor.field("traffic", traffic);
-    visitor.field("held_back", held_back);
-    visitor.field("process", process);
-    visitor.field("seconds", seconds);
-    visitor.field("lost_peers", lost_peers);
-    visitor.field("apart_peers", apart_peers);
-    visitor.field("other_vocabulary", other_vocabulary);
-    visitor.field("other_network", other_network);
-    visitor.field("exit_reason", exit_reason);
-    visitor.field("findings", findings);
+    visit_each(visitor, "robot", robot, "name", name, "version", version, "commit", commit,
+               "keyframes", keyframes, "keypoints", keypoints, "frames", frames, "frames_skipped",
+               frames_skipped, "paused_s", paused_s, "sensor_faults", sensor_faults,
+               "peer_keyframes", peer_keyframes, "closures", closures, "pgo", pgo, "odometry",
+               odometry, "localization", localization, "absolute_fixes", fixes, "holes", holes,
+               "cameras", cameras, "mapping", mapping, "traffic", traffic, "held_back", held_back,
+               "process", process, "seconds", seconds, "lost_peers", lost_peers, "apart_peers",
+               apart_peers, "other_vocabulary", other_vocabulary, "other_network", other_network,
+               "exit_reason", exit_reason, "findings", findings);
   }
-  bool operator==(const RunSummary&) const = default;
 };
 
 void to_json(Json& json, const RunSummary& summary);

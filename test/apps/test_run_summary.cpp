@@ -51,10 +51,10 @@ RunSummary full_summary() {
 
 TEST_CASE("A summary with all possible values is read as it was written", "[robot][summary]") {
   const TemporaryFolder folder;
-  const RunSummary full = full_summary();
-  CHECK(read_summary(folder.write("full.json", json_text(full))) == full);
-  CHECK(read_summary(folder.write("default.json", json_text(RunSummary{}))) == RunSummary{});
-  CHECK(read_summary(folder.write("empty.json", "{}")) == RunSummary{});
+  const std::string full = json_text(full_summary()), least = json_text(RunSummary{});
+  CHECK(json_text(read_summary(folder.write("full.json", full))) == full);
+  CHECK(json_text(read_summary(folder.write("default.json", least))) == least);
+  CHECK(json_text(read_summary(folder.write("empty.json", "{}"))) == least);
 }
 
 TEST_CASE("The category of the map has one name", "[robot][summary]") {
