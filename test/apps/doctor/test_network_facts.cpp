@@ -105,10 +105,11 @@ TEST_CASE("The reason that keeps robots apart on a network is named", "[doctor]"
              facts.robots[1].identity->boot = 0x50000;
            }},
       Case{"note network.other_programs ", [](auto& facts) { facts.ros_topics = 3; }},
-      Case{"warning network.unreachable ", echo({.sent = 20})},
-      Case{"warning network.loss ", echo({.sent = 20, .received = 15})},
-      Case{"warning network.slow ", echo({.sent = 20, .received = 20, .median_s = 0.4})},
-      Case{"", echo({.may_send_icmp = false})},
+      Case{"warning network.unreachable ", echo({.host = {}, .sent = 20})},
+      Case{"warning network.loss ", echo({.host = {}, .sent = 20, .received = 15})},
+      Case{"warning network.slow ",
+           echo({.host = {}, .sent = 20, .received = 20, .median_s = 0.4})},
+      Case{"", echo({.host = {}, .may_send_icmp = false})},
       Case{"warning network.no_peers ",
            [](auto& facts) {
              facts.config.peers = {"10.0.0.2"};

@@ -63,7 +63,7 @@ TEST_CASE("unusable fixes are counted by reason", "[absolute_fixes]") {
   CHECK((good->p_datum - Eigen::Vector3d(0.0, 0.0, 2.0)).norm() < 1e-8);
   CHECK(good->sigma_m == Approx(std::sqrt(0.5)));
   RosNavSatFix bad = nav_sat_fix(200);
-  bad.status = -1;
+  bad.status.status = -1;
   CHECK_FALSE(read(reader, bad));
   bad = nav_sat_fix(200);
   bad.altitude = std::numeric_limits<double>::quiet_NaN();
