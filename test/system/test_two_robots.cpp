@@ -47,7 +47,7 @@ TEST_CASE("Two robots on the halves of a recording localise together", "[system]
     CHECK(fs::file_size(folder.path() / "a" / file) > 0);
 
   // The same graph solved once more: a keyframe without a path to the others could not be located.
-  Eavesdropper ear = listen_to(read_team_folder(folder.path()), false, 100);
+  Eavesdropper ear = listen_to(read_team_folder(folder.path()), 100);
   CHECK(ear.messages() > 0);
   CHECK(ear.private_poses() > 0);
   CHECK(ear.misfits() == 0);
