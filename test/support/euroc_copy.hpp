@@ -22,7 +22,7 @@ class EurocCopy {
   struct Image {
     Stamp stamp = 0;
     std::filesystem::path file;
-    double gain = 1.0, level = 0.0;  ///< A grey value v becomes gain * v + level.
+    double gain = 1.0;  ///< Grey values are multiplied by it.
   };
   struct Sample {
     Stamp stamp = 0;
@@ -86,7 +86,7 @@ class EurocCopy {
     std::ofstream list(to / "data.csv");
     list << "#timestamp [ns],filename\n";
     for (const Image& image : images) {
-      const bool is_changed = image.gain != 1.0 || image.level != 0.0;
+      const bool is_changed = image.gain != 1.0;
       const std::string name =
           std::to_string(image.stamp) + (is_changed ? ".png" : image.file.extension().string());
       list << image.stamp << ',' << name << '\n';
@@ -99,7 +99,7 @@ class EurocCopy {
 
   static void write_changed(const Image& image, const std::filesystem::path& to) {
     cv::Mat pixels = read_pixels(image.file, DecodedPixels::kGray);
-    pixels.convertTo(pixels, CV_8U, image.gain, image.level);  // saturates
+    pixels.convertTo(pixels, CV_8U, image.gain);  // saturates
     write_png(to, pixels);
   }
 
