@@ -34,9 +34,9 @@ struct MapMesh {
   double voxel_m = 0.0;
 };
 
-/// The reason why `map` cannot be the mesh of a map (a string literal), or null: lists of other
-/// lengths, faces with vertices that do not exist, ids that do not ascend, and vertices that are
-/// not finite or beyond 10,000 km.
+/// The reason why `map` cannot be the mesh of a map (a string literal), or null. Reasons are lists
+/// of other lengths, faces with vertices that do not exist, ids that do not ascend, and vertices
+/// that are not finite or beyond 10,000 km.
 [[nodiscard]] const char* fault_of(const MapMesh& map);
 
 /// A vertex of a robot's map whose surface other visits have mapped better, and the vertex of one

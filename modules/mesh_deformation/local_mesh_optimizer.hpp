@@ -63,9 +63,9 @@ class LocalMeshOptimizer {
   /// built, index i being keyframe i; `T_world_kf` are their optimised poses. Keyframes at the end
   /// without an optimised pose follow, by odometry, the last keyframe that has one.
   ///
-  /// Throws std::invalid_argument if fault_of() finds a fault in the map, for a vertex seen by
-  /// keyframes that do not exist, if check_trajectories() refuses the poses, or
-  /// if there are fewer keyframes than in the call before. The state is then unchanged.
+  /// Throws std::invalid_argument if fault_of() finds a fault in the map, or check_trajectories()
+  /// refuses the poses. Also throws if keyframes that saw a vertex do not exist, or if there are
+  /// fewer keyframes than in the call before. The state is then unchanged.
   DeformedMesh optimize(const MapMesh& map, std::span<const SE3> T_odom_kf,
                         std::span<const SE3> T_world_kf);
 

@@ -19,7 +19,7 @@ struct SemanticMappingConfig {
   int max_blocks = 20000;
 
   /// Truncation distance on both sides of a surface [voxels]. The two sides of a thinner wall
-  /// damage each other. Below three times the depth error, surfaces get holes.
+  /// have errors. Below three times the depth error, surfaces get holes.
   static constexpr double kTruncation_voxels = 4.0;
 
   /// Bound on the sum of weights of a voxel. A lower one follows changes faster, a higher one
@@ -42,7 +42,7 @@ struct SemanticMappingConfig {
     visitor.field("max_range_m", max_range_m, {0.5, 65.0}, "[m] largest depth that is used");
     visitor.field(
         "depth_sigma_per_m", depth_sigma_per_m, {0.0, 1.0},
-        "[1/m] standard deviation of depth z is sqrt(0.01^2 + (this z^2)^2) m: s / (f b) for "
+        "[1/m] standard deviation of depth z is sqrt(0.01^2 + (this z^2)^2) m; s / (f b) for "
         "stereo with focal length f [px], baseline b [m] and a "
         "matching error of s px; left out: that of a quarter of a pixel for stereo depth, "
         "0.003 for depth images");

@@ -19,7 +19,7 @@ class ImuStream {
   /// with samples from before the first image.
   static constexpr double kLeadIn_s = 1.0;
   /// Longest time by which samples of a packet precede its frame. After a longer pause of the
-  /// cameras odometry starts anew, so that older samples are of no use.
+  /// cameras odometry starts again, so that older samples are of no use.
   static constexpr double kLongest_s = 60.0;
 
   /// Stamps must ascend.

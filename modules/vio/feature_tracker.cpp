@@ -22,7 +22,7 @@ constexpr double kMinDepthRatio = 0.1;         // Below it a point is nearly beh
 constexpr int kSearchEvery = 4;  // A feature without a depth is searched in every fourth image.
 constexpr double kMaxInverseDepth = 20.0;  // [1/m]; a propagated depth beyond it is discarded.
 constexpr float kMinSpacing = 0.4F;        // Share of min_distance_px to which tracks may approach.
-constexpr unsigned kSeed = 1;              // Of the random samples.
+constexpr unsigned kSeed = 1;              // Seed of the random samples.
 // Largest distance to which a feature tracked forward and back must return.
 constexpr double kMaxForwardBackwardPx = 1.0;
 

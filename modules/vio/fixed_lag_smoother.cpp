@@ -17,8 +17,8 @@ namespace {
 constexpr int kStartIterations = 30;
 constexpr int kIterations = 3;            // largest number of optimisation steps per image
 constexpr std::size_t kRecentImages = 3;  // most recent images in the window
-// A keyframe is made when the image has moved this far, rotation removed, when at most this share
-// of the features of the last keyframe is still tracked, or when this time has passed.
+// A keyframe is made when the image has moved this far, rotation removed. It is also made when at
+// most this share of the features of the last keyframe is still tracked, or this time has passed.
 constexpr double kKeyframeParallax_px = 12.0;
 constexpr double kKeyframeTrackedShare = 0.6;
 constexpr double kKeyframeInterval_s = 1.0;

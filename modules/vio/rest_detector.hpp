@@ -8,7 +8,7 @@
 namespace km {
 
 /// Largest image motion, and largest change of the mean accelerometer and gyroscope, of a body at
-/// rest: at the start over the images held back and between their halves, later over
+/// rest. At the start they count over the images held back and between their halves, later over
 /// VioConfig::rest_s and against the estimate.
 inline constexpr double kRestParallax_px = 1.0;
 inline constexpr double kRestAccel_mps2 = 0.5;

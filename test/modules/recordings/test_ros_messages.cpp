@@ -249,7 +249,7 @@ TEST_CASE("Messages are to the byte those of another CDR library, in both direct
   check(RosLog{1700000001123456789, RosLogLevel::kWarn, "vio", "slow", "", "f", 7});
 }
 
-TEST_CASE("Messages of any encoding are read alike, and refused when longer", "[recordings]") {
+TEST_CASE("Messages of any encoding are read equally, and refused when longer", "[recordings]") {
   const auto check = []<typename Message>(std::size_t first, const Message&) {
     for (std::size_t k = first; k < first + 3; ++k) {
       Golden golden = samples()[k];

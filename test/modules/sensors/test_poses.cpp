@@ -54,7 +54,7 @@ TEST_CASE("A pause of the cameras bounds the samples and poses that wait", "[sen
   CHECK(!poses.at(nanoseconds(0.5)));
   CHECK(poses.at(nanoseconds(1.0)));
 
-  // The gyroscope goes on without an accelerometer.
+  // The gyroscope continues without an accelerometer.
   ImuJoiner joiner;
   for (int k = 0; k <= kPause_s; ++k) joiner.add_gyro({.stamp = nanoseconds(k)});
   CHECK(joiner.lost() == static_cast<std::size_t>(kPause_s - ImuStream::kLongest_s));

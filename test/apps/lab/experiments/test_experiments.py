@@ -135,7 +135,7 @@ class Tables(unittest.TestCase):
 
     def test_all_tables_are_those_of_known_results(self):
         city = CannedCity()
-        with open(os.path.join(HERE, "expected_report.md"), encoding="utf-8") as file:
+        with open(os.path.join(HERE, "expected_report.txt"), encoding="utf-8") as file:
             self.assertEqual(city.report(), file.read())
         for name in ("pcm-time", "pcm-clique", "mesh-error-city"):
             xml.etree.ElementTree.fromstring(city.read(f"results/figures/{name}.svg"))
