@@ -11,24 +11,26 @@ namespace {
 
 constexpr auto kLongestPause = static_cast<Stamp>(1e9 * kLongestPause_s);
 
-// Positions in `stamps` of a longest strictly ascending subsequence of the stamps in [first, last];
-// if there are several, of one that ends on the smallest stamp. Equal stamps: the first.
+// Positions in `stamps` of a longest strictly ascending subsequence of the stamps in [first, last].
+// If there are several: one that ends on the smallest stamp, and before it on the first in the
+// list.
 std::vector<std::size_t> longest_ascent(std::span<const Stamp> stamps, Stamp first, Stamp last) {
-  std::vector<std::size_t> ends;                   // [k]: smallest end of an ascent of k + 1 stamps
+  // [k]: ends of ascents of k + 1 stamps, in the order of the list, on ever smaller stamps.
+  std::vector<std::vector<std::size_t>> ends;
   std::vector<std::size_t> before(stamps.size());  // previous position in the ascent
   for (std::size_t i = 0; i < stamps.size(); ++i) {
     if (stamps[i] < first || stamps[i] > last) continue;
-    const auto end =
-        std::ranges::lower_bound(ends, stamps[i], {}, [&](std::size_t k) { return stamps[k]; });
-    if (end != ends.end() && stamps[*end] == stamps[i]) continue;
-    if (end != ends.begin()) before[i] = *std::prev(end);
-    if (end == ends.end())
-      ends.push_back(i);
-    else
-      *end = i;
+    auto end = std::ranges::lower_bound(
+        ends, stamps[i], {}, [&](const auto& positions) { return stamps[positions.back()]; });
+    if (end != ends.end() && stamps[end->back()] == stamps[i]) continue;  // the first one counts
+    if (end != ends.begin())
+      before[i] = *std::ranges::partition_point(
+          *std::prev(end), [&](std::size_t k) { return stamps[k] >= stamps[i]; });
+    if (end == ends.end()) end = ends.emplace(end);
+    end->push_back(i);
   }
   std::vector<std::size_t> ascent(ends.size());
-  std::size_t i = ends.empty() ? 0 : ends.back();
+  std::size_t i = ends.empty() ? 0 : ends.back().back();
   for (std::size_t k = ends.size(); k-- > 0; i = before[i]) ascent[k] = i;
   return ascent;
 }

@@ -120,7 +120,7 @@ TEST_CASE("Faulty times and images of a folder in KITTI's layout are left out an
   const TemporaryFolder folder;
   write_kitti(folder);
   folder.write("times.txt", c.times);
-  fs::remove(folder.path() / c.missing);
+  if (*c.missing != 0) fs::remove(folder.path() / c.missing);
   const auto reader = open_folder(folder.path());
   const auto packets = packets_of(*reader);
   CHECK(packets.size() == c.frames);

@@ -173,7 +173,7 @@ TEST_CASE("Depth that is not aligned with colour is refused, with the remedy",
   };
   const Case c = GENERATE(
       Case{{.width = 848}, "it has 848x1 px in place of 640x1"},
-      Case{{.info_fx = std::nan("")}, "fx, fy, cx, cy of   nan   457"},
+      Case{{.info_fx = std::nan(""), .images = 5}, "fx, fy, cx, cy of   nan   457"},
       Case{{.info_fx = 385.0, .images = 5}, "fx, fy, cx, cy of   385   457 320.5 240.5 in place"},
       Case{{.frame = "depth_optical", .info_fx = std::nullopt},
            "its frame is depth_optical, not color_optical"},
