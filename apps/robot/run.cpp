@@ -20,7 +20,6 @@
 #include "apps/robot/map_results.hpp"
 #include "apps/robot/process_usage.hpp"
 #include "apps/robot/results.hpp"
-#include "apps/robot/rounds_csv.hpp"
 #include "apps/robot/run_end.hpp"
 #include "apps/robot/run_findings.hpp"
 #include "apps/robot/status_text.hpp"

@@ -3,20 +3,24 @@
 #include <algorithm>
 #include <cmath>
 #include <exception>
+#include <initializer_list>
 #include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <ostream>
 #include <span>
+#include <stdexcept>
+#include <string_view>
+#include <utility>
 
 #include "apps/output_file.hpp"
 #include "apps/robot/pose_holes.hpp"
-#include "apps/robot/run_tables.hpp"
 #include "apps/team/closure_images.hpp"
 #include "apps/team/team_report.hpp"
 #include "modules/charts/html_page.hpp"
 #include "modules/charts/page_file.hpp"
 #include "modules/core/input_file.hpp"
+#include "modules/core/text_rows.hpp"
 
 namespace km {
 
@@ -125,27 +129,79 @@ Json closures_of(const RobotResult& robot, Reasons& reasons) {
   return rows;
 }
 
+// Rows of a table of numbers among the results of a robot, without the names of the columns.
+class TableRows {
+ public:
+  explicit TableRows(const fs::path& file)
+      : file_(file), text_(read_input_file(file)), rows_(split_rows(text_)) {
+    if (!rows_.empty()) rows_.erase(rows_.begin());
+  }
+
+  [[nodiscard]] const std::vector<TextRow>& all() const { return rows_; }
+
+  // Throws std::runtime_error that names the file and the line.
+  [[nodiscard]] double number(const TextRow& row, std::size_t i) const {
+    const auto value = number_in(row, i);
+    if (!value || !std::isfinite(*value))
+      throw std::runtime_error(file_.string() + " line " + std::to_string(row.line) + ": field " +
+                               std::to_string(i + 1) + " is not a number");
+    return *value;
+  }
+  // These columns of all rows.
+  [[nodiscard]] std::vector<Json> numbers(std::initializer_list<std::size_t> columns) const {
+    std::vector<Json> result;
+    for (const TextRow& row : rows_) {
+      Json& values = result.emplace_back();
+      for (const std::size_t i : columns) values.push_back(number(row, i));
+    }
+    return result;
+  }
+
+ private:
+  const fs::path file_;
+  const std::string text_;
+  std::vector<TextRow> rows_;
+};
+
+// Round and cost.
 Json rounds_of(const fs::path& file) {
-  Json rows = Json::array();
-  for (const NumberRow& row : thinned(read_number_rows(file, 5))) rows.push_back({row[1], row[3]});
-  return rows;
+  return thinned(TableRows(file).numbers({1, 3}));
 }
 
 Json process_of(const fs::path& file) {
-  return thinned(read_number_rows(file, 3));
+  return thinned(TableRows(file).numbers({0, 1, 2}));
 }
 
 Json timing_of(const fs::path& file) {
+  const TableRows table(file);
   Json rows = Json::array();
-  for (const ModuleTiming& m : read_timing(file))
-    rows.push_back({m.module, m.calls, m.median_ms, m.p95_ms, m.max_ms, m.total_s});
+  for (const TextRow& row : table.all()) {
+    Json& values = rows.emplace_back(Json::array({row.fields.front()}));
+    for (const std::size_t i : {1, 2, 3, 4, 5}) values.push_back(table.number(row, i));
+  }
   return rows;
 }
 
-// Bytes sent until each time of the table, by category.
+// Bytes sent until each time of the table, with retransmissions, by category.
 Json sent_of(const fs::path& file) {
+  struct SentBytes {
+    double time_s = 0.0;
+    std::map<std::string, double> by_category;
+  };
+  const TableRows table(file);
+  std::vector<SentBytes> all;
+  std::map<std::pair<std::string_view, std::string_view>, double> known;  // by topic and peer
+  for (const TextRow& row : table.all()) {
+    const double time_s = table.number(row, 0), bytes = table.number(row, 6) + table.number(row, 7);
+    if (all.empty() || all.back().time_s < time_s)
+      all.push_back(
+          {time_s, all.empty() ? std::map<std::string, double>() : all.back().by_category});
+    if (row.fields[1] == "out")
+      all.back().by_category[std::string(row.fields[3])] +=
+          bytes - std::exchange(known[{row.fields[2], row.fields[4]}], bytes);
+  }
   Json sent = Json::object();
-  for (const SentBytes& until : thinned(read_sent(file)))
+  for (const SentBytes& until : thinned(std::move(all)))
     for (const auto& [category, bytes] : until.by_category)
       sent[category].push_back({until.time_s, bytes});
   return sent;

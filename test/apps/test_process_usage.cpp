@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "apps/robot/process_usage.hpp"
-#include "apps/robot/rounds_csv.hpp"
 
 namespace km {
 namespace {
