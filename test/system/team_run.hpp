@@ -3,11 +3,14 @@
 #include <unistd.h>
 
 #include <catch2/catch.hpp>
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "apps/robot/run_summary.hpp"
@@ -15,6 +18,7 @@
 #include "runtime/dds/dds_config.hpp"
 #include "runtime/dds/domain_draw.hpp"
 #include "test/support/command.hpp"
+#include "test/support/patience.hpp"
 #include "test/support/pose_graph_problems.hpp"
 #include "test/support/split_graph.hpp"
 #include "test/support/temporary_folder.hpp"
@@ -22,10 +26,15 @@
 namespace km {
 
 /// A DDS domain that no other test uses while this process runs: tests run side by side, and robots
-/// of two tests with one id are twins.
+/// of two tests with one id are twins. Waits while other tests have all domains.
 inline int random_domain() {
   constexpr unsigned kLastDomain = kLastQuietDomain / 2;  // kimera_multi_team draws those above
-  return static_cast<int>(draw_domain(1, kLastDomain));
+  for (const auto end = std::chrono::steady_clock::now() + kPatience;;) try {
+      return static_cast<int>(draw_domain(1, kLastDomain));
+    } catch (const std::runtime_error&) {
+      if (std::chrono::steady_clock::now() > end) throw;
+      std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    }
 }
 
 /// Lines of a file; 0 if there is none.
