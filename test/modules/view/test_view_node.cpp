@@ -160,26 +160,6 @@ TEST_CASE("Earlier and new data are sent within their budgets", "[view]") {
   CHECK(rate > 0.9 * config.bytes_per_s);
 }
 
-TEST_CASE("Each state is sent", "[view]") {
-  Watched robot;
-  Visitor visitor(robot);
-  const std::size_t before = visitor.watcher.states.size();
-  for (std::uint32_t k = 1; k <= 10; ++k) {
-    robot.give(RobotSample{.name = "alpha", .keyframes = k, .links = {{4, 0.5F}}});
-    robot.pass(1.0);
-  }
-  REQUIRE(eventually([&] {
-    visitor.receive_all();
-    return visitor.watcher.states.size() >= before + 10;
-  }));
-  CHECK(visitor.watcher.states.size() == before + 10);
-  const RobotSample& state = visitor.watcher.states.back();
-  CHECK(state.name == "alpha");
-  CHECK(state.keyframes == 10);
-  REQUIRE(state.links.size() == 1);
-  CHECK(state.links[0].robot == 4);
-}
-
 TEST_CASE("A late viewer receives the full state", "[view]") {
   Watched robot;
   robot.give_keyframes(50);

@@ -4,6 +4,7 @@
 #include <span>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -81,76 +82,55 @@ TEST_CASE("Truncated and extended updates are refused", "[view]") {
   CHECK_FALSE(decode_view(Bytes{255, 0, 0}));
 }
 
+template <typename T, typename Change>
+ViewContent changed(T content, const Change& change) {
+  change(content);
+  return content;
+}
+
 TEST_CASE("Updates with impossible numbers are refused", "[view]") {
-  const double nan = std::numeric_limits<double>::quiet_NaN();
-  const float infinity = std::numeric_limits<float>::infinity();
-  RobotSample state;
-  SECTION("a cost") {
-    state.cost = nan;
-    CHECK_FALSE(is_understood(state));
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  const std::vector<std::pair<const char*, ViewContent>> impossible = {
+      {"a cost", RobotSample{.cost = kNan}},
+      {"a load", RobotSample{.loads = {{"vio", kNan}}}},
+      {"a silence", RobotSample{.links = {{1, kInfinity}}}},
+      {"a position",
+       changed(ViewPose{}, [](auto& pose) { pose.T_odom_body.translation().y() = kNan; })},
+      {"a far position",
+       changed(ViewPose{}, [](auto& pose) { pose.T_odom_body.translation().y() = 2e7; })},
+      {"a matrix that is no rotation",
+       changed(some_keyframes(2),
+               [](auto& keyframes) { keyframes.T_world_kf[1].linear() *= 1.1; })},
+      {"a feature", changed(some_image(), [](auto& image) { image.features[1][0] = kInfinity; })},
+      {"a closure with its ends exchanged", changed(some_closures(),
+                                                    [](auto& closures) {
+                                                      auto& id = closures.closures[0].id;
+                                                      std::swap(id.from, id.to);
+                                                    })},
+      {"a verdict", changed(some_closures(),
+                            [](auto& closures) {
+                              closures.closures[0].verdict = static_cast<ClosureStatus>(4);
+                            })},
+      {"a box of negative size",
+       changed(some_objects(), [](auto& objects) { objects.objects[1].size_m.y() = -1.0F; })},
+      {"no cells in a run", changed(some_raster(), [](auto& raster) { raster.runs[0] = 0; })},
+      {"fewer cells", changed(some_raster(), [](auto& raster) { raster.runs[0] = 2; })},
+      {"more cells", changed(some_raster(), [](auto& raster) { raster.runs[0] = 255; })},
+      {"another value", changed(some_raster(), [](auto& raster) { raster.runs[1] = 2; })},
+      {"a large raster",
+       changed(some_raster(),
+               [](auto& raster) { raster.width = raster.height = ViewRaster::kMaxSide; })},
+      {"a face outside", changed(some_chunk(), [](auto& chunk) { chunk.faces[0][2] = 4; })},
+  };
+  for (const auto& [what, content] : impossible) {
+    CAPTURE(what);
+    CHECK_FALSE(is_understood(content));
   }
-  SECTION("a load") {
-    state.loads = {{"vio", nan}};
-    CHECK_FALSE(is_understood(state));
-  }
-  SECTION("a silence") {
-    state.links = {{1, infinity}};
-    CHECK_FALSE(is_understood(state));
-  }
-  SECTION("a position") {
-    ViewPose pose;
-    pose.T_odom_body.translation().y() = nan;
-    CHECK_FALSE(is_understood(pose));
-    pose.T_odom_body.translation().y() = 2e7;
-    CHECK_FALSE(is_understood(pose));
-  }
-  SECTION("a rotation") {
-    ViewKeyframes keyframes = some_keyframes(2);
-    keyframes.T_world_kf[1].linear() *= 1.1;  // A matrix that is no rotation.
-    CHECK_FALSE(is_understood(keyframes));
-  }
-  SECTION("a feature") {
-    ViewImage image = some_image();
-    image.features[1][0] = infinity;
-    CHECK_FALSE(is_understood(image));
-  }
-  SECTION("a closure with its ends exchanged") {
-    ViewClosures closures = some_closures();
-    std::swap(closures.closures[0].id.from, closures.closures[0].id.to);
-    CHECK_FALSE(is_understood(closures));
-  }
-  SECTION("a verdict") {
-    ViewClosures closures = some_closures();
-    closures.closures[0].verdict = static_cast<ClosureStatus>(4);
-    CHECK_FALSE(is_understood(closures));
-  }
-  SECTION("a box of negative size") {
-    ViewObjects objects = some_objects();
-    objects.objects[1].size_m.y() = -1.0F;
-    CHECK_FALSE(is_understood(objects));
-  }
-  SECTION("a raster whose runs do not have the number of its cells") {
-    ViewRaster raster = some_raster();
-    raster.runs[0] = GENERATE(std::uint8_t{0}, std::uint8_t{2}, std::uint8_t{255});
-    CHECK_FALSE(is_understood(raster));
-  }
-  SECTION("a raster with other values") {
-    ViewRaster raster = some_raster();
+  CHECK(is_understood(changed(some_raster(), [](auto& raster) {
     raster.runs[1] = 2;
-    CHECK_FALSE(is_understood(raster));
     raster.kind = RasterKind::kDistances;
-    CHECK(is_understood(raster));
-  }
-  SECTION("a raster that is too large") {
-    ViewRaster raster = some_raster();
-    raster.width = raster.height = ViewRaster::kMaxSide;
-    CHECK_FALSE(is_understood(raster));
-  }
-  SECTION("a face outside") {
-    MeshChunk chunk = some_chunk();
-    chunk.faces[0][2] = 4;
-    CHECK_FALSE(is_understood(chunk));
-  }
+  })));
 }
 
 TEST_CASE("The size of an update is bounded", "[view]") {
