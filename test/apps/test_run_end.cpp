@@ -1,5 +1,8 @@
 #include <catch2/catch.hpp>
 
+#include <functional>
+#include <string>
+#include <tuple>
 #include <vector>
 
 #include "apps/robot/run_end.hpp"
@@ -118,67 +121,64 @@ RunEnd usual_end() {
   return end;
 }
 
-TEST_CASE("A run with poses is a success and reports their number", "[run_end]") {
-  const Verdict verdict = verdict_of(usual_end());
-  CHECK(verdict.exit_code == 0);
-  CHECK(verdict.reason == "all present robots have settled");
+TEST_CASE("A run is judged by the gravest that happened to it", "[run_end]") {
   CHECK(to_string(*usual_end().images) == "88 of 100 images have a pose");
-}
-
-TEST_CASE("A run without a single pose fails and reports the number of images by reason",
-          "[run_end]") {
-  RunEnd end = usual_end();
-  end.images->with_pose = 0;
-  const Verdict verdict = verdict_of(end);
-  CHECK(verdict.exit_code == 1);
-  CHECK(verdict.reason ==
-        "no pose estimated: of 100 images, 4 could not be used, 6 were skipped because processors "
-        "were short, "
-        "90 were read but odometry did not start on them");
-}
-
-TEST_CASE("Without sensors, or interrupted, no pose is no failure", "[run_end]") {
-  RunEnd graph = usual_end();
-  graph.images.reset();
-  CHECK(verdict_of(graph).exit_code == 0);
-  RunEnd interrupted = usual_end();
-  interrupted.images->with_pose = 0;
-  interrupted.result.interrupted = true;
-  CHECK(verdict_of(interrupted).exit_code == 0);
-  CHECK(verdict_of(interrupted).reason == "interrupted");
-}
-
-TEST_CASE("Live sensors that gave no image make a failure of a run, however it ends", "[run_end]") {
-  RunEnd end = usual_end();
-  end.is_live = true;
-  end.result.interrupted = true;
-  end.images = ImageCounts{};
-  CHECK(verdict_of(end).exit_code == 1);
-  CHECK_THAT(verdict_of(end).reason,
-             Catch::StartsWith("no image came: kimera_multi_doctor --live"));
-  end.images->read = 1;
-  CHECK(verdict_of(end).exit_code == 0);
-  end = usual_end();
-  end.is_live = true;
-  end.id_taken = true;  // the more severe reason comes first
-  end.images = ImageCounts{};
-  CHECK(verdict_of(end).exit_code == 3);
-}
-
-TEST_CASE("A robot that leaves without others has a verdict of its own that names them",
-          "[run_end]") {
-  RunEnd end = usual_end();
-  end.missed = {{"bob", Absence::kSilent, 31.24}};
-  CHECK(verdict_of(end).exit_code == 0);
-  CHECK(verdict_of(end).reason == "settled without bob (not received for 31.2 s)");
-  end.departure = "time limit for serving peers";
-  end.missed.push_back({"carol", Absence::kApart, 7.0});
-  CHECK(verdict_of(end).reason ==
-        "time limit for serving peers without bob (not received for 31.2 s), carol (received, but "
-        "not in "
-        "one frame for 7.0 s)");
-  end.result.interrupted = true;
-  CHECK(verdict_of(end).reason == "interrupted");  // it was interrupted before it could leave
+  const RunResult::Failure failed{"vio", "out of memory"},
+      hung{"vio", "has not finished one step for 30 s", true};
+  const auto be_silent = [](RunEnd& end) {  // live sensors without an image
+    end.is_live = true;
+    end.images = ImageCounts{};
+  };
+  const auto miss_bob = [](RunEnd& end) { end.missed = {{"bob", Absence::kSilent, 31.24}}; };
+  const auto miss_both = [&](RunEnd& end) {
+    miss_bob(end);
+    end.missed.push_back({"carol", Absence::kApart, 7.0});
+    end.departure = "time limit for serving peers";
+  };
+  const auto lose_results = [](RunEnd& end) {
+    end.lost_results = {{"out/a", "out/a: cannot be written: No space left on device"},
+                        {"out/b", "out/b: cannot be written: Is a directory"}};
+  };
+  const auto have_no_pose = [](RunEnd& end) { end.images->with_pose = 0; };
+  const auto interrupt = [](RunEnd& end) { end.result.interrupted = true; };
+  const auto take_id = [](RunEnd& end) { end.id_taken = true; };
+  using Changes = std::vector<std::function<void(RunEnd&)>>;
+  const std::vector<std::tuple<Changes, int, std::string>> rows = {
+      {{}, 0, "all present robots have settled"},
+      {{have_no_pose},
+       1,
+       "no pose estimated: of 100 images, 4 could not be used, 6 were skipped because processors "
+       "were short, 90 were read but odometry did not start on them"},
+      {{[](RunEnd& end) { end.images.reset(); }}, 0, "all present robots have settled"},
+      {{have_no_pose, interrupt}, 0, "interrupted"},
+      {{be_silent, interrupt}, 1, "no image came: kimera_multi_doctor --live"},
+      {{be_silent, interrupt, [](RunEnd& end) { end.images->read = 1; }}, 0, "interrupted"},
+      {{be_silent, take_id}, 3, "another robot has this robot's id 7"},
+      {{miss_bob}, 0, "settled without bob (not received for 31.2 s)"},
+      {{miss_both},
+       0,
+       "time limit for serving peers without bob (not received for 31.2 s), carol (received, but "
+       "not in one frame for 7.0 s)"},
+      {{miss_both, interrupt}, 0, "interrupted"},  // before it could leave
+      {{lose_results},
+       4,
+       "all present robots have settled; 2 results lost: out/a: cannot be written: No space left "
+       "on device; out/b: cannot be written: Is a directory"},
+      {{lose_results, have_no_pose}, 1, "no pose estimated"},
+      {{take_id}, 3, "another robot has this robot's id 7"},
+      {{take_id, [&](RunEnd& end) { end.result.failure = hung; }}, 5, "vio: has not finished"},
+      {{take_id, [&](RunEnd& end) { end.result.failure = failed; }}, 3, "vio: out of memory"},
+      {{lose_results, have_no_pose, [&](RunEnd& end) { end.result.failure = failed; }},
+       3,
+       "vio: out of memory"},
+  };
+  for (const auto& [changes, exit_code, reason] : rows) {
+    RunEnd end = usual_end();
+    for (const auto& change : changes) change(end);
+    CAPTURE(reason);
+    CHECK(verdict_of(end).exit_code == exit_code);
+    CHECK_THAT(verdict_of(end).reason, Catch::StartsWith(reason));
+  }
 }
 
 using enum Absentees::Contact;
@@ -224,34 +224,6 @@ TEST_CASE("A member that only others received is missed once it cannot have left
                    std::vector<RobotId>{1, 2});
   CHECK(text_of(absentees, 3.0) == "carol silent 4 ");
   CHECK(text_of(absentees, 5.0).empty());
-}
-
-TEST_CASE("Lost results are reported with their reasons and have the least severe exit code",
-          "[run_end]") {
-  RunEnd end = usual_end();
-  end.lost_results = {{"out/a", "out/a: cannot be written: No space left on device"},
-                      {"out/b", "out/b: cannot be written: Is a directory"}};
-  CHECK(verdict_of(end).exit_code == 4);
-  CHECK(verdict_of(end).reason ==
-        "all present robots have settled; 2 results lost: out/a: cannot be written: No space left "
-        "on device; out/b: cannot be written: Is a directory");
-  end.images->with_pose = 0;
-  CHECK(verdict_of(end).exit_code == 1);
-  end.result.failure = RunResult::Failure{"vio", "out of memory"};
-  CHECK(verdict_of(end).exit_code == 3);
-}
-
-TEST_CASE("A second robot of the same id is a failure, a failed module a greater one",
-          "[run_end]") {
-  RunEnd end = usual_end();
-  end.id_taken = true;
-  CHECK(verdict_of(end).exit_code == 3);
-  CHECK_THAT(verdict_of(end).reason, Catch::Contains("another robot has this robot's id 7"));
-  end.result.failure = RunResult::Failure{"vio", "has not finished one step for 30 s", true};
-  CHECK(verdict_of(end).exit_code == 5);
-  end.result.failure = RunResult::Failure{"vio", "out of memory"};
-  CHECK(verdict_of(end).exit_code == 3);
-  CHECK(verdict_of(end).reason == "vio: out of memory");
 }
 
 }  // namespace
