@@ -231,7 +231,7 @@ RunSummary summary_of(const RunRecord& record) {
   summary.keyframes = record.keyframes().size();
   summary.keypoints = record.keypoints();
   summary.peer_keyframes = record.peer_keyframes();
-  for (const auto& [peer, counts] : record.closures_per_peer()) {
+  for (const auto& [peer, counts] : record.closure_tallies()) {
     summary.closures.candidates += counts.candidates;
     summary.closures.verified += counts.verified;
     summary.closures.inliers += counts.inliers;

@@ -245,19 +245,6 @@ std::vector<StampedPose> RunRecord::optimized() const {
   return odometry_.empty() ? keyframes : correct_odometry(odometry_, keyframes);
 }
 
-std::map<RobotId, ClosureCounts> RunRecord::closures_per_peer() const {
-  std::map<RobotId, ClosureCounts> result;
-  for (const auto& [id, outcome] : outcomes_) {
-    ClosureCounts& counts = result[id.from.robot == robot_ ? id.to.robot : id.from.robot];
-    ++counts.candidates;
-    // The peer may have verified a pair that this robot did not.
-    const bool is_verified = outcome.stage >= ClosureStage::kVerified;
-    counts.verified += is_verified ? 1 : 0;
-    counts.inliers += is_verified && is_inlier(id) ? 1 : 0;
-  }
-  return result;
-}
-
 std::map<RobotId, ClosureTally> RunRecord::closure_tallies() const {
   std::map<RobotId, ClosureTally> result;
   for (const ClosureOutcome& outcome : outcomes()) {

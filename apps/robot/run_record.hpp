@@ -146,10 +146,8 @@ class RunRecord {
   /// that had a solution.
   [[nodiscard]] const std::vector<StampedPose>& live() const { return live_; }
 
-  /// Closures that this robot found, by the other robot (or itself).
-  [[nodiscard]] std::map<RobotId, ClosureCounts> closures_per_peer() const;
-
-  /// Closures that this robot found, by stage, and by the reason why they went no further.
+  /// Closures that this robot found, by the other robot (or itself): by stage, and by the reason
+  /// why they went no further. The other robot may have verified a pair that this robot did not.
   [[nodiscard]] std::map<RobotId, ClosureTally> closure_tallies() const;
 
   /// By robot, the number of its keyframes that were compared by ORB, because its keypoints are

@@ -34,7 +34,7 @@ std::string closures_text(const RunRecord& record, const std::vector<Peer>& peer
   for (const Peer& peer : peers) names[peer.identity.robot] = peer.identity.name;
   names[record.robot()] = "own";
   std::string text = "closures:";
-  for (const auto& [robot, counts] : record.closures_per_peer()) {
+  for (const auto& [robot, counts] : record.closure_tallies()) {
     const std::string& name = names[robot];
     text += ' ' + (name.empty() ? std::to_string(robot) : name) + ' ' +
             std::to_string(counts.candidates) + '>' + std::to_string(counts.verified) + '>' +

@@ -37,7 +37,6 @@ TEST_CASE("a closure that the optimiser rejects is no inlier, until it is accept
   CHECK(outcomes[1].reason == "rejected: the other closures contradict it");
   CHECK(outcomes[2].reason == "inconsistent with the other closures of the robot pair");
   CHECK(record.inlier_closures().size() == 1);
-  CHECK(record.closures_per_peer().at(2).inliers == 1);
   const ClosureTally tally = record.closure_tallies().at(2);
   CHECK(tally.candidates == 3);
   CHECK(tally.inliers == 1);
@@ -230,7 +229,7 @@ TEST_CASE("closures with a robot that restarts are dropped, those with a resumed
   }
   CHECK(record.closures().size() == 1);
   CHECK(record.outcomes().size() == 1);
-  CHECK(record.closures_per_peer().at(3).inliers == 1);
+  CHECK(record.closure_tallies().at(3).inliers == 1);
   // In the new incarnation the same indices mean other keyframes, and versions begin again.
   for (const ClosureId& id : {with_it, doubted}) record.add(closure_between(id));
   CHECK(record.inlier_closures().size() == 1);
@@ -262,8 +261,8 @@ TEST_CASE("a closure that only the peer has verified is none of this robot's", "
   record.add(ClosureOutcome{.id = id, .stage = ClosureStage::kReceived, .reason = {}});
   record.add(InlierSet{1, 2, 1, {id}});
   REQUIRE(record.inlier_closures().size() == 1);
-  CHECK(record.closures_per_peer().at(2).verified == 0);
-  CHECK(record.closures_per_peer().at(2).inliers == 0);
+  CHECK(record.closure_tallies().at(2).verified == 0);
+  CHECK(record.closure_tallies().at(2).inliers == 0);
 }
 
 TEST_CASE("a closure is the same from whichever end it was found", "[robot]") {
@@ -277,7 +276,7 @@ TEST_CASE("a closure is the same from whichever end it was found", "[robot]") {
   REQUIRE(record.outcomes().size() == 1);
   CHECK(record.outcomes()[0].id == ClosureId{low, high});
   CHECK(record.outcomes()[0].stage == ClosureStage::kInlier);
-  CHECK(record.closures_per_peer().at(1).inliers == 1);
+  CHECK(record.closure_tallies().at(1).inliers == 1);
 
   const TemporaryFolder folder;
   ResultWriter results;
