@@ -1,4 +1,3 @@
-#include <yaml-cpp/yaml.h>
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <filesystem>
@@ -11,7 +10,7 @@
 #include "modules/outlier_rejection/pcm.hpp"
 #include "modules/outlier_rejection/witnessed_pair.hpp"
 #include "modules/recorded_graph/recorded_graph.hpp"
-#include "runtime/yaml_config.hpp"
+#include "runtime/config_layers.hpp"
 #include "test/support/shared_data.hpp"
 
 namespace km {
@@ -89,10 +88,16 @@ TEST_CASE("PCM keeps exactly the true half of DOOR-SLAM's simulated closures", "
   }
 }
 
+PcmConfig tunnels_config() {
+  ConfigLayers layers;
+  layers.add_file("config/datasets/tunnels.yaml");
+  return layers.load<PcmConfig>();
+}
+
 TEST_CASE("Every two robots in tunnels are joined by witnesses", "[recorded]") {
   const auto files = team("multi_robot/tunnels_8robots/robot", 8, ".csv");
   if (files.empty()) return;
-  const auto config = load_config<PcmConfig>(YAML::LoadFile("config/datasets/tunnels.yaml"));
+  const auto config = tunnels_config();
   std::map<RobotPair, WitnessedPair> pairs;
   std::map<RobotPair, std::set<ClosureId>> given;
   for (const Closure& closure : recorded_closures(files)) {
