@@ -49,15 +49,6 @@ std::string joined(const std::string& name, const std::string& key) {
   return name.empty() ? key : name + '.' + key;
 }
 
-// Replaces keys by those of the map `quick:` in a quick run; otherwise moves them to `unused`.
-void apply_quick(ConfigSection& section, const std::string& name, const ConfigContext& context) {
-  const auto quick = section.values.extract("quick");
-  if (quick.empty()) return;
-  const ConfigValue& map = quick.mapped();
-  for (const auto& [key, value] : read_section(map.node, name, map.file, context).values)
-    (*context.quick ? section.values : section.unused).insert_or_assign(key, value);
-}
-
 }  // namespace
 
 void ConfigProblems::finish() const {
@@ -124,7 +115,7 @@ std::string suggestion(const std::string& word, const std::set<std::string>& kno
 
 ConfigSection read_section(const YAML::Node& node, const std::string& name, const std::string& file,
                            const ConfigContext& context) {
-  ConfigSection section{place_of(node, file), {}, {}};
+  ConfigSection section{place_of(node, file), {}};
   const std::string called = name.empty() ? "the file" : name;
   const auto problem = [&](const std::string& where, const std::string& text) {
     context.problems.others += line_of(where + ": " + text);
@@ -145,7 +136,6 @@ ConfigSection read_section(const YAML::Node& node, const std::string& name, cons
         section.values.try_emplace(key, ConfigValue{entry.second, file, where});
     if (!fresh) problem(where, joined(name, key) + " is repeated, see " + earlier->second.where);
   }
-  if (context.quick) apply_quick(section, name, context);
   return section;
 }
 
@@ -192,11 +182,10 @@ void YamlFields::check(bool ok, const char* key, const std::string& problem,
 }
 
 void YamlFields::finish() {
-  for (const auto* values : {&section_.values, &section_.unused})
-    for (const auto& [key, value] : *values)
-      if (!known_.contains(key))
-        context_.problems.unknown +=
-            line_of(value.where + ": unknown key " + full_name(key) + suggestion(key, known_));
+  for (const auto& [key, value] : section_.values)
+    if (!known_.contains(key))
+      context_.problems.unknown +=
+          line_of(value.where + ": unknown key " + full_name(key) + suggestion(key, known_));
 }
 
 std::string YamlFields::full_name(const std::string& key) const {

@@ -104,7 +104,7 @@ void define(CLI::App& app, SimulationOptions& options) {
   struct Given {
     explicit Given(CLI::App& app) : fields(app, given) {}
     std::string file;
-    ConfigSection given{"command line", {}, {}};
+    ConfigSection given{"command line", {}};
     OptionFields fields;
   };
   const auto line = std::make_shared<Given>(app);
