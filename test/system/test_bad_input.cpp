@@ -160,21 +160,4 @@ TEST_CASE("A folder that results cannot go to is refused before any other output
   CHECK(folder.read("map.yaml") == "mine");
 }
 
-TEST_CASE("Noise that no sensor has is refused before the run", "[system]") {
-  const auto recording = shared_data("euroc/MH_01_easy");
-  if (!recording) return;
-  const TemporaryFolder folder;
-  excerpt(*recording).write(folder.path() / "recording");
-  const std::string name = "recording/mav0/imu0/sensor.yaml", key = "gyroscope_noise_density:";
-  std::string text = folder.read(name);
-  text.insert(text.find(key) + key.size(), " 1e-300 #");
-  fs::remove(folder.path() / name);  // a link to the original
-  folder.write(name, text);
-  const CommandResult result = run_robot(folder);
-  CAPTURE(result.output);
-  CHECK(result.exit_code == 1);
-  CHECK_THAT(result.output, Catch::Contains("imu0/sensor.yaml line") &&
-                                Catch::Contains("gyroscope_noise_density is not a number within"));
-}
-
 }  // namespace km

@@ -101,43 +101,6 @@ bool is_past_start(const std::string& line) {
          seconds >= 4.0;
 }
 
-TEST_CASE("An interrupted robot ends in order with everything written", "[system]") {
-  const auto dataset = shared_data("euroc/MH_01_easy");
-  if (!dataset) return;
-  const TemporaryFolder folder;
-  Process robot(robot_command("5", *dataset, folder.path(), random_domain()));
-  REQUIRE(robot.wait_until(is_past_start).has_value());
-  robot.kill(SIGINT);
-  CHECK(robot.wait() == 0);
-  CHECK(fs::file_size(folder.path() / "odometry.tum") > 0);
-  CHECK(read_summary(folder.path() / "summary.json").exit_reason == "interrupted");
-}
-
-TEST_CASE("A robot whose peer is killed continues, finishes and names the lost peer", "[system]") {
-  const auto dataset = shared_data("euroc/MH_01_easy");
-  if (!dataset) return;
-  const TemporaryFolder folder;
-  const int domain = random_domain();
-  auto command = robot_command("1", *dataset, folder.path() / "a", domain);
-  command.insert(command.end(), {"--to", "7.5"});
-  Process survivor(command);
-  {
-    Process victim(robot_command("60000", *dataset, folder.path() / "b", domain));
-    REQUIRE(victim.wait_until(is_past_start).has_value());
-    const auto knows_it = [](const std::string& line) {
-      return line.find("r60000 alive") != line.npos;
-    };
-    REQUIRE(survivor.wait_until(knows_it).has_value());
-    victim.kill(SIGKILL);
-  }
-  CHECK(survivor.wait() == 0);
-  const RunSummary summary = read_summary(folder.path() / "a/summary.json");
-  CHECK(summary.pgo.settled);
-  REQUIRE(summary.lost_peers.size() == 1);
-  CHECK(summary.lost_peers.at("r60000") > 0.0);
-  CHECK_THAT(summary.exit_reason, Catch::StartsWith("settled without r60000 (not received for "));
-}
-
 TEST_CASE("A robot whose id is taken reports it and ends, and the first owner of the id continues",
           "[system]") {
   const auto dataset = shared_data("euroc/MH_01_easy");
