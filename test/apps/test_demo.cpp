@@ -109,34 +109,28 @@ TEST_CASE("The demo joins three robots of a simulated world into one frame", "[d
     CHECK(std::filesystem::exists(folder.path() / file));
 }
 
-TEST_CASE("The demo prints the commands to play a bag", "[demo]") {
+TEST_CASE("The demo prints the commands to play a bag, to be pasted", "[demo]") {
   const TemporaryFolder folder;
-  const auto [file, dataset] = GENERATE(table<std::string, std::string>({
-      {"walk.bag", "walk.bag"},
-      {"walk.mcap", "walk.mcap"},
-      {"walk.db3", "walk.db3"},
-      {"ros2/metadata.yaml", "ros2"},
-      {"ros2/walk_0.db3", "ros2"},
-      {"ros2/walk_0.mcap", "ros2"},
+  const auto [file, dataset, pasted] = GENERATE(table<std::string, std::string, std::string>({
+      {"walk.bag", "walk.bag", "walk.bag"},
+      {"walk.mcap", "walk.mcap", "walk.mcap"},
+      {"walk.db3", "walk.db3", "walk.db3"},
+      {"ros2/metadata.yaml", "ros2", "ros2"},
+      {"ros2/walk_0.db3", "ros2", "ros2"},
+      {"ros2/walk_0.mcap", "ros2", "ros2"},
+      {"a walk.bag", "a walk.bag", "a\\ walk.bag"},
   }));
   CAPTURE(file, dataset);
   folder.write(file, "x");
   const std::string path = (folder.path() / dataset).string();
-  const auto demo = run_command("apps/demo --programs " KM_BIN_DIR " " + path);
+  const auto demo = run_command("apps/demo --programs " KM_BIN_DIR " '" + path + '\'');
   CHECK(demo.exit_code == 1);
-  const std::string robot = KM_BIN_DIR "/kimera_multi_robot ";
+  const std::string robot = KM_BIN_DIR "/kimera_multi_robot ",
+                    name = (folder.path() / pasted).string();
   CHECK_THAT(demo.output, Catch::StartsWith("demo: " + path + " is a bag of ROS.") &&
-                              Catch::Contains(robot + "--inspect " + path + " rig.yaml\n") &&
-                              Catch::Contains(robot + "--robot 0 --dataset " + path +
+                              Catch::Contains(robot + "--inspect " + name + " rig.yaml\n") &&
+                              Catch::Contains(robot + "--robot 0 --dataset " + name +
                                               " --rig rig.yaml --output results/robot0\n"));
-}
-
-TEST_CASE("The demo's commands for a bag can be pasted, also with spaces in its name", "[demo]") {
-  const TemporaryFolder folder;
-  const auto bag = folder.write("a walk.bag", "x");
-  const auto demo = run_command("apps/demo '" + bag.string() + "'");
-  CHECK(demo.exit_code == 1);
-  CHECK_THAT(demo.output, Catch::Contains((folder.path() / "a\\ walk.bag").string() + " rig.yaml"));
 }
 
 // A recording of 10 s, and programs that print their command lines.
@@ -170,6 +164,13 @@ TEST_CASE("The demo builds and draws a map of a recording with --map only", "[de
   CHECK(without.exit_code == 0);
   CHECK_THAT(without.output, !Catch::Contains(settings) && !Catch::Contains("team_mesh.png"));
 
+  const CommandResult none = demo.run("--map");
+  CAPTURE(none.output);
+  CHECK(none.exit_code == 1);
+  CHECK_THAT(none.output, Catch::Contains("report.html") && !Catch::Contains("team_mesh.png ") &&
+                              Catch::EndsWith("demo: the team built no mesh: the notes above and "
+                                              "robot0/robot.log have the reason\n"));
+
   demo.add("team",
            "echo \"$*\"; : >\"" + (demo.folder.path() / "out/team_mesh.ply").string() + '"');
   const CommandResult with = demo.run("--map");
@@ -181,6 +182,11 @@ TEST_CASE("The demo builds and draws a map of a recording with --map only", "[de
   const std::string render = demo.folder.read("out/render.log");
   CHECK_THAT(render,
              Catch::Contains("/out/team_mesh.ply --output ") && !Catch::Contains("--palette"));
+
+  std::filesystem::remove(demo.folder.path() / "bin/kimera_multi_evaluate");
+  CHECK(demo.run("").exit_code == 0);
+  CHECK_THAT(demo.run("--map").output,
+             Catch::StartsWith("demo: --programs: no kimera_multi_evaluate in "));
 }
 
 TEST_CASE("The demo lets robots be watched with --view only", "[demo]") {
@@ -195,25 +201,6 @@ TEST_CASE("The demo lets robots be watched with --view only", "[demo]") {
   CHECK_THAT(with.output, Catch::Contains("To watch the team, open http://here") &&
                               Catch::Contains("/kimera_multi_team --config") &&
                               Catch::Contains(" --view\n"));
-}
-
-TEST_CASE("The demo names the missing map, and lists the other results", "[demo]") {
-  const StubbedDemo demo;
-  const CommandResult result = demo.run("--map");
-  CAPTURE(result.output);
-  CHECK(result.exit_code == 1);
-  CHECK_THAT(result.output, Catch::Contains("report.html") && !Catch::Contains("team_mesh.png ") &&
-                                Catch::EndsWith("demo: the team built no mesh: the notes above and "
-                                                "robot0/robot.log have the reason\n"));
-}
-
-TEST_CASE("The demo needs the evaluation program for a map", "[demo]") {
-  const StubbedDemo demo;
-  std::filesystem::remove(demo.folder.path() / "bin/kimera_multi_evaluate");
-  CHECK(demo.run("").exit_code == 0);
-  const CommandResult with = demo.run("--map");
-  CHECK(with.exit_code == 1);
-  CHECK_THAT(with.output, Catch::StartsWith("demo: --programs: no kimera_multi_evaluate in "));
 }
 
 TEST_CASE("The demo refuses unusable input", "[demo]") {
