@@ -7,7 +7,6 @@
 #include <set>
 #include <sstream>
 
-#include "apps/centralised_system.hpp"
 #include "apps/output_file.hpp"
 #include "modules/core/text_table.hpp"
 #include "modules/evaluation/mesh/mesh_report.hpp"
@@ -18,7 +17,8 @@ namespace {
 
 using Rows = std::vector<std::vector<std::string>>;
 
-constexpr std::array kTraffic = {"place_recognition", "geometric_verification", "pgo", "map",
+constexpr const char* kMapTraffic = "map";
+constexpr std::array kTraffic = {"place_recognition", "geometric_verification", "pgo", kMapTraffic,
                                  "other"};
 
 // Absolute error, drift and covered share of the recording; "-" for missing values.
@@ -130,10 +130,13 @@ std::string closure_table(const TeamResult& team) {
 std::string centralised_remark(const std::map<std::string, std::uint64_t>& traffic,
                                std::uint64_t keyframes, const PeerKeyframeCounts& received) {
   constexpr double kKeypointsOfPaper = 1000.0;
-  const double sent = counted_bytes(traffic);
+  constexpr double kKeypointBytes = 40.0;  // 8 of position and 32 of ORB descriptor
+  double sent = 0.0;
+  for (const auto& [category, bytes] : traffic)
+    if (category != kMapTraffic) sent += static_cast<double>(bytes);
   if (sent == 0.0 || keyframes == 0) return "";
   const auto share = [&](double keypoints) {
-    const double bytes = server_bytes(static_cast<double>(keyframes), keypoints);
+    const double bytes = static_cast<double>(keyframes) * keypoints * kKeypointBytes;
     return bytes_text(bytes) + ", of which the robots send " + fixed(100.0 * sent / bytes, 1) +
            " %";
   };

@@ -4,9 +4,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "apps/centralised_system.hpp"
 #include "apps/robot/run_summary.hpp"
-#include "runtime/dds/qos.hpp"
 #include "test/support/temporary_folder.hpp"
 
 namespace km {
@@ -55,10 +53,6 @@ TEST_CASE("A summary with all possible values is read as it was written", "[robo
   CHECK(json_text(read_summary(folder.write("full.json", full))) == full);
   CHECK(json_text(read_summary(folder.write("default.json", least))) == least);
   CHECK(json_text(read_summary(folder.write("empty.json", "{}"))) == least);
-}
-
-TEST_CASE("The category of the map has one name", "[robot][summary]") {
-  CHECK(to_string(TrafficCategory::kMap) == kMapTraffic);
 }
 
 TEST_CASE("summary.json has the keys that others read", "[robot][summary]") {
