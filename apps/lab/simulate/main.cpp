@@ -6,15 +6,12 @@
 
 namespace {
 
-constexpr int kInterrupted = 130;  // exit code of shells for SIGINT
-
 constexpr const char* kAbout =
-    R"(Makes recordings of robots that move through a built-in world: EuRoC/ASL folders with images, inertial
-data and the truth, and a team file to run on them.
+    R"(Makes recordings of robots that move through a built-in world: EuRoC/ASL folders with images,
+inertial data and the truth, and a team file to run on them.
 
-Worlds: city, camp and store have roads or aisles for vehicles; vicon_room and hall are for flying robots.
-The same seed makes the same bytes, for any number of threads. Ctrl-C stops in order, a second one at
-once; the same command continues a stopped run.
+Worlds: city and camp have roads for vehicles, vicon_room is for flying robots. The same seed makes
+the same bytes, whatever the number of threads. The same command continues a stopped run.
 
 Examples:
   kimera_multi_simulate --world city --robots 2 --duration 60 --output city
@@ -23,13 +20,13 @@ Examples:
   kimera_multi_simulate --world vicon_room --resolution 376x240 --output small
   kimera_multi_team --config small/team.yaml --output results/small
 
-With --trajectory and --imu the robots move like recorded flights, and keep the recorded inertial data;
-only the images are rendered:
+With --trajectory and --imu the robots move as recorded flights did, and keep the recorded inertial
+data; only the images are rendered:
   kimera_multi_simulate --world vicon_room --trajectory V1_02.csv V1_03.csv \
       --imu V1_02.imu.csv V1_03.imu.csv --names a b --end 60 --output vicon1
 
-Exit codes: 0 if the recordings are complete; 1 for unusable input or a disk that cannot be written; 130 if
-it was stopped.)";
+Exit code: 0 if the recordings are complete, 1 for input that cannot be used or a disk that cannot be
+written.)";
 
 }  // namespace
 
@@ -39,16 +36,11 @@ int main(int argc, char** argv) try {
   km::define(app, options);
   if (const auto exit_code = km::parse_options(app, argc, argv, 1)) return *exit_code;
   options = km::completed(options);
-  km::SignalWatch signals;
-  km::Progress progress;
-  if (km::simulate(options, signals, progress) == km::SimulationOutcome::kComplete) {
-    std::cout << "Complete: " << options.output.string() << "\nRun a team on it:\n  "
-              << "kimera_multi_team --config " << (options.output / "team.yaml").string()
-              << " --output results" << std::endl;
-    return 0;
-  }
-  std::cout << "Stopped; the same command continues from here." << std::endl;
-  return kInterrupted;
+  km::simulate(options);
+  std::cout << "Complete: " << options.output.string() << "\nRun a team on it:\n  "
+            << "kimera_multi_team --config " << (options.output / "team.yaml").string()
+            << " --output results" << std::endl;
+  return 0;
 } catch (const std::exception& error) {
   std::cerr << "kimera_multi_simulate: " << error.what() << '\n';
   return 1;

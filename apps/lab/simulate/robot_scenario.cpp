@@ -1,19 +1,151 @@
 #include "apps/lab/simulate/robot_scenario.hpp"
 
+#include <zlib.h>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdio>
+#include <optional>
 #include <stdexcept>
 
 #include "apps/lab/simulation/motion/default_rig.hpp"
 #include "apps/lab/simulation/motion/flight_trajectory.hpp"
 #include "apps/lab/simulation/motion/imu_simulator.hpp"
-#include "apps/lab/simulation/motion/recorded_trajectory.hpp"
-#include "apps/lab/simulation/motion/told_calibration.hpp"
+#include "apps/lab/simulation/motion/sensor_errors.hpp"
 #include "apps/lab/simulation/motion/vehicle_trajectory.hpp"
-#include "apps/lab/simulation/world/routes.hpp"
 #include "apps/lab/simulation/world/seeded_random.hpp"
+#include "apps/lab/simulation/world/world.hpp"
+#include "modules/core/text_rows.hpp"
 
 namespace km {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kMaxNormError = 0.01;  // largest error of the norm of a quaternion
+
+// Text of a file, decompressed if it is gzipped (zlib passes other files through), and its check
+// sum.
+struct Table {
+  fs::path file;
+  std::string text;
+
+  explicit Table(const fs::path& path) : file(path) {
+    const gzFile stream = gzopen(path.c_str(), "rb");
+    if (stream == nullptr) throw std::runtime_error(path.string() + ": cannot be read");
+    std::vector<char> buffer(1 << 16);
+    int n = 0;
+    while ((n = gzread(stream, buffer.data(), static_cast<unsigned>(buffer.size()))) > 0)
+      text.append(buffer.data(), static_cast<std::size_t>(n));
+    const bool truncated = gzclose_r(stream) == Z_BUF_ERROR;
+    if (n < 0 || truncated)
+      throw std::runtime_error(path.string() + ": damaged gzip file, or cannot be read");
+  }
+
+  [[nodiscard]] std::string fingerprint() const {
+    const uLong sum = crc32_z(0, reinterpret_cast<const Bytef*>(text.data()), text.size());
+    std::array<char, 16> digits{};
+    std::snprintf(digits.data(), digits.size(), "%08lx", sum);
+    return file.filename().string() + " (crc32 " + digits.data() + ')';
+  }
+
+  [[noreturn]] void fail(const TextRow& row, const std::string& why) const {
+    throw std::runtime_error(file.string() + " line " + std::to_string(row.line) + ": " + why);
+  }
+};
+
+// A number in field `i`; fields beyond the last count as 0 if they may be missing.
+double number(const Table& table, const TextRow& row, std::size_t i, bool required = true) {
+  if (i >= row.fields.size()) {
+    if (!required) return 0.0;
+    table.fail(row, "has only " + std::to_string(row.fields.size()) + " fields");
+  }
+  const auto value = parse_double(row.fields[i]);
+  if (!value || !std::isfinite(*value))
+    table.fail(row, "'" + std::string(row.fields[i]) + "' is not a number");
+  return *value;
+}
+
+Eigen::Vector3d vector(const Table& table, const TextRow& row, std::size_t i,
+                       bool required = true) {
+  const double x = number(table, row, i, required);
+  const double y = number(table, row, i + 1, required);
+  const double z = number(table, row, i + 2, required);
+  return {x, y, z};
+}
+
+Eigen::Quaterniond rotation(const Table& table, const TextRow& row, double w,
+                            const Eigen::Vector3d& v) {
+  const Eigen::Quaterniond q(w, v.x(), v.y(), v.z());
+  if (std::abs(q.norm() - 1.0) > kMaxNormError)
+    table.fail(row, "the quaternion's norm is " + std::to_string(q.norm()));
+  return q.normalized();
+}
+
+// EuRoC: t[ns], p, q_wxyz, v, b_g, b_a.
+TrueState euroc_state(const Table& table, const TextRow& row) {
+  const auto stamp = parse_int64(row.fields.front());
+  if (!stamp) table.fail(row, std::string(row.fields.front()) + " is not a stamp in nanoseconds");
+  const auto q = rotation(table, row, number(table, row, 4), vector(table, row, 5));
+  return {*stamp, make_pose(q.toRotationMatrix(), vector(table, row, 1)),
+          vector(table, row, 8, false), vector(table, row, 11, false),
+          vector(table, row, 14, false)};
+}
+
+// TUM: t[s] p q_xyzw.
+TrueState tum_state(const Table& table, const TextRow& row) {
+  const double t_s = number(table, row, 0);
+  const auto q = rotation(table, row, number(table, row, 7), vector(table, row, 4));
+  TrueState state;
+  state.stamp = static_cast<Stamp>(std::llround(t_s * 1e9));
+  state.T_world_body = make_pose(q.toRotationMatrix(), vector(table, row, 1));
+  return state;
+}
+
+bool is_header(const TextRow& row) {
+  return !parse_double(row.fields.front());
+}
+
+template <typename Row, typename Parse>
+std::vector<Row> read_rows(const Table& table, const Parse& parse) {
+  std::vector<Row> rows;
+  for (const TextRow& row : split_rows(table.text)) {
+    if (rows.empty() && is_header(row)) continue;
+    const Row parsed = parse(row);
+    if (!rows.empty() && parsed.stamp < rows.back().stamp)
+      table.fail(row, "comes before the row above it");
+    if (rows.empty() || parsed.stamp > rows.back().stamp) rows.push_back(parsed);
+  }
+  if (rows.size() < 2) throw std::runtime_error(table.file.string() + ": holds no data");
+  return rows;
+}
+
+bool is_comma_separated(const Table& table) {
+  return table.text.find(',') != std::string::npos;
+}
+
+}  // namespace
+
+RecordedFlight read_recorded_flight(const fs::path& truth, const fs::path& imu) {
+  const Table states(truth);
+  const Table samples(imu);
+  RecordedFlight flight;
+  const bool euroc = is_comma_separated(states);
+  flight.truth = read_rows<TrueState>(states, [&](const TextRow& row) {
+    return euroc ? euroc_state(states, row) : tum_state(states, row);
+  });
+  flight.imu = read_rows<ImuSample>(samples, [&](const TextRow& row) {
+    const auto stamp = parse_int64(row.fields.front());
+    if (!stamp) samples.fail(row, "does not begin with a stamp in nanoseconds");
+    return ImuSample{*stamp, vector(samples, row, 1), vector(samples, row, 4)};
+  });
+  flight.fingerprint = states.fingerprint() + ", " + samples.fingerprint();
+  if (flight.imu.back().stamp <= flight.truth.front().stamp ||
+      flight.truth.back().stamp <= flight.imu.front().stamp)
+    throw std::runtime_error(truth.string() + " and " + imu.string() + " do not overlap in time");
+  return flight;
+}
+
 namespace {
 
 constexpr double kImuLead_s = 1.0;           // inertial data begin this long before the first image
@@ -38,7 +170,7 @@ Route route_of(const World& world, std::size_t robot, bool opposite) {
   const std::vector<Route>& routes = world.routes;
   if (!opposite) return routes[robot % routes.size()];
   const Route& shared = routes[robot / 2 % routes.size()];
-  return robot % 2 == 0 ? shared : opposite_route(shared, lane_apart_m(world));
+  return robot % 2 == 0 ? shared : opposite_route(shared);
 }
 
 std::unique_ptr<const BodyTrajectory> drive(const World& world, std::size_t robot, bool opposite,
@@ -47,12 +179,6 @@ std::unique_ptr<const BodyTrajectory> drive(const World& world, std::size_t robo
   VehicleOptions vehicle;
   vehicle.seed = seed;
   vehicle.duration_s = duration_s;
-  if (!world.ground_height) {  // a cart on the level floor of a hall
-    vehicle.rig_height_m = 0.8;
-    vehicle.corner_radius_m = 0.8;
-    vehicle.roughness = 0.0;
-    vehicle.stop_every_m = 20.0;
-  }
   return std::make_unique<SplineTrajectory>(
       make_vehicle_trajectory(route, world.ground_height, vehicle));
 }
@@ -73,9 +199,8 @@ void add_told_values(const SimulationOptions& options, RobotScenario& scenario) 
   scenario.told_rig = told_rig(scenario.rig, options.effects.calibration_error,
                                derived_seed(scenario.seed, kCalibration));
   scenario.images = without_dropped(scenario.images, timing, derived_seed(scenario.seed, kDropped));
-  const RobotClock& clock =
-      scenario.clock.emplace(timing, scenario.imu.front().stamp, scenario.imu.back().stamp,
-                             derived_seed(scenario.seed, kClock));
+  const RobotClock clock(timing, scenario.imu.front().stamp, scenario.imu.back().stamp,
+                         derived_seed(scenario.seed, kClock));
   for (const Stamp at : scenario.images) scenario.image_stamps.push_back(clock.camera(at));
   for (ImuSample& sample : scenario.imu) sample.stamp = clock.inertial(sample.stamp);
   for (TrueState& state : scenario.truth) state.stamp = clock.inertial(state.stamp);
@@ -99,11 +224,10 @@ RobotScenario simulated_robot(const World& world, const SimulationOptions& optio
   scenario.images =
       image_stamps(first, first + nanoseconds(options.duration_s) - 1, options.rate_hz);
 
-  scenario.inertial_errors =
-      draw_inertial_errors(options.effects.inertial, derived_seed(scenario.seed, kInertial));
   ImuSimulation imu;
   imu.noise = scenario.rig.imu;
-  imu.errors = scenario.inertial_errors;
+  imu.errors =
+      draw_inertial_errors(options.effects.inertial, derived_seed(scenario.seed, kInertial));
   imu.seed = derived_seed(scenario.seed, kImu);
   for (const SimulatedImu& at : simulate_imu(*scenario.trajectory, kEpoch, imu)) {
     const BodyMotion motion = scenario.motion(at.sample.stamp);
@@ -131,7 +255,7 @@ std::vector<Stamp> recorded_stamps(const RecordedFlight& flight, const Simulatio
   const Stamp origin = flight.truth.front().stamp;
   Stamp last = std::min(flight.truth.back().stamp, flight.imu.back().stamp);
   if (options.end_s > 0.0) last = std::min(last, origin + nanoseconds(options.end_s));
-  const Stamp start = std::max(origin + nanoseconds(options.start_s), flight.imu.front().stamp);
+  const Stamp start = std::max(origin, flight.imu.front().stamp);
   const auto first =
       std::lower_bound(flight.imu.begin(), flight.imu.end(), start,
                        [](const ImuSample& sample, Stamp stamp) { return sample.stamp < stamp; });
@@ -145,15 +269,15 @@ RobotScenario recorded_robot(const RecordedFlight& flight, const SimulationOptio
   RobotScenario scenario;
   scenario.name = options.names[robot];
   scenario.seed = derived_seed(options.seed, robot);
-  scenario.rig =
-      options.rig ? *options.rig : default_rig(RigKind::kFlying, options.width, options.height);
+  scenario.rig = default_rig(RigKind::kFlying, options.width, options.height);
   scenario.images = recorded_stamps(flight, options);
   if (scenario.images.empty())
     throw std::invalid_argument(
-        scenario.name + ": nothing was recorded between --start and --end; the flight lasts " +
+        scenario.name + ": nothing was recorded until --end; the flight lasts " +
         std::to_string(seconds_between(flight.truth.front().stamp, flight.truth.back().stamp)) +
         " s");
-  const std::vector<StampedPose>& poses = flight.motion.poses;
+  std::vector<StampedPose> poses;
+  for (const TrueState& state : flight.truth) poses.push_back({state.stamp, state.T_world_body});
   RecordedTrajectory fitted = fit_recording(poses, poses.front().stamp);
   scenario.epoch = fitted.epoch;
   scenario.trajectory = std::make_unique<SplineTrajectory>(std::move(fitted.trajectory));

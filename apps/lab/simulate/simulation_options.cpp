@@ -1,9 +1,9 @@
 #include "apps/lab/simulate/simulation_options.hpp"
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <map>
 #include <memory>
 #include <optional>
 #include <set>
@@ -11,8 +11,7 @@
 #include <thread>
 #include <tuple>
 
-#include "apps/lab/simulation/dataset/number_text.hpp"
-#include "modules/sensors/node/rig_calibration.hpp"
+#include "apps/lab/simulation/dataset/recording.hpp"
 #include "runtime/yaml_config.hpp"
 
 namespace km {
@@ -65,29 +64,15 @@ std::optional<std::pair<int, int>> parse_resolution(const std::string& text) {
   return std::pair(width, height);
 }
 
-// Removes the values that are maps: the sections of effects.
-std::map<std::string, YAML::Node> take_sections(ConfigSection& options) {
-  std::map<std::string, YAML::Node> sections;
-  for (const auto& [key, value] : options.values)
-    if (value.node.IsMap()) sections.emplace(key, value.node);
-  std::erase_if(options.values, [](const auto& entry) { return entry.second.node.IsMap(); });
-  return sections;
-}
-
 // Reads the file of options if there is one, then overrides it with the command line.
 void read_options(const std::string& file, const ConfigSection& given, SimulationOptions& options) {
   ConfigProblems problems;
   const ConfigContext context{problems};
   ConfigSection section = given;
   if (!file.empty()) section.values.merge(read_section(load_yaml(file), "", file, context).values);
-  EffectLayers layers;
-  layers.file = file;
-  layers.sections = take_sections(section);
   fill_config(section, "", context, options);
-  layers.level = options.difficulty;
-  layers.settings = options.settings;
   try {
-    options.effects = load_effects(layers);
+    options.effects = load_effects(options.difficulty, options.settings);
   } catch (const ConfigError& error) {
     problems.others += std::string(error.what()) + '\n';
   }
@@ -114,7 +99,7 @@ void define(CLI::App& app, SimulationOptions& options) {
     try {
       read_options(line->file, line->given, options);
     } catch (const ConfigError& error) {
-      throw CLI::ValidationError(error.what());
+      throw CLI::ValidationError(error.what(), CLI::ExitCodes::ValidationError);
     }
   });
 }
@@ -141,19 +126,7 @@ void complete_recorded(SimulationOptions& options) {
     for (const auto& file : options.truths) options.names.push_back(recording_name(file));
   if (options.names.size() != options.truths.size())
     throw std::invalid_argument("--names needs one name per --trajectory");
-  if (options.end_s > 0.0 && options.end_s <= options.start_s)
-    throw std::invalid_argument("--end is not after --start");
   options.robots = static_cast<int>(options.truths.size());
-}
-
-// Sets the rig of `calibrations`, which also determines the resolution.
-void complete_rig(SimulationOptions& options) {
-  RigChoice choice;
-  if (options.cameras == CameraKind::kRgbd) choice = {.right = {}, .depth = DepthChoice{}};
-  options.rig = read_rig(options.calibrations, choice).rig;
-  const Camera& left = options.rig->stereo.cameras[0];
-  options.width = left.width;
-  options.height = left.height;
 }
 
 void complete_names(const SimulationOptions& options) {
@@ -178,14 +151,11 @@ SimulationOptions completed(SimulationOptions options) {
   if (options.is_recorded()) {
     complete_recorded(options);
   } else {
-    if (!options.imus.empty() || !options.calibrations.empty() || !options.names.empty() ||
-        options.start_s > 0.0 || options.end_s > 0.0 || options.steady)
-      throw std::invalid_argument(
-          "--imu, --steady, --calibration, --names, --start and --end need --trajectory");
+    if (!options.imus.empty() || !options.names.empty() || options.end_s > 0.0)
+      throw std::invalid_argument("--imu, --names and --end need --trajectory");
     for (int i = 0; i < options.robots; ++i) options.names.push_back("robot" + std::to_string(i));
   }
   complete_names(options);
-  if (!options.calibrations.empty()) complete_rig(options);
   if (options.cameras == CameraKind::kRgbd) options.depth = true;
   if (!options.depth && (options.depth_rate_hz > 0.0 || options.ideal_depth))
     throw std::invalid_argument("--depth-rate and --ideal-depth need --depth or --rig rgbd");
@@ -210,9 +180,7 @@ ParameterList parameters(const SimulationOptions& options) {
                         {"seed", std::to_string(options.seed)},
                         {"robots", std::to_string(options.robots)}};
   if (options.is_recorded()) {
-    list.emplace_back("start", number_text(options.start_s));
     list.emplace_back("end", number_text(options.end_s));
-    if (options.steady) list.emplace_back("steady", "yes");
   } else {
     list.emplace_back("duration", number_text(options.duration_s));
   }
@@ -221,41 +189,14 @@ ParameterList parameters(const SimulationOptions& options) {
                     std::to_string(options.width) + 'x' + std::to_string(options.height));
   list.emplace_back("rate", number_text(options.rate_hz));
   list.emplace_back("depth", yes(options.depth));
-  if (options.depth) {
-    list.emplace_back("depth-rate", number_text(options.depth_rate_hz));
-    list.emplace_back("ideal-depth", yes(options.ideal_depth));
-  }
+  if (options.depth) list.emplace_back("depth-rate", number_text(options.depth_rate_hz));
+  if (options.depth) list.emplace_back("ideal-depth", yes(options.ideal_depth));
   list.emplace_back("labels", yes(options.labels));
-  list.emplace_back("color", yes(options.color));
   list.emplace_back("motion-blur", yes(options.motion_blur));
-  list.emplace_back("image-format", Choices<ImageFormat>{kFormats}.name_of(options.format));
-  if (options.difficulty > 0) list.emplace_back("difficulty", std::to_string(options.difficulty));
-  for (const auto& [key, value] : changed_keys(options.effects, options.difficulty))
-    list.emplace_back(key, value);
+  list.emplace_back("difficulty", std::to_string(options.difficulty));
+  for (const std::string& setting : options.settings)
+    list.emplace_back(setting.substr(0, setting.find('=')), setting);
   return list;
-}
-
-std::string command_line(const SimulationOptions& options) {
-  std::string text = "kimera_multi_simulate";
-  for (const auto& [name, value] : parameters(options)) {
-    if (value == "no" || (options.is_recorded() && name == "robots")) continue;
-    if (name.find('.') != std::string::npos)
-      text += " --set " + name + '=' + value;
-    else
-      text += " --" + name + (value == "yes" ? "" : ' ' + value);
-  }
-  const auto add = [&text](const char* name, const auto& values, const auto& shown) {
-    if (values.empty()) return;
-    text += name;
-    for (const auto& value : values) text += ' ' + shown(value);
-  };
-  const auto file_name = [](const std::filesystem::path& file) { return file.filename().string(); };
-  add(" --trajectory", options.truths, file_name);
-  add(" --imu", options.imus, file_name);
-  add(" --calibration", options.calibrations, file_name);
-  if (options.is_recorded())
-    add(" --names", options.names, [](const std::string& name) { return name; });
-  return text + " --output DIR";
 }
 
 }  // namespace km

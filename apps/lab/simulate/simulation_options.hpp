@@ -2,30 +2,25 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <optional>
 #include <string>
 #include <vector>
 
+#include "apps/lab/simulate/dataset_record.hpp"
 #include "apps/lab/simulate/effects.hpp"
-#include "apps/lab/simulation/dataset/dataset_record.hpp"
-#include "apps/lab/simulation/dataset/image_encoding.hpp"
-#include "apps/program_options.hpp"
-#include "modules/core/camera.hpp"
 #include "modules/core/config.hpp"
+
+namespace CLI {
+class App;
+}  // namespace CLI
 
 namespace km {
 
-enum class WorldKind { kCity, kCamp, kStore, kViconRoom, kHall };
+enum class WorldKind { kCity, kCamp, kViconRoom };
 enum class CameraKind { kStereo, kRgbd };
-inline constexpr Choice<WorldKind> kWorlds[] = {{"city", WorldKind::kCity},
-                                                {"camp", WorldKind::kCamp},
-                                                {"store", WorldKind::kStore},
-                                                {"vicon_room", WorldKind::kViconRoom},
-                                                {"hall", WorldKind::kHall}};
+inline constexpr Choice<WorldKind> kWorlds[] = {
+    {"city", WorldKind::kCity}, {"camp", WorldKind::kCamp}, {"vicon_room", WorldKind::kViconRoom}};
 inline constexpr Choice<CameraKind> kCameras[] = {{"stereo", CameraKind::kStereo},
                                                   {"rgbd", CameraKind::kRgbd}};
-inline constexpr Choice<ImageFormat> kFormats[] = {{"jpg", ImageFormat::kJpeg},
-                                                   {"png", ImageFormat::kPng}};
 
 /// True for "752x480": both sides from 16 to 8192.
 [[nodiscard]] bool is_resolution(const std::string& text);
@@ -43,27 +38,23 @@ struct SimulationOptions {
   double depth_rate_hz = 0.0;
   bool ideal_depth = false;
   bool labels = false;
-  bool color = false;
   bool motion_blur = false;
   int difficulty = 0;
   std::vector<std::string> settings;
-  ImageFormat format = ImageFormat::kJpeg;
   std::vector<std::filesystem::path> truths;
   std::vector<std::filesystem::path> imus;
-  bool steady = false;
-  std::vector<std::filesystem::path> calibrations;
   std::vector<std::string> names;
-  double start_s = 0.0;
   double end_s = 0.0;
   std::filesystem::path output;
   int threads = 0;
 
-  int width = 752;               ///< [px], from `resolution` or `rig`.
-  int height = 480;              ///< [px]
-  std::optional<SensorRig> rig;  ///< Rig of the files in `calibrations`.
-  Effects effects;               ///< From the difficulty, the file's sections, the settings.
+  int width = 752;   ///< [px], from `resolution`.
+  int height = 480;  ///< [px]
+  Effects effects;   ///< From the difficulty and the settings.
 
   [[nodiscard]] bool is_recorded() const { return !truths.empty(); }
+  /// True if any effect makes the recordings harder than at level 0.
+  [[nodiscard]] bool is_disturbed() const { return difficulty > 0 || !settings.empty(); }
 
   void visit_fields(auto& visitor) {
     constexpr double kDay_s = 24.0 * 3600.0;
@@ -81,30 +72,20 @@ struct SimulationOptions {
                   "Depth images per second, --rate divided by a whole number; 0: --rate");
     visitor.field("ideal-depth", ideal_depth, "Depth without noise and holes");
     visitor.field("labels", labels, "Also class ids of the left camera's pixels");
-    visitor.field("color", color, "Also colour images of the left camera");
     visitor.field("motion-blur", motion_blur, "Smear images along their motion");
     visitor.field(
         "difficulty", difficulty, {0, kHardestLevel},
         "Level of errors of sensors, clocks and calibration, and of clutter in the world");
     visitor.field("set", settings,
                   "Keys of single effects over those of the difficulty: section.key=value");
-    visitor.field("image-format", format, kFormats, "jpg: quality 92, as recordings were stored");
     visitor.field("trajectory", truths, Input{},
                   "Recorded motion: true poses of flights, one file per robot: EuRoC's state CSV "
                   "or TUM text, also gzipped; in the frame of the world");
     visitor.field("imu", imus, Input{}, "The recorded inertial data, one CSV per --trajectory");
-    visitor.field("steady", steady,
-                  "Correct recorded rotations by the gyroscope: motion capture has errors of "
-                  "milliradians that change fast, so images along it would show turns that the "
-                  "gyroscope does not measure");
-    visitor.field("calibration", calibrations, Input{},
-                  "The sensors of recorded motion: a folder of EuRoC, one or two files of Kalibr, "
-                  "or one of Basalt (default: EuRoC's, its cameras scaled to the resolution)");
     visitor.field("names", names, "Names of the robots of recorded motion (default: the files')");
-    visitor.field("start", start_s, {0.0, kDay_s},
-                  "For recorded motion: first image [s since the first true pose]");
-    visitor.field("end", end_s, {0.0, kDay_s},
-                  "For recorded motion: last image [s], 0: the flight's end");
+    visitor.field(
+        "end", end_s, {0.0, kDay_s},
+        "For recorded motion: last image [s since the first true pose], 0: the flight's end");
     visitor.field("output", output, "Folder of the recordings; a stopped run is continued");
     visitor.field("threads", threads, {0, 256},
                   "Number of threads that render; 0: one per processor");
@@ -113,22 +94,17 @@ struct SimulationOptions {
   }
 };
 
-/// Adds the options to a command line, and --config for a file of them: a YAML map, which may have
-/// sections of effects. The command line has priority over the file. All errors of both are
-/// reported together, by name and line.
+/// Adds the options to a command line, and --config for a file of them, a YAML map. The command
+/// line has priority over the file. All errors of both are reported together, by name and line.
 void define(CLI::App& app, SimulationOptions& options);
 
-/// Options with derived values filled in: names, the number of robots, the rate of depth images,
-/// and the rig of the calibration files. Throws std::invalid_argument for contradicting options,
-/// and DatasetError as read_rig() does.
+/// Options with derived values filled in: names, the number of robots and the rate of depth images.
+/// Throws std::invalid_argument for contradicting options.
 [[nodiscard]] SimulationOptions completed(SimulationOptions options);
 
 /// All parameters that the bytes of the recordings depend on; neither the threads nor the output
 /// folder.
 [[nodiscard]] ParameterList parameters(const SimulationOptions& options);
-
-/// The command that makes the same recordings, with DIR for the output.
-[[nodiscard]] std::string command_line(const SimulationOptions& options);
 
 [[nodiscard]] std::string name_of(WorldKind world);
 

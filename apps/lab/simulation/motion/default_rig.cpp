@@ -1,8 +1,5 @@
 #include "apps/lab/simulation/motion/default_rig.hpp"
 
-#include <stdexcept>
-#include <string>
-
 #include "modules/core/lie.hpp"
 
 namespace km {
@@ -65,10 +62,6 @@ void mount_on_vehicle(StereoRig& stereo) {
 }  // namespace
 
 SensorRig default_rig(RigKind kind, int width, int height) {
-  for (const int size : {width, height})
-    if (size < 16 || size > 8192)
-      throw std::invalid_argument("default rig: resolution " + std::to_string(width) + "x" +
-                                  std::to_string(height) + " is outside 16x16 to 8192x8192");
   SensorRig rig;
   rig.stereo = euroc_stereo();
   for (Camera& camera : rig.stereo.cameras) resize(camera, width, height);
@@ -81,17 +74,6 @@ Eigen::Matrix3d vehicle_from_body(RigKind kind) {
   Eigen::Matrix3d R_vehicle_body;  // EuRoC's body: x up, y right, z forward
   R_vehicle_body << 0, 0, 1, 0, -1, 0, 1, 0, 0;
   return R_vehicle_body;
-}
-
-DepthSensorOptions depth_options(const SensorRig& rig) {
-  DepthSensorOptions options;
-  options.focal_px = rig.stereo.cameras[0].fx;
-  options.baseline_m = rig.stereo.baseline_m();
-  if (rig.depth) {
-    options.min_range_m = rig.depth->min_m;
-    options.max_range_m = rig.depth->max_m;
-  }
-  return options;
 }
 
 }  // namespace km

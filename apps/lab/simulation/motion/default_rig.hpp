@@ -1,6 +1,5 @@
 #pragma once
 
-#include "apps/lab/simulation/motion/depth_sensor.hpp"
 #include "modules/core/camera.hpp"
 
 namespace km {
@@ -13,15 +12,10 @@ enum class RigKind {
 
 /// The published calibration of EuRoC's cameras (Burri et al., IJRR 2016) at another resolution:
 /// scaled to the width, cut or extended around the image's centre in height. The noise is that of
-/// the ADIS16448 as published. Throws std::invalid_argument for a width or height below 16 or above
-/// 8192.
+/// the ADIS16448 as published.
 [[nodiscard]] SensorRig default_rig(RigKind kind, int width, int height);
 
 /// Rotation of the body in the vehicle's frame (x forward, y left, z up), R_vehicle_body.
 [[nodiscard]] Eigen::Matrix3d vehicle_from_body(RigKind kind);
-
-/// A depth camera in place of the rig's left camera, with the rig's baseline and its range if it
-/// has one.
-[[nodiscard]] DepthSensorOptions depth_options(const SensorRig& rig);
 
 }  // namespace km

@@ -15,6 +15,11 @@ namespace km {
 namespace {
 
 constexpr double kLargest_mm = 65535.0;
+constexpr double kNoise_px = 0.15;          // standard deviation of a disparity
+constexpr double kStep_px = 1.0 / 16;       // sub-pixel steps of the matcher
+constexpr std::size_t kCorrelation_px = 4;  // width over which noise is correlated
+constexpr double kEdge_px = 1.0;   // difference to a neighbour above which a pixel is an edge
+constexpr double kEdgeLoss = 0.5;  // probability of no depth at an edge
 constexpr double kBlockTolerance_px = 0.5;  // width by which a nearer surface must cover a pixel
 
 // Rounds half away from zero, for positive values; std::round costs a call.
@@ -98,8 +103,6 @@ bool at_edge(std::span<const double> disparity, std::size_t width, std::size_t x
 
 }  // namespace
 
-DepthSensor::DepthSensor(const DepthSensorOptions& options) : options_(checked(options)) {}
-
 std::vector<std::uint16_t> DepthSensor::measure(std::span<const float> depth_m, int width,
                                                 int height, std::uint64_t seed) const {
   if (width <= 0 || height <= 0 ||
@@ -108,8 +111,8 @@ std::vector<std::uint16_t> DepthSensor::measure(std::span<const float> depth_m, 
                                 std::to_string(width) + "x" + std::to_string(height) + " pixels");
   std::vector<std::uint16_t> measured(depth_m.size(), 0);
   if (options_.ideal) {
-    std::transform(depth_m.begin(), depth_m.end(), measured.begin(),
-                   [](float z) { return millimetres(static_cast<double>(z)); });
+    std::ranges::transform(depth_m, measured.begin(),
+                           [](float z) { return millimetres(static_cast<double>(z)); });
     return measured;
   }
 
@@ -119,7 +122,7 @@ std::vector<std::uint16_t> DepthSensor::measure(std::span<const float> depth_m, 
   std::vector<bool> lost(depth_m.size(), false);
   mark_blocked(disparity, columns, lost);
   GaussianRandom gaussian(SeededRandom::stream(seed, 41));
-  SmoothNoise noise(columns, rows, static_cast<std::size_t>(options_.correlation_px), gaussian);
+  SmoothNoise noise(columns, rows, kCorrelation_px, gaussian);
   auto edges = SeededRandom::stream(seed, 42);
 
   for (std::size_t y = 0; y < rows; ++y) {
@@ -128,10 +131,8 @@ std::vector<std::uint16_t> DepthSensor::measure(std::span<const float> depth_m, 
       const std::size_t k = y * columns + x;
       const auto z = static_cast<double>(depth_m[k]);
       if (lost[k] || !(z >= options_.min_range_m && z <= options_.max_range_m)) continue;
-      if (at_edge(disparity, columns, x, k, options_.edge_disparity_px) &&
-          edges.chance(options_.edge_loss))
-        continue;
-      measured[k] = depth_at(disparity[k] + options_.disparity_noise_px * errors[x]);
+      if (at_edge(disparity, columns, x, k, kEdge_px) && edges.chance(kEdgeLoss)) continue;
+      measured[k] = depth_at(disparity[k] + kNoise_px * errors[x]);
     }
   }
   return measured;
@@ -139,8 +140,7 @@ std::vector<std::uint16_t> DepthSensor::measure(std::span<const float> depth_m, 
 
 std::uint16_t DepthSensor::depth_at(double disparity_px) const {
   if (!(disparity_px > 0.0)) return 0;
-  const double step = options_.disparity_step_px;
-  if (step > 0.0) disparity_px = step * rounded(disparity_px / step);
+  disparity_px = kStep_px * rounded(disparity_px / kStep_px);
   return disparity_px > 0.0 ? millimetres(options_.focal_px * options_.baseline_m / disparity_px)
                             : std::uint16_t{0};
 }

@@ -19,28 +19,16 @@ using Controls = std::vector<Eigen::Vector4d>;  // position [m] and yaw [rad]
 constexpr double kPlanInterval_s = 1.0;   // interval of the flight plan's controls
 constexpr double kGustInterval_s = 0.25;  // interval of the gusts' controls
 constexpr double kPoseInterval_s = 0.01;
-constexpr double kGravity_mps2 = 9.81;
 constexpr double kRotorDrag_hz = 0.3;  // deceleration by drag per speed
-constexpr double kSmallestVolume_m = 1.0;
-constexpr double kMaxGusts = 2.5;  // standard deviations
+constexpr double kStandstill_s = 2.0;  // exactly at rest on the ground at the start
+constexpr double kMaxSpeed_mps = 1.0;  // towards the next waypoint
+constexpr double kMaxYawRate_radps = 1.047;
+constexpr double kGusts_m = 0.008;  // standard deviation of the displacement by gusts
+constexpr double kMaxGusts = 2.5;   // standard deviations
 constexpr double kMinLeg_m = 0.8;
 constexpr double kStartYaw =
     std::numbers::pi / 4.0;  // largest angle between the start yaw and the direction to the middle
 constexpr int kTries = 20;
-
-[[noreturn]] void refuse_flight(const std::string& problem) {
-  throw std::invalid_argument("flight trajectory: " + problem);
-}
-
-void check(const Eigen::AlignedBox3d& volume, const FlightOptions& options) {
-  checked(options);
-  if (volume.isEmpty() || !(volume.sizes().minCoeff() >= kSmallestVolume_m) ||
-      !volume.sizes().allFinite())
-    refuse_flight("the volume is not at least 1 m in every direction");
-  const Eigen::Matrix3d& R = options.R_vehicle_body;
-  if (!((R * R.transpose()).isIdentity(1e-6) && R.determinant() > 0.0))
-    refuse_flight("R_vehicle_body is no rotation");
-}
 
 Eigen::Vector3d random_point(const Eigen::AlignedBox3d& box, SeededRandom& random) {
   Eigen::Vector3d point;
@@ -64,8 +52,7 @@ void append_leg(const Eigen::Vector3d& end, double turn, double speed_mps, doubl
   const Eigen::Vector4d begin = controls.back();
   Eigen::Vector4d change;
   change << end - begin.head<3>(), turn;
-  const double duration = std::max(change.head<3>().norm() / speed_mps,
-                                   yaw_rate > 0.0 ? std::abs(turn) / yaw_rate : 0.0);
+  const double duration = std::max(change.head<3>().norm() / speed_mps, std::abs(turn) / yaw_rate);
   const int steps = std::max(1, static_cast<int>(std::ceil(duration / kPlanInterval_s)));
   for (int k = 1; k <= steps; ++k) controls.push_back(begin + change * k / steps);
 }
@@ -83,18 +70,18 @@ UniformSpline<4> flight_plan(const Eigen::AlignedBox3d& volume, const Eigen::Ali
   const Eigen::Vector3d inwards = volume.center() - start.head<3>();
   start[3] = std::atan2(inwards.y(), inwards.x()) + kStartYaw * (2.0 * random.unit() - 1.0);
   Controls controls(5, start);
-  const double end_s = std::max(0.0, options.duration_s - options.standstill_s) + 1.0;
+  const double end_s = std::max(0.0, options.duration_s - kStandstill_s) + 1.0;
   Eigen::Vector3d target = start.head<3>();  // first straight up
   target.z() = air.min().z() + (0.3 + 0.4 * random.unit()) * air.sizes().z();
   double turn = 0.0;
   while (static_cast<double>(controls.size()) * kPlanInterval_s < end_s + 6.0 * kPlanInterval_s) {
-    const double speed = options.max_speed_mps * (0.4 + 0.6 * random.unit());
-    const double yaw_rate = options.max_yaw_rate * (0.3 + 0.7 * random.unit());
-    append_leg(target, yaw_rate > 0.0 ? turn : 0.0, speed, yaw_rate, controls);
+    const double speed = kMaxSpeed_mps * (0.4 + 0.6 * random.unit());
+    const double yaw_rate = kMaxYawRate_radps * (0.3 + 0.7 * random.unit());
+    append_leg(target, turn, speed, yaw_rate, controls);
     target = next_waypoint(air, target, random);
     turn = pi * (2.0 * random.unit() - 1.0);
   }
-  return {options.standstill_s, kPlanInterval_s, std::move(controls)};
+  return {kStandstill_s, kPlanInterval_s, std::move(controls)};
 }
 
 UniformSpline<3> gusts(const FlightOptions& options, double first_s) {
@@ -103,7 +90,7 @@ UniformSpline<3> gusts(const FlightOptions& options, double first_s) {
   const double span_s = std::max(0.0, options.duration_s - first_s);
   const int count = static_cast<int>(std::ceil(span_s / kGustInterval_s)) + 6;
   for (int k = 0; k < count; ++k)
-    controls.push_back(options.gusts_m * random.draw3().cwiseMax(-kMaxGusts).cwiseMin(kMaxGusts));
+    controls.push_back(kGusts_m * random.draw3().cwiseMax(-kMaxGusts).cwiseMin(kMaxGusts));
   return {first_s, kGustInterval_s, std::move(controls)};
 }
 
@@ -128,9 +115,8 @@ Eigen::Matrix3d attitude(const Eigen::Vector3d& thrust, double yaw) {
 
 SplineTrajectory make_flight_trajectory(const Eigen::AlignedBox3d& volume,
                                         const FlightOptions& options) {
-  check(volume, options);
   // Gusts displace the vehicle by at most this, and only once it is in the air.
-  const Eigen::Vector3d margin = Eigen::Vector3d::Constant(kMaxGusts * options.gusts_m);
+  const Eigen::Vector3d margin = Eigen::Vector3d::Constant(kMaxGusts * kGusts_m);
   const Eigen::AlignedBox3d air(volume.min() + margin, volume.max() - margin);
   const UniformSpline<4> plan = flight_plan(volume, air, options);
   const UniformSpline<3> push = gusts(options, time_above(plan, air.min().z()));
@@ -150,6 +136,74 @@ SplineTrajectory make_flight_trajectory(const Eigen::AlignedBox3d& volume,
                               planned.value.head<3>() + pushed.value));
   }
   return spline_along(0.0, kPoseInterval_s, poses);
+}
+
+namespace {
+
+using Control = SplineTrajectory::Control;
+
+constexpr double kFitInterval_s = 0.02;  // interval of the spline's controls
+// Standard deviations of the poses; larger deviations lose weight as outliers.
+constexpr double kPositionNoise_m = 0.0005;
+constexpr double kRotationNoise_rad = 0.0005;
+// Standard deviations of the derivatives of the accelerations.
+constexpr double kJerk_mps3 = 100.0;
+constexpr double kRotationJerk = 1000.0;  // [rad/s^3]
+
+void check(std::span<const StampedPose> poses) {
+  if (poses.size() < 2)
+    throw std::invalid_argument("recorded trajectory: " + std::to_string(poses.size()) +
+                                " poses, at least 2 are needed");
+  for (std::size_t k = 1; k < poses.size(); ++k)
+    if (poses[k].stamp <= poses[k - 1].stamp)
+      throw std::invalid_argument("recorded trajectory: stamp " + std::to_string(poses[k].stamp) +
+                                  " of pose " + std::to_string(k) +
+                                  " is not after the one before it");
+}
+
+// The poses as rows of position and quaternion, neighbouring quaternions on one side of R^4.
+Eigen::MatrixXd pose_rows(std::span<const StampedPose> poses) {
+  Eigen::MatrixXd rows(static_cast<Eigen::Index>(poses.size()), 7);
+  for (std::size_t k = 0; k < poses.size(); ++k) {
+    Control control = spline_control(poses[k].T);
+    const auto row = static_cast<Eigen::Index>(k);
+    if (k > 0 && control.tail<4>().dot(rows.row(row - 1).tail<4>().transpose()) < 0.0)
+      control.tail<4>() = -control.tail<4>().eval();
+    rows.row(row) = control.transpose();
+  }
+  return rows;
+}
+
+}  // namespace
+
+RecordedTrajectory fit_recording(std::span<const StampedPose> poses, Stamp epoch) {
+  check(poses);
+  // The intervals are stretched a little, so that a whole number of them spans the recording.
+  const double span_s = seconds_between(poses.front().stamp, poses.back().stamp);
+  const double intervals = std::max(1.0, std::round(span_s / kFitInterval_s));
+  const double interval_s = span_s / intervals;
+  std::vector<double> positions;
+  for (const StampedPose& pose : poses)
+    positions.push_back(
+        std::min(seconds_between(poses.front().stamp, pose.stamp) / interval_s, intervals));
+
+  const Eigen::MatrixXd rows = pose_rows(poses);
+  const auto count = static_cast<std::size_t>(intervals) + 5;
+  const double cubed = interval_s * interval_s * interval_s;
+  const Eigen::MatrixXd translations =
+      fit_spline(positions, rows.leftCols(3), {count, kPositionNoise_m, kJerk_mps3 * cubed});
+  // A quaternion moves by half the angle.
+  const Eigen::MatrixXd rotations = fit_spline(
+      positions, rows.rightCols(4), {count, 0.5 * kRotationNoise_rad, 0.5 * kRotationJerk * cubed});
+
+  std::vector<Control> controls(count);
+  for (std::size_t k = 0; k < count; ++k) {
+    const auto row = static_cast<Eigen::Index>(k);
+    controls[k] << translations.row(row).transpose(), rotations.row(row).transpose();
+  }
+  SplineTrajectory trajectory(seconds_between(epoch, poses.front().stamp), interval_s,
+                              std::move(controls));
+  return {std::move(trajectory), epoch};
 }
 
 }  // namespace km

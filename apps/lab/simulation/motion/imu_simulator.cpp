@@ -38,15 +38,13 @@ GaussianRandom stream(const ImuSimulation& options, std::uint64_t part) {
 
 std::vector<SimulatedImu> simulate_imu(const BodyTrajectory& trajectory, Stamp epoch,
                                        const ImuSimulation& options) {
-  checked(options);
   const ImuNoise& n = options.noise;
   const InertialErrors& errors = options.errors;
-  const double on = options.ideal ? 0.0 : 1.0;
-  SensorError gyro(on * options.initial_gyro_bias, on * n.gyro_noise_density,
-                   on * n.gyro_random_walk, n.rate_hz, stream(options, 1));
-  SensorError accel(on * options.initial_accel_bias, on * n.accel_noise_density,
-                    on * n.accel_random_walk, n.rate_hz, stream(options, 2));
-  const Eigen::Vector3d gravity(0.0, 0.0, -options.gravity_mps2);
+  SensorError gyro(options.initial_gyro_bias, n.gyro_noise_density, n.gyro_random_walk, n.rate_hz,
+                   stream(options, 1));
+  SensorError accel(options.initial_accel_bias, n.accel_noise_density, n.accel_random_walk,
+                    n.rate_hz, stream(options, 2));
+  const Eigen::Vector3d gravity(0.0, 0.0, -kGravity_mps2);
 
   std::vector<SimulatedImu> samples;
   for (std::int64_t k = std::llround(std::ceil(trajectory.start_s() * n.rate_hz));; ++k) {

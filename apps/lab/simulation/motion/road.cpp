@@ -145,12 +145,6 @@ UniformSpline<2> closed_spline(const Route& route, double radius_m) {
   return {0.0, closed_length(even) / static_cast<double>(count), std::move(controls)};
 }
 
-double checked_radius(double radius_m) {
-  if (!(radius_m >= 0.5 && radius_m <= 100.0))
-    refuse_route("corner radius " + std::to_string(radius_m) + " m is outside [0.5, 100]");
-  return radius_m;
-}
-
 constexpr double kInterval_m = 0.1;
 constexpr double kDensity_m3 = 16e-6;        // at kReferenceFrequency: geometric mean of class A
 constexpr double kReferenceFrequency = 0.1;  // [cycles/m]
@@ -193,7 +187,7 @@ constexpr double angular(double frequency_hz) {
 }  // namespace
 
 RoutePath::RoutePath(const Route& route, double corner_radius_m)
-    : curve_(closed_spline(route, checked_radius(corner_radius_m))) {}
+    : curve_(closed_spline(route, corner_radius_m)) {}
 
 RoutePath::Point RoutePath::at(double way_m) const {
   const double around = way_m - std::floor(way_m / length_m()) * length_m();

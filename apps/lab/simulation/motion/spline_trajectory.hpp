@@ -12,6 +12,8 @@
 
 namespace km {
 
+inline constexpr double kGravity_mps2 = 9.81;  ///< Gravity of all simulated worlds.
+
 /// The six weights of a uniform B-spline of degree 5 within one of its intervals.
 struct QuinticBasis {
   static constexpr std::size_t kOrder = 6;

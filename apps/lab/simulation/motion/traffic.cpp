@@ -7,10 +7,9 @@
 
 #include "apps/lab/simulation/motion/vehicle_trajectory.hpp"
 #include "apps/lab/simulation/world/objects.hpp"
-#include "apps/lab/simulation/world/places.hpp"
-#include "apps/lab/simulation/world/routes.hpp"
 #include "apps/lab/simulation/world/scene.hpp"
 #include "apps/lab/simulation/world/seeded_random.hpp"
+#include "apps/lab/simulation/world/world.hpp"
 #include "modules/core/lie.hpp"
 
 namespace km {
@@ -134,7 +133,7 @@ class TrafficPlanner {
   Way draw_car() {
     Route route = world_.routes[static_cast<std::size_t>(
         random_.below(static_cast<int>(world_.routes.size())))];
-    if (random_.chance(0.6)) route = opposite_route(route, lane_apart_m(world_));
+    if (random_.chance(0.6)) route = opposite_route(route);
     VehicleOptions vehicle;
     vehicle.seed = static_cast<std::uint64_t>(random_.below(1 << 30));
     vehicle.duration_s = duration_s_ + 1.0 + 2.0 * kMargin_s;
@@ -175,7 +174,6 @@ class TrafficPlanner {
     const Eigen::Vector2d forward = (b - a).normalized();
     const Eigen::Vector2d right(forward.y(), -forward.x());
     const Eigen::Vector2d at = a + (0.2 + 0.6 * random_.unit()) * (b - a);
-    if (!world_.ground_height) return {at - 3.0 * forward, at + 3.0 * forward};  // in an aisle
     if (random_.chance(0.5)) return {at - 4.5 * right, at + 1.3 * right};
     const double lateral_m = 4.6 + 0.8 * random_.unit();
     return {at - 8.0 * forward + lateral_m * right, at + 8.0 * forward + lateral_m * right};

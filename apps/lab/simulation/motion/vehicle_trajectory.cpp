@@ -5,8 +5,6 @@
 #include <cmath>
 #include <cstddef>
 #include <map>
-#include <stdexcept>
-#include <string>
 #include <vector>
 
 #include "apps/lab/simulation/motion/road.hpp"
@@ -15,6 +13,11 @@
 namespace km {
 namespace {
 
+constexpr double kCornerRadius_m = 5.0;        // smaller if the route leaves no room
+constexpr double kMaxLateral_mps2 = 2.5;       // in curves
+constexpr double kMaxLongitudinal_mps2 = 1.5;  // speeding up and braking
+constexpr double kStopEvery_m = 150.0;         // mean distance between short stops
+constexpr double kRoughness = 2.0;             // road, ISO 8608: 1 is class A, 2 B, 4 C
 constexpr double kInterval_s = 0.01;
 constexpr std::size_t kBeyondEnd = 4;  // points at or after the end
 constexpr double kStep_m = 0.25;
@@ -33,8 +36,8 @@ struct SpeedPlan {
   std::map<std::size_t, double> dwell_s;  // duration of the stop, by index of the point
 };
 
-double curve_limit(double curvature, const VehicleOptions& options) {
-  return std::sqrt(kLateralShare * options.max_lateral_mps2 / std::max(std::abs(curvature), 1e-6));
+double curve_limit(double curvature) {
+  return std::sqrt(kLateralShare * kMaxLateral_mps2 / std::max(std::abs(curvature), 1e-6));
 }
 
 // Limits from the road and its curves; each also holds for the points around it.
@@ -43,7 +46,7 @@ std::vector<double> road_limits(const RoutePath& path, double speed_mps, std::si
   std::vector<double> own(count), limits(count);
   for (std::size_t k = 0; k < count; ++k) {
     const double way = options.start_m + kStep_m * static_cast<double>(k);
-    own[k] = std::min(speed_mps, curve_limit(path.at(way).curvature, options));
+    own[k] = std::min(speed_mps, curve_limit(path.at(way).curvature));
   }
   for (std::size_t k = 0; k < count; ++k) {
     const std::size_t from = k < kLookAround ? 0 : k - kLookAround;
@@ -65,10 +68,9 @@ SpeedPlan plan_speeds(std::vector<double> limits, double speed_mps, const Vehicl
     for (; k < std::min(until, count); ++k) plan.limit_mps[k] = std::min(plan.limit_mps[k], limit);
   }
   plan.limit_mps[0] = 0.0;
-  if (options.stop_every_m <= 0.0) return plan;
   auto stops = SeededRandom::stream(options.seed, 12);
   for (double way = 0.0;;) {
-    way += std::max(kFirstStop_m, options.stop_every_m * (0.5 + stops.unit()));
+    way += std::max(kFirstStop_m, kStopEvery_m * (0.5 + stops.unit()));
     const double dwell = 1.0 + 1.5 * stops.unit();
     const auto k = static_cast<std::size_t>(way / kStep_m);
     if (k >= count) return plan;
@@ -144,7 +146,7 @@ std::vector<double> drive(const RoutePath& path, double speed_mps, const Vehicle
   const SpeedPlan plan =
       plan_speeds(road_limits(path, speed_mps, points, options), speed_mps, options);
   const std::vector<double> speeds =
-      fastest(plan.limit_mps, kLongitudinalShare * options.max_longitudinal_mps2);
+      fastest(plan.limit_mps, kLongitudinalShare * kMaxLongitudinal_mps2);
   // The smoothing begins `reach` before time 0 and sees `reach` ahead of the end of the standstill.
   std::vector<double> ways =
       smoothed(ways_in_time(speeds, plan, options.standstill_s + 2.0 * reach_s,
@@ -156,8 +158,6 @@ std::vector<double> drive(const RoutePath& path, double speed_mps, const Vehicle
 
 using GroundHeight = std::function<double(double, double)>;
 
-constexpr double kSlowest_mps = 0.1;  // slowest speed of a route
-constexpr double kFastest_mps = 60.0;
 constexpr double kWheelbase_m = 2.7;
 constexpr double kTrack_m = 1.6;
 constexpr double kTyreStep_m = 0.15;
@@ -188,12 +188,11 @@ class Road {
  public:
   Road(const Route& route, const GroundHeight& ground, const VehicleOptions& options,
        double begin_m, double end_m)
-      : path_(route, options.corner_radius_m),
+      : path_(route, kCornerRadius_m),
         ground_(ground),
         wander_(wander(begin_m, end_m, options.seed)),
-        left_(begin_m - kWheelbase_m, end_m + kWheelbase_m, options.roughness,
-              options.seed * 2 + 1),
-        right_(begin_m - kWheelbase_m, end_m + kWheelbase_m, options.roughness, options.seed * 2) {}
+        left_(begin_m - kWheelbase_m, end_m + kWheelbase_m, kRoughness, options.seed * 2 + 1),
+        right_(begin_m - kWheelbase_m, end_m + kWheelbase_m, kRoughness, options.seed * 2) {}
 
   [[nodiscard]] GroundPoint point(double way_m) const {
     const RoutePath::Point center = path_.at(way_m);
@@ -231,7 +230,6 @@ class Road {
   // A tyre averages structures shorter than itself: binomial weights along it.
   [[nodiscard]] double ground_under(const Eigen::Vector2d& contact,
                                     const Eigen::Vector2d& heading) const {
-    if (!ground_) return 0.0;
     double height = 0.0;
     for (int k = -2; k <= 2; ++k) {
       const Eigen::Vector2d at = contact + k * kTyreStep_m * heading;
@@ -261,13 +259,9 @@ SE3 body_pose(const GroundPoint& point, const SprungBody& body, double height_m)
 
 SplineTrajectory make_vehicle_trajectory(const Route& route, const GroundHeight& ground_height,
                                          const VehicleOptions& options) {
-  checked(options);
-  if (!(route.speed_mps >= kSlowest_mps && route.speed_mps <= kFastest_mps))
-    throw std::invalid_argument("route: speed " + std::to_string(route.speed_mps) +
-                                " m/s is outside [0.1, 60]");
   const double dt = kInterval_s;
   const std::vector<double> ways =
-      drive(RoutePath(route, options.corner_radius_m), route.speed_mps, options);
+      drive(RoutePath(route, kCornerRadius_m), route.speed_mps, options);
   const Road road(route, ground_height, options, ways.front(), ways.back());
 
   std::vector<SE3> poses;

@@ -23,23 +23,14 @@ double soft_disc(double distance, double radius, double edge) {
   return share * share * (3.0 - 2.0 * share);
 }
 
-template <typename Value>
-Value mean_of(const std::vector<Value>& values) {
-  Value sum = 0.0F * values.front();
-  for (const Value& value : values) sum += value;
+float mean_of(const std::vector<float>& values) {
+  float sum = 0.0F * values.front();
+  for (const float value : values) sum += value;
   return sum / static_cast<float>(values.size());
 }
 
-template <typename Value>
-void blend(std::vector<Value>& light, const std::vector<float>& cover, const Value& color) {
-  for (std::size_t i = 0; i < cover.size(); ++i) light[i] += cover[i] * (color - light[i]);
-}
-
-void add_everywhere(float& light, float veil) {
-  light += veil;
-}
-void add_everywhere(Eigen::Vector3f& light, float veil) {
-  light.array() += veil;
+void blend(std::vector<float>& light, const std::vector<float>& cover, float level) {
+  for (std::size_t i = 0; i < cover.size(); ++i) light[i] += cover[i] * (level - light[i]);
 }
 
 }  // namespace
@@ -151,24 +142,20 @@ std::vector<float> LensClutter::veil(const Shot& shot) const {
   return veil;
 }
 
-template <typename Value>
-void LensClutter::add_to(std::vector<Value>& light, const Shot& shot) const {
+void LensClutter::add_to(std::vector<float>& light, const Shot& shot) const {
   if (light.empty()) return;
   const bool is_clear = rain_drops_ == 0 && dirt_.empty() && !(glare_ > 0.0);
   if (is_clear) return;
-  const Value mean = mean_of(light);
-  if (rain_drops_ > 0) blend<Value>(light, rain_cover(shot), kDropLight * mean);
-  blend<Value>(light, dirt_, kDirtLight * mean);
+  const float mean = mean_of(light);
+  if (rain_drops_ > 0) blend(light, rain_cover(shot), kDropLight * mean);
+  blend(light, dirt_, kDirtLight * mean);
   if (!(glare_ > 0.0) || shot.lights.empty()) return;
   const std::vector<float> scattered = veil(shot);
   for (std::size_t i = 0; i < light.size(); ++i) {
     constexpr float kLitDirt = 2.0F;  // dirt scatters more than clean glass
     const float dirt = dirt_.empty() ? 0.0F : dirt_[i];
-    add_everywhere(light[i], scattered[i] * (1.0F + kLitDirt * dirt));
+    light[i] += scattered[i] * (1.0F + kLitDirt * dirt);
   }
 }
-
-template void LensClutter::add_to(std::vector<float>&, const Shot&) const;
-template void LensClutter::add_to(std::vector<Eigen::Vector3f>&, const Shot&) const;
 
 }  // namespace km

@@ -17,9 +17,8 @@ class LensClutter {
   /// `seed` determines the spots of dirt.
   LensClutter(const Camera& camera, const SensorEffectsConfig& config, std::uint64_t seed);
 
-  /// Adds the clutter to the light on the sensor, row-major. Value: float, Eigen::Vector3f.
-  template <typename Value>
-  void add_to(std::vector<Value>& light, const Shot& shot) const;
+  /// Adds the clutter to the light on the sensor, row-major.
+  void add_to(std::vector<float>& light, const Shot& shot) const;
 
  private:
   void cover_with_dirt(const SensorEffectsConfig& config, std::uint64_t seed);

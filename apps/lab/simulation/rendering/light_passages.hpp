@@ -20,13 +20,11 @@ class LightPassages {
   /// Factor at `t_s`; 1 outside all passages.
   [[nodiscard]] double factor(double t_s) const;
 
+ private:
   struct Passage {
     double begin_s = 0.0, end_s = 0.0;
     double log_light = 0.0;
   };
-  [[nodiscard]] const std::vector<Passage>& passages() const { return passages_; }
-
- private:
   std::vector<Passage> passages_;  // ascending, without overlap
 };
 

@@ -71,12 +71,6 @@ void require_no_error(RTCDevice device) {
     throw std::runtime_error("Embree failed with error " + std::to_string(error));
 }
 
-// One thread builds: the tree is then the same every time.
-std::string device_config(const std::string& instruction_set) {
-  const std::string config = "threads=1,set_affinity=0";
-  return instruction_set.empty() ? config : config + ",isa=" + instruction_set;
-}
-
 // Copies the mesh: Embree pads its buffers, since it reads 16 bytes at the last vertex.
 void attach_mesh(RTCDevice device, RTCScene scene, const SurfaceMesh& mesh) {
   if (mesh.triangles.empty()) return;
@@ -97,8 +91,8 @@ void attach_mesh(RTCDevice device, RTCScene scene, const SurfaceMesh& mesh) {
 
 }  // namespace
 
-RayTracer::RayTracer(const SurfaceMesh& mesh, const std::string& instruction_set)
-    : device_(rtcNewDevice(device_config(instruction_set).c_str())) {
+// One thread builds: the tree is then the same every time.
+RayTracer::RayTracer(const SurfaceMesh& mesh) : device_(rtcNewDevice("threads=1,set_affinity=0")) {
   require_no_error(device_.get());
   scene_.reset(rtcNewScene(device_.get()));
   // Without it, rays pass between triangles that share an edge.

@@ -8,7 +8,6 @@
 
 #include <cstdint>
 #include <memory>
-#include <string>
 
 #include "apps/lab/simulation/rendering/lanes.hpp"
 #include "apps/lab/simulation/world/world.hpp"
@@ -25,10 +24,8 @@ using RayPacket = RTCRayHit16;
 /// fastest if the rays of a packet are neighbours; other rays give correct results, too.
 class RayTracer {
  public:
-  /// Copies `mesh`. `instruction_set` is one of Embree's ("sse2", "avx2", ...), for tests of its
-  /// kernels; empty: the widest of this processor. Throws std::runtime_error with Embree's error
-  /// code.
-  explicit RayTracer(const SurfaceMesh& mesh, const std::string& instruction_set = {});
+  /// Copies `mesh`. Throws std::runtime_error with Embree's error code.
+  explicit RayTracer(const SurfaceMesh& mesh);
 
   /// Nearest hits of the rays in `active` between tnear and tfar: primID, u, v; tfar becomes the
   /// distance of the hit. The other lanes get kNoTriangle and a ray of length zero; they need not

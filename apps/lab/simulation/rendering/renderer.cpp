@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <cstdlib>
 #include <limits>
@@ -19,32 +18,21 @@ namespace {
 constexpr int kBlock = 4;  // a packet covers 4 x 4 pixels
 static_assert(kBlock * kBlock == kLanes);
 
-int usable_samples(int wanted) {
-  const int rounded = static_cast<int>(std::bit_ceil(static_cast<unsigned>(std::max(wanted, 1))));
-  return std::min(rounded, kLanes);
-}
+// Sample i is in column i of a square grid, in the row given here. Among all such sets, these were
+// found by search: the count on one side of a straight edge follows the area best, over all edges.
+constexpr std::array<int, 4> kSampleRows = {1, 3, 0, 2};  // for a pixel with an edge
+constexpr std::array<int, 16> kThinRows = {4, 13, 8, 0, 5, 11, 14, 2, 9, 6, 12, 1, 7, 15, 3, 10};
 
-// Sample i of n is in column i of an n x n grid, in the row given here. Among all such sets, these
-// were found by search: the count on one side of a straight edge follows the area best, over all
-// edges.
-constexpr std::array<int, 4> kRows4 = {1, 3, 0, 2};
-constexpr std::array<int, 8> kRows8 = {7, 2, 4, 1, 6, 3, 5, 0};
-constexpr std::array<int, 16> kRows16 = {4, 13, 8, 0, 5, 11, 14, 2, 9, 6, 12, 1, 7, 15, 3, 10};
-
-// Offset from the pixel's centre; n is 2, 4, 8 or 16.
-Eigen::Vector2f sample_offset(std::size_t i, std::size_t n) {
-  const int row = n == 16  ? kRows16[i]
-                  : n == 8 ? kRows8[i]
-                  : n == 4 ? kRows4[i]
-                           : static_cast<int>(i);
-  const auto count = static_cast<float>(n);
+// Offset of sample `i` from the pixel's centre.
+template <std::size_t kCount>
+Eigen::Vector2f sample_offset(const std::array<int, kCount>& rows, std::size_t i) {
+  constexpr auto count = static_cast<float>(kCount);
   return {(static_cast<float>(i) + 0.5F) / count - 0.5F,
-          (static_cast<float>(row) + 0.5F) / count - 0.5F};
+          (static_cast<float>(rows[i]) + 0.5F) / count - 0.5F};
 }
 
-template <typename Value>
-Value lit(const Shade<Value>& shade, bool dark) {
-  return dark ? shade.ambient : Value(shade.ambient + shade.sun);
+float lit(const Shade& shade, bool dark) {
+  return dark ? shade.ambient : shade.ambient + shade.sun;
 }
 
 void copy_lane(const Lanes3& from, std::size_t lane, Lanes3& to, std::size_t to_lane) {
@@ -74,17 +62,15 @@ void copy_lane(const SurfaceHits& from, std::size_t lane, SurfaceHits& to, std::
 // One call of Renderer::render(): a ray and a shade per pixel, then more rays in pixels with edges.
 class ViewPass {
  public:
-  ViewPass(const SceneView& view, const RenderOptions& options, const PixelRays& rays,
-           std::span<const SE3> T_world_body, const RenderRequest& request)
+  ViewPass(const SceneView& view, const PixelRays& rays, std::span<const SE3> T_world_body,
+           const RenderRequest& request)
       : at_(view),
         scene_(view.fixed),
         surfaces_(view.surfaces()),
-        options_(options),
         rays_(rays),
         request_(request),
         width_(rays.camera().width),
-        height_(rays.camera().height),
-        samples_(usable_samples(options.samples_per_pixel)) {
+        height_(rays.camera().height) {
     if (T_world_body.size() != 1 && T_world_body.size() != static_cast<std::size_t>(height_))
       throw std::invalid_argument("render: " + std::to_string(T_world_body.size()) + " poses for " +
                                   std::to_string(height_) + " rows");
@@ -97,10 +83,8 @@ class ViewPass {
     view_.height = height_;
     const std::size_t n = static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_);
     pixels_.resize(n);
-    if (request.radiance) gray_.resize(n);
-    if (request.rgb) color_.resize(n);
+    if (request.radiance) shades_.resize(n);
     if (request.radiance) view_.radiance.resize(n);
-    if (request.rgb) view_.rgb.assign(n, Eigen::Vector3f::Zero());
     if (request.depth) view_.depth_m.resize(n);
     if (request.labels) view_.labels.resize(n);
   }
@@ -108,8 +92,7 @@ class ViewPass {
   [[nodiscard]] RenderedView run() {
     for (int y = 0; y < height_; y += kBlock)
       for (int x = 0; x < width_; x += kBlock) shade_block(x, y);
-    const bool shaded = request_.radiance || request_.rgb;
-    if (shaded && samples_ > 1) {
+    if (request_.radiance) {
       edge_.assign(pixels_.size(), kNoEdge);
       compare_neighbours();
       for (int y = 0; y < height_; y += kBlock)
@@ -234,20 +217,17 @@ class ViewPass {
     trace(aim, hits);
     SurfacePoints points;
     LaneMask dark = 0;
-    if (request_.radiance || request_.rgb) {
+    if (request_.radiance) {
       locate(surfaces_, hits, points);
-      if (options_.shadows && scene_.lighting.sun > 0.0F)
-        dark = shadowed(at_, hits.surface, points);
+      if (scene_.lighting.sun > 0.0F) dark = shadowed(at_, hits.surface, points);
     }
     store_block(aim, hits, points, dark);
   }
 
   void store_block(const Aim& aim, const SurfaceHits& hits, const SurfacePoints& points,
                    LaneMask dark) {
-    std::array<Shade<float>, kLanes> gray;
-    std::array<Shade<Eigen::Vector3f>, kLanes> color;
-    if (request_.radiance) shade(scene_, hits, points, hits.active, gray);
-    if (request_.rgb) shade(scene_, hits, points, hits.active, color);
+    Shades shades;
+    if (request_.radiance) shade(scene_, hits, points, hits.active, shades);
     for (std::size_t lane = 0; lane < kLanes; ++lane) {
       if (!has_lane(hits.active, lane)) continue;
       const std::size_t i = index(aim.x[lane], aim.y[lane]);
@@ -260,12 +240,8 @@ class ViewPass {
         pixels_[i].foliage = surfaces_.material_of(pixels_[i].triangle).foliage;
       }
       if (request_.radiance) {
-        gray_[i] = gray[lane];
-        view_.radiance[i] = gray[lane].ambient + (is_dark ? 0.0F : gray[lane].sun);
-      }
-      if (request_.rgb) {
-        color_[i] = color[lane];
-        view_.rgb[i] = color[lane].ambient + (is_dark ? 0.0F : 1.0F) * color[lane].sun;
+        shades_[i] = shades[lane];
+        view_.radiance[i] = shades[lane].ambient + (is_dark ? 0.0F : shades[lane].sun);
       }
       if (request_.depth) view_.depth_m[i] = depth_m;
       if (request_.labels)
@@ -301,8 +277,8 @@ class ViewPass {
   // True if the radiances of two pixels differ enough for their mean to be visible.
   [[nodiscard]] bool contrast(std::size_t a, std::size_t b) const {
     constexpr float kVisible = 0.05F;  // steps of some grey levels; the lens blurs them away
-    const float at_a = request_.radiance ? view_.radiance[a] : luminance_of(view_.rgb[a]);
-    const float at_b = request_.radiance ? view_.radiance[b] : luminance_of(view_.rgb[b]);
+    const float at_a = view_.radiance[a];
+    const float at_b = view_.radiance[b];
     return std::abs(at_a - at_b) > kVisible * std::max(at_a, at_b);
   }
 
@@ -344,7 +320,7 @@ class ViewPass {
       if (!rays_.is_lit(index(x, y))) continue;
       const float depth_m = pixels_[index(x, y)].depth_m;
       if (depth_m > 0.0F && depth_m < nearest_m) continue;
-      aim.set(lane, x, y, sample_offset((5 * lane + 3) % kLanes, kLanes));
+      aim.set(lane, x, y, sample_offset(kThinRows, (5 * lane + 3) % kLanes));
     }
     if (aim.active == 0) return;
     SurfaceHits hits;
@@ -393,12 +369,11 @@ class ViewPass {
   void refine_edges() {
     std::vector<Sample> batch;
     batch.reserve(kLanes);
-    const auto n = static_cast<std::size_t>(samples_);
     const auto refine_pixel = [&](int x, int y) {
       const std::uint8_t edge = edge_[index(x, y)];
       if (edge == kNoEdge || !rays_.is_lit(index(x, y))) return;
-      for (std::size_t i = 0; i < n; ++i) {
-        const Eigen::Vector2f offset = sample_offset(i, n);
+      for (std::size_t i = 0; i < kSampleRows.size(); ++i) {
+        const Eigen::Vector2f offset = sample_offset(kSampleRows, i);
         if (!beyond_edge(edge, offset)) continue;
         batch.push_back({x, y, offset});
         if (batch.size() < kLanes) continue;
@@ -464,9 +439,7 @@ class ViewPass {
       if (!source || ask_sun) {
         defer(hits, lane, pixel, source);
       } else if (*source != pixel) {
-        const bool dark = pixels_[*source].dark;
-        if (request_.radiance) add_sample(pixel, lit(gray_[*source], dark), gray_, view_.radiance);
-        if (request_.rgb) add_sample(pixel, lit(color_[*source], dark), color_, view_.rgb);
+        add_sample(pixel, lit(shades_[*source], pixels_[*source].dark));
       }
     }
   }
@@ -488,30 +461,20 @@ class ViewPass {
     SurfacePoints points;
     locate(surfaces_, hits, points);
     LaneMask dark = 0;
-    if (options_.shadows && scene_.lighting.sun > 0.0F) dark = shadowed(at_, hits.surface, points);
-    if (request_.radiance) mix(points, dark, gray_, view_.radiance);
-    if (request_.rgb) mix(points, dark, color_, view_.rgb);
+    if (scene_.lighting.sun > 0.0F) dark = shadowed(at_, hits.surface, points);
+    Shades shades;
+    shade(scene_, hits, points, deferred_.fresh, shades);
+    for (std::size_t i = 0; i < deferred_.count; ++i) {
+      const Shade& light = has_lane(deferred_.fresh, i) ? shades[i] : shades_[deferred_.source[i]];
+      add_sample(deferred_.pixel[i], lit(light, has_lane(dark, i)));
+    }
     deferred_ = {};
   }
 
-  template <typename Value>
-  void mix(const SurfacePoints& points, LaneMask dark, const std::vector<Shade<Value>>& shaded,
-           std::vector<Value>& image) const {
-    std::array<Shade<Value>, kLanes> shades;
-    shade(scene_, deferred_.hits, points, deferred_.fresh, shades);
-    for (std::size_t i = 0; i < deferred_.count; ++i) {
-      const Shade<Value>& light =
-          has_lane(deferred_.fresh, i) ? shades[i] : shaded[deferred_.source[i]];
-      add_sample(deferred_.pixel[i], lit(light, has_lane(dark, i)), shaded, image);
-    }
-  }
-
   // In the mean of a pixel's centre and samples, missing samples count as the centre.
-  template <typename Value>
-  void add_sample(std::size_t pixel, const Value& radiance, const std::vector<Shade<Value>>& shaded,
-                  std::vector<Value>& image) const {
-    const float weight = 1.0F / static_cast<float>(samples_ + 1);
-    image[pixel] += weight * (radiance - lit(shaded[pixel], pixels_[pixel].dark));
+  void add_sample(std::size_t pixel, float radiance) {
+    constexpr float kWeight = 1.0F / static_cast<float>(kSampleRows.size() + 1);
+    view_.radiance[pixel] += kWeight * (radiance - lit(shades_[pixel], pixels_[pixel].dark));
   }
 
   [[nodiscard]] const Pose& pose(int row) const {
@@ -526,19 +489,16 @@ class ViewPass {
   const SceneView at_;
   const RenderScene& scene_;
   const SurfaceView surfaces_;
-  const RenderOptions& options_;
   const PixelRays& rays_;
   const RenderRequest& request_;
   int width_;
   int height_;
   std::vector<Pose> poses_;  ///< One, or one for each row.
-  int samples_;              ///< Per pixel with an edge.
 
   RenderedView view_;
   std::vector<Pixel> pixels_;
   std::vector<std::uint8_t> edge_;  ///< flags of Edge
-  std::vector<Shade<float>> gray_;
-  std::vector<Shade<Eigen::Vector3f>> color_;
+  std::vector<Shade> shades_;
   Deferred deferred_;
 };
 
@@ -584,13 +544,7 @@ Camera shrunk(const Camera& camera, int factor) {
   return small;
 }
 
-struct Renderer::Impl {
-  RenderScene scene;
-  RenderOptions options;
-};
-
-Renderer::Renderer(const World& world, const RenderOptions& options)
-    : impl_(new Impl{RenderScene(world), options}) {}
+Renderer::Renderer(const World& world) : scene_(new RenderScene(world)) {}
 
 Renderer::~Renderer() = default;
 
@@ -601,17 +555,17 @@ RenderedView Renderer::render(const PixelRays& rays, const SE3& T_world_body,
 
 RenderedView Renderer::render(const PixelRays& rays, std::span<const SE3> T_world_body,
                               const RenderRequest& request, const MovedSurfaces* moved) const {
-  return ViewPass({impl_->scene, moved}, impl_->options, rays, T_world_body, request).run();
+  return ViewPass({*scene_, moved}, rays, T_world_body, request).run();
 }
 
 std::vector<LightSource> Renderer::visible_lights(const SE3& T_world_body) const {
-  const Lighting& lighting = impl_->scene.lighting;
+  const Lighting& lighting = scene_->lighting;
   const Eigen::Vector3f origin = T_world_body.translation().cast<float>();
   std::vector<LightSource> lights;
   const auto add_if_visible = [&](const Eigen::Vector3f& to_light, float irradiance, float far) {
     RayPacket rays;
     set_ray(rays, 0, origin, to_light, 0.0F, far);
-    if (impl_->scene.tracer.occluded(1U, rays) != 0) return;
+    if (scene_->tracer.occluded(1U, rays) != 0) return;
     lights.push_back({T_world_body.linear().transpose() * to_light.cast<double>(),
                       static_cast<double>(irradiance)});
   };
@@ -625,11 +579,6 @@ std::vector<LightSource> Renderer::visible_lights(const SE3& T_world_body) const
                    distance_m - kLampRadius_m);
   }
   return lights;
-}
-
-RenderedView Renderer::render(const Camera& camera, const SE3& T_world_body,
-                              const RenderRequest& request) const {
-  return render(PixelRays(camera), T_world_body, request);
 }
 
 }  // namespace km

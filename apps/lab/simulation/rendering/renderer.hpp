@@ -48,36 +48,28 @@ class PixelRays {
 struct RenderedView {
   int width = 0;
   int height = 0;
-  std::vector<float> radiance;       ///< Linear grey, anti-aliased; a white wall in the sun is 1.
-  std::vector<Eigen::Vector3f> rgb;  ///< Linear colour, anti-aliased.
-  std::vector<float> depth_m;        ///< z in the camera frame at the pixel's centre [m]; 0: sky.
-  std::vector<LabelId> labels;       ///< Labels at the centres of the pixels. Sky is
-                                     ///< SurfaceClass::kSky; pixels without a bearing are
-                                     ///< SurfaceClass::kUnknown.
+  std::vector<float> radiance;  ///< Linear grey, anti-aliased; a white wall in the sun is 1.
+  std::vector<float> depth_m;   ///< z in the camera frame at the pixel's centre [m]; 0: sky.
+  /// Labels at the centres of the pixels. Sky is SurfaceClass::kSky; pixels without a bearing are
+  /// SurfaceClass::kUnknown.
+  std::vector<LabelId> labels;
 };
 
 struct RenderRequest {
   bool radiance = true;
-  bool rgb = false;
   bool depth = false;
   bool labels = false;
 };
 
-struct RenderOptions {
-  /// Visibility samples, beside the centre, of a pixel with edges of surfaces or shadows: 1 (none),
-  /// 2, 4, 8 or 16; others are rounded up.
-  int samples_per_pixel = 4;
-  bool shadows = true;
-};
-
 class MovedSurfaces;
+struct RenderScene;
 
 /// Ray caster over one world. Immutable after construction. render() may be called from several
 /// threads at once and gives the same bytes whatever their number.
 class Renderer {
  public:
   /// Builds the acceleration structure and bakes ambient light. `world` must outlive the renderer.
-  explicit Renderer(const World& world, const RenderOptions& options = {});
+  explicit Renderer(const World& world);
   ~Renderer();
 
   /// One view through a camera (distortion included), its body at T_world_body.
@@ -89,16 +81,12 @@ class Renderer {
   [[nodiscard]] RenderedView render(const PixelRays& rays, std::span<const SE3> T_world_body,
                                     const RenderRequest& request,
                                     const MovedSurfaces* moved = nullptr) const;
-  /// Renders a single view: computes the camera's rays first.
-  [[nodiscard]] RenderedView render(const Camera& camera, const SE3& T_world_body,
-                                    const RenderRequest& request) const;
 
   /// The sun and the lamps that shine on the body at T_world_body without a surface between.
   [[nodiscard]] std::vector<LightSource> visible_lights(const SE3& T_world_body) const;
 
  private:
-  struct Impl;
-  std::unique_ptr<const Impl> impl_;
+  std::unique_ptr<const RenderScene> scene_;
 };
 
 }  // namespace km

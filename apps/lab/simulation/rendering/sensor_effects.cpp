@@ -10,11 +10,22 @@
 namespace km {
 namespace {
 
+constexpr double kVignetting = 0.2;  // share of light lost in the corners
+// Standard deviation of a point. With this value the Vicon room has the same variance of the
+// Laplacian as recorded images.
+constexpr double kLensBlur_px = 0.6;
+constexpr double kReadNoise = 1.0;    // [grey levels], in the dark
+constexpr double kPhotonNoise = 2.0;  // [grey levels], just below saturation
+constexpr double kNoiseCorrelation_px =
+    1.2;                               // demosaicing, filters and JPEG leave little fine noise
+constexpr double kTargetLevel = 0.55;  // mean grey, share of saturation
+constexpr double kAdaptation = 0.02;   // share of the way to the target per frame, in log exposure
+constexpr double kAdaptationRate_hz = 20.0;
+
 // Mean grey level, as a share of saturation, of the scene under a gain.
-double mean_level(const std::vector<float>& radiance, double gain, double gamma) {
+double mean_level(const std::vector<float>& radiance, double gain) {
   double sum = 0.0;
-  for (const float value : radiance)
-    sum += std::pow(std::clamp(gain * static_cast<double>(value), 0.0, 1.0), 1.0 / gamma);
+  for (const float value : radiance) sum += std::clamp(gain * static_cast<double>(value), 0.0, 1.0);
   return sum / static_cast<double>(radiance.size());
 }
 
@@ -23,13 +34,13 @@ constexpr double kLeastGain = 1e-3;
 constexpr double kMostGain = 1e3;
 
 // The gain for the target level; the mean level grows with the gain.
-double solve_gain(const std::vector<float>& radiance, const SensorEffectsConfig& config) {
+double solve_gain(const std::vector<float>& radiance) {
   double low = std::log(kLeastGain);
   double high = std::log(kMostGain);
   constexpr int kHalvings = 30;
   for (int i = 0; i < kHalvings; ++i) {
     const double middle = 0.5 * (low + high);
-    const bool dark = mean_level(radiance, std::exp(middle), config.gamma) < config.target_level;
+    const bool dark = mean_level(radiance, std::exp(middle)) < kTargetLevel;
     (dark ? low : high) = middle;
   }
   return std::exp(0.5 * (low + high));
@@ -45,9 +56,8 @@ std::vector<float> gaussian_kernel(double sigma_px) {
 }
 
 /// `row` convolved; `padded` is scratch memory.
-template <typename Value>
-void blur_row(const std::vector<float>& kernel, const Value* row, std::size_t n,
-              std::vector<Value>& padded, Value* result) {
+void blur_row(const std::vector<float>& kernel, const float* row, std::size_t n,
+              std::vector<float>& padded, float* result) {
   const std::size_t radius = kernel.size() / 2;
   padded.assign(radius, row[0]);
   padded.insert(padded.end(), row, row + n);
@@ -70,19 +80,18 @@ CameraVelocity camera_velocity(const SE3& T_body_cam, const Vector6& body_veloci
   return {(R_cam_body * omega).cast<float>(), (R_cam_body * at_camera).cast<float>()};
 }
 
-template <typename Value>
-Value bilinear(const std::vector<Value>& image, int width, int height, float x, float y) {
+float bilinear(const std::vector<float>& image, int width, int height, float x, float y) {
   x = std::clamp(x, 0.0F, static_cast<float>(width - 1));
   y = std::clamp(y, 0.0F, static_cast<float>(height - 1));
   const int column = std::min(static_cast<int>(x), std::max(width - 2, 0));
   const int row = std::min(static_cast<int>(y), std::max(height - 2, 0));
   const float fx = x - static_cast<float>(column);
   const float fy = y - static_cast<float>(row);
-  const Value* p = image.data() + static_cast<std::ptrdiff_t>(row) * width + column;
+  const float* p = image.data() + static_cast<std::ptrdiff_t>(row) * width + column;
   const std::ptrdiff_t right = width > 1 ? 1 : 0;
   const std::ptrdiff_t down = height > 1 ? width : 0;
-  const Value low = p[0] + fx * (p[right] - p[0]);
-  const Value high = p[down] + fx * (p[down + right] - p[down]);
+  const float low = p[0] + fx * (p[right] - p[0]);
+  const float high = p[down] + fx * (p[down + right] - p[down]);
   return low + fy * (high - low);
 }
 
@@ -106,16 +115,14 @@ std::vector<float> smoothed_transposed(const std::vector<float>& field, double s
   return result;
 }
 
-// Gaussian noise of unit variance that repeats, neighbours correlated over `sigma_px`.
-std::vector<float> make_noise_tile(double sigma_px) {
+// Gaussian noise of unit variance that repeats, neighbours correlated.
+std::vector<float> make_noise_tile() {
   // A constant seed is enough, because each image uses another part of the tile.
   std::mt19937 random(20240229);
   std::normal_distribution<float> normal;
   std::vector<float> tile(static_cast<std::size_t>(kTile) * kTile);
   for (float& value : tile) value = normal(random);
-  constexpr double kWhite_px = 0.1;
-  if (sigma_px > kWhite_px)
-    tile = smoothed_transposed(smoothed_transposed(tile, sigma_px), sigma_px);
+  tile = smoothed_transposed(smoothed_transposed(tile, kNoiseCorrelation_px), kNoiseCorrelation_px);
   double squares = 0.0;
   for (const float value : tile) squares += static_cast<double>(value) * static_cast<double>(value);
   const auto scale = static_cast<float>(std::sqrt(static_cast<double>(tile.size()) / squares));
@@ -133,8 +140,8 @@ NoiseLevels noise_levels(const SensorEffectsConfig& config, const Exposure& expo
   // Beyond the longest shutter time the signal is amplified together with its noise.
   const double opened = exposure.time_s / config.unit_exposure_s;
   const double amplified = opened > 0.0 ? std::max(1.0, exposure.gain / opened) : 1.0;
-  const double read = amplified * config.read_noise / 255.0;
-  const double photon = config.photon_noise / 255.0;
+  const double read = amplified * kReadNoise / 255.0;
+  const double photon = kPhotonNoise / 255.0;
   return {static_cast<float>(read * read), static_cast<float>(amplified * photon * photon)};
 }
 
@@ -164,22 +171,21 @@ ExposureControl::ExposureControl(const SensorEffectsConfig& config, double rate_
     : config_(checked(config)) {
   if (!(rate_hz > 0.0) || !std::isfinite(rate_hz))
     throw std::invalid_argument("ExposureControl: a rate of " + std::to_string(rate_hz) + " Hz");
-  constexpr double kConfiguredRate_hz = 20.0;
-  share_per_frame_ = 1.0 - std::pow(1.0 - config_.adaptation, kConfiguredRate_hz / rate_hz);
+  share_per_frame_ = 1.0 - std::pow(1.0 - kAdaptation, kAdaptationRate_hz / rate_hz);
 }
 
 Exposure ExposureControl::next(const RenderedView& scene, double light) {
   if (scene.radiance.empty())
     throw std::invalid_argument("ExposureControl: a view without radiance");
   if (!started_) {
-    log_gain_ = std::log(solve_gain(scene.radiance, config_) / light);
+    log_gain_ = std::log(solve_gain(scene.radiance) / light);
     started_ = true;
   } else {
     // A step of the integrating controller that steers the mean of a linear image to its target.
-    const double level = mean_level(scene.radiance, light * std::exp(log_gain_), config_.gamma);
-    const double error = std::log(config_.target_level / std::max(level, 1e-3));
-    log_gain_ = std::clamp(log_gain_ + share_per_frame_ * config_.gamma * error,
-                           std::log(kLeastGain), std::log(kMostGain));
+    const double level = mean_level(scene.radiance, light * std::exp(log_gain_));
+    const double error = std::log(kTargetLevel / std::max(level, 1e-3));
+    log_gain_ =
+        std::clamp(log_gain_ + share_per_frame_ * error, std::log(kLeastGain), std::log(kMostGain));
   }
   Exposure exposure;
   exposure.gain = std::exp(log_gain_);
@@ -187,27 +193,23 @@ Exposure ExposureControl::next(const RenderedView& scene, double light) {
   return exposure;
 }
 
-template <typename Value>
-std::vector<Value> lens_blurred(const std::vector<Value>& image, int width, int height,
-                                double sigma_px) {
-  constexpr double kSharp_px = 0.1;  // below this the neighbours' weights round to zero
-  if (!(sigma_px > kSharp_px) || image.empty()) return image;
-  std::vector<float> kernel = gaussian_kernel(sigma_px);
+std::vector<float> lens_blurred(const std::vector<float>& image, int width, int height) {
+  std::vector<float> kernel = gaussian_kernel(kLensBlur_px);
   const float sum = std::accumulate(kernel.begin(), kernel.end(), 0.0F);
   for (float& weight : kernel) weight /= sum;
   const auto n = static_cast<std::size_t>(width);
   const int radius = static_cast<int>(kernel.size() / 2);
-  std::vector<Value> across(image.size());
-  std::vector<Value> padded;
+  std::vector<float> across(image.size());
+  std::vector<float> padded;
   for (std::size_t begin = 0; begin < image.size(); begin += n)
     blur_row(kernel, image.data() + begin, n, padded, across.data() + begin);
-  std::vector<Value> result(image.size());
+  std::vector<float> result(image.size());
   for (int y = 0; y < height; ++y) {
-    Value* const out = result.data() + static_cast<std::size_t>(y) * n;
+    float* const out = result.data() + static_cast<std::size_t>(y) * n;
     for (int i = -radius; i <= radius; ++i) {
       const auto row = static_cast<std::size_t>(std::clamp(y + i, 0, height - 1));
       const float weight = kernel[static_cast<std::size_t>(i + radius)];
-      const Value* const in = across.data() + row * n;
+      const float* const in = across.data() + row * n;
       if (i == -radius)
         for (std::size_t x = 0; x < n; ++x) out[x] = weight * in[x];
       else
@@ -216,10 +218,6 @@ std::vector<Value> lens_blurred(const std::vector<Value>& image, int width, int 
   }
   return result;
 }
-
-template std::vector<float> lens_blurred(const std::vector<float>&, int, int, double);
-template std::vector<Eigen::Vector3f> lens_blurred(const std::vector<Eigen::Vector3f>&, int, int,
-                                                   double);
 
 std::vector<Eigen::Vector2f> image_motion(const PixelRays& rays, const std::vector<float>& depth_m,
                                           const Vector6& body_velocity, double time_s) {
@@ -253,10 +251,9 @@ std::vector<Eigen::Vector2f> image_motion(const PixelRays& rays, const std::vect
   return motion;
 }
 
-template <typename Value>
-std::vector<Value> blurred(const std::vector<Value>& image, int width, int height,
+std::vector<float> blurred(const std::vector<float>& image, int width, int height,
                            const std::vector<Eigen::Vector2f>& motion) {
-  std::vector<Value> result(image.size());
+  std::vector<float> result(image.size());
   std::size_t i = 0;
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x, ++i) {
@@ -270,7 +267,7 @@ std::vector<Value> blurred(const std::vector<Value>& image, int width, int heigh
       const auto taps = static_cast<int>(std::min(std::ceil(length) + 1.0F, kMostTaps));
       const Eigen::Vector2f step = motion[i] / static_cast<float>(taps);
       const float first = -0.5F * static_cast<float>(taps - 1);
-      Value sum = 0.0F * image[i];
+      float sum = 0.0F * image[i];
       for (int k = 0; k < taps; ++k) {
         const float along = first + static_cast<float>(k);
         sum += bilinear(image, width, height, static_cast<float>(x) + along * step.x(),
@@ -282,22 +279,16 @@ std::vector<Value> blurred(const std::vector<Value>& image, int width, int heigh
   return result;
 }
 
-template std::vector<float> blurred(const std::vector<float>&, int, int,
-                                    const std::vector<Eigen::Vector2f>&);
-template std::vector<Eigen::Vector3f> blurred(const std::vector<Eigen::Vector3f>&, int, int,
-                                              const std::vector<Eigen::Vector2f>&);
-
 SensorEffects::SensorEffects(const PixelRays& rays, const SensorEffectsConfig& config,
                              std::uint64_t dirt_seed)
     : config_(checked(config)),
       rays_(rays),
       clutter_(rays.camera(), config, dirt_seed),
-      noise_tile_(make_noise_tile(config.noise_correlation_px)) {
+      noise_tile_(make_noise_tile()) {
   const Camera& camera = rays.camera();
   // The light falls with the fourth power of a cosine: 1 / (1 + k r^2)^2.
   const Eigen::Vector2d half(0.5 * (camera.width - 1), 0.5 * (camera.height - 1));
-  const double k =
-      (1.0 / std::sqrt(1.0 - config_.vignetting) - 1.0) / std::max(half.squaredNorm(), 1.0);
+  const double k = (1.0 / std::sqrt(1.0 - kVignetting) - 1.0) / std::max(half.squaredNorm(), 1.0);
   relative_light_.reserve(static_cast<std::size_t>(camera.width) *
                           static_cast<std::size_t>(camera.height));
   for (int y = 0; y < camera.height; ++y) {
@@ -306,38 +297,31 @@ SensorEffects::SensorEffects(const PixelRays& rays, const SensorEffectsConfig& c
       relative_light_.push_back(static_cast<float>(1.0 / (fall * fall)));
     }
   }
-  // The response as a function of the square root of the signal: fine steps in the dark, where it
-  // is steep.
+  // The response as a function of the square root of the signal: fine steps in the dark.
   for (int i = 0; i <= kResponseSteps; ++i)
-    response_.push_back(static_cast<float>(
-        255.0 * std::pow(static_cast<double>(i) / kResponseSteps, 2.0 / config_.gamma)));
+    response_.push_back(
+        static_cast<float>(255.0 * std::pow(static_cast<double>(i) / kResponseSteps, 2.0)));
 }
 
-RenderRequest SensorEffects::request(bool color) const {
-  RenderRequest request;
-  request.radiance = !color;
-  request.rgb = color;
-  request.depth = config_.motion_blur;
-  return request;
+RenderRequest SensorEffects::request() const {
+  return {.radiance = true, .depth = config_.motion_blur, .labels = false};
 }
 
-void SensorEffects::require_complete(const RenderedView& view, std::size_t values) const {
+void SensorEffects::require_complete(const RenderedView& view) const {
   const Camera& camera = rays_.camera();
   if (view.width != camera.width || view.height != camera.height)
     throw std::invalid_argument("SensorEffects: a view of " + std::to_string(view.width) + " x " +
                                 std::to_string(view.height) + " for a camera of " +
                                 std::to_string(camera.width) + " x " +
                                 std::to_string(camera.height));
-  if (values != relative_light_.size())
-    throw std::invalid_argument("SensorEffects: the view lacks the radiance or colour asked for");
+  if (view.radiance.size() != relative_light_.size())
+    throw std::invalid_argument("SensorEffects: the view lacks radiance");
   if (config_.motion_blur && view.depth_m.size() != relative_light_.size())
     throw std::invalid_argument("SensorEffects: motion blur needs the view's depth");
 }
 
-template <typename Value>
-std::vector<Value> SensorEffects::on_sensor(const std::vector<Value>& image,
-                                            const RenderedView& view, const Shot& shot) const {
-  std::vector<Value> seen = lens_blurred(image, view.width, view.height, config_.lens_blur_px);
+std::vector<float> SensorEffects::on_sensor(const RenderedView& view, const Shot& shot) const {
+  std::vector<float> seen = lens_blurred(view.radiance, view.width, view.height);
   if (config_.motion_blur && !shot.body_velocity.isZero() && shot.exposure.time_s > 0.0)
     seen = blurred(seen, view.width, view.height,
                    image_motion(rays_, view.depth_m, shot.body_velocity, shot.exposure.time_s));
@@ -354,9 +338,11 @@ std::uint8_t SensorEffects::quantized(float signal) const {
   return static_cast<std::uint8_t>(level + 0.5F);
 }
 
-// Exposure, noise, response of every `stride`-th value of `linear`; noise differs per channel.
-void SensorEffects::expose(const float* linear, std::size_t stride, const Shot& shot,
-                           std::mt19937& random, std::uint8_t* levels) const {
+GrayImage SensorEffects::gray(const RenderedView& view, const Shot& shot) const {
+  require_complete(view);
+  const std::vector<float> linear = on_sensor(view, shot);
+  std::mt19937 random = generator(shot.noise_seed);
+  GrayImage image{view.width, view.height, std::vector<std::uint8_t>(linear.size())};
   const NoiseLevels noise = noise_levels(config_, shot.exposure);
   const TileOffsets offsets = draw_offsets(random);
   const auto gain = static_cast<float>(shot.exposure.gain * shot.light);
@@ -370,30 +356,12 @@ void SensorEffects::expose(const float* linear, std::size_t stride, const Shot& 
       constexpr float kHalfRoot = 0.70710678F;  // the sum of two has unit variance again
       const float draw =
           kHalfRoot * (row0[(x + offsets.x[0]) & kTileMask] + row1[(x + offsets.x[1]) & kTileMask]);
-      const float signal = gain * relative_light_[i] * linear[i * stride];
+      const float signal = gain * relative_light_[i] * linear[i];
       const float variance =
           noise.read_variance + noise.photon_variance * std::clamp(signal, 0.0F, 1.0F);
-      levels[i * stride] = quantized(signal + draw * std::sqrt(variance));
+      image.pixels[i] = quantized(signal + draw * std::sqrt(variance));
     }
   }
-}
-
-GrayImage SensorEffects::gray(const RenderedView& view, const Shot& shot) const {
-  require_complete(view, view.radiance.size());
-  const std::vector<float> linear = on_sensor(view.radiance, view, shot);
-  std::mt19937 random = generator(shot.noise_seed);
-  GrayImage image{view.width, view.height, std::vector<std::uint8_t>(linear.size())};
-  expose(linear.data(), 1, shot, random, image.pixels.data());
-  return image;
-}
-
-ColorImage SensorEffects::color(const RenderedView& view, const Shot& shot) const {
-  require_complete(view, view.rgb.size());
-  const std::vector<Eigen::Vector3f> linear = on_sensor(view.rgb, view, shot);
-  std::mt19937 random = generator(shot.noise_seed);
-  ColorImage image{view.width, view.height, std::vector<std::uint8_t>(3 * linear.size())};
-  for (std::size_t channel = 0; channel < 3; ++channel)
-    expose(linear.data()->data() + channel, 3, shot, random, image.pixels.data() + channel);
   return image;
 }
 

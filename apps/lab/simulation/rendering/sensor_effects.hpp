@@ -50,11 +50,10 @@ class ExposureControl {
   return config.rolling_shutter_s * ((row + 0.5) / height - 0.5);
 }
 
-/// Blur of a sharp image by the lens: a Gaussian of `sigma_px`. Border values continue outwards.
-/// Row-major, width * height. Value: float, Eigen::Vector3f.
-template <typename Value>
-[[nodiscard]] std::vector<Value> lens_blurred(const std::vector<Value>& image, int width,
-                                              int height, double sigma_px);
+/// Blur of a sharp image by the lens: a Gaussian. Border values continue outwards. Row-major,
+/// width * height.
+[[nodiscard]] std::vector<float> lens_blurred(const std::vector<float>& image, int width,
+                                              int height);
 
 /// Motion of each pixel's content in the image while the shutter is open [px].
 ///
@@ -67,17 +66,9 @@ template <typename Value>
                                                         const Vector6& body_velocity,
                                                         double time_s);
 
-/// Mean of `image` along each pixel's motion, centred on the pixel. Value: float, Eigen::Vector3f.
-template <typename Value>
-[[nodiscard]] std::vector<Value> blurred(const std::vector<Value>& image, int width, int height,
+/// Mean of `image` along each pixel's motion, centred on the pixel.
+[[nodiscard]] std::vector<float> blurred(const std::vector<float>& image, int width, int height,
                                          const std::vector<Eigen::Vector2f>& motion);
-
-/// 8-bit colour image: red, green, blue interleaved, row-major without padding.
-struct ColorImage {
-  int width = 0;   ///< [px]
-  int height = 0;  ///< [px]
-  std::vector<std::uint8_t> pixels;
-};
 
 /// Converts light on the sensor to grey levels: blur of lens and motion, rain, glare and dirt,
 /// vignetting, exposure, noise, response, quantisation. Immutable; one per camera, shared by
@@ -88,31 +79,25 @@ class SensorEffects {
   SensorEffects(const PixelRays& rays, const SensorEffectsConfig& config,
                 std::uint64_t dirt_seed = 0);
 
-  /// Request to the renderer for gray() or color(): the radiance or rgb, and the depth if there is
-  /// motion blur.
-  [[nodiscard]] RenderRequest request(bool color) const;
+  /// Request to the renderer for gray(): the radiance, and the depth if there is motion blur.
+  [[nodiscard]] RenderRequest request() const;
 
   /// Throws std::invalid_argument if `view` lacks what request() names or is of another size.
   [[nodiscard]] GrayImage gray(const RenderedView& view, const Shot& shot) const;
-  [[nodiscard]] ColorImage color(const RenderedView& view, const Shot& shot) const;
 
  private:
   static constexpr int kResponseSteps = 1024;
 
-  void require_complete(const RenderedView& view, std::size_t values) const;
-  template <typename Value>
-  [[nodiscard]] std::vector<Value> on_sensor(const std::vector<Value>& image,
-                                             const RenderedView& view, const Shot& shot) const;
+  void require_complete(const RenderedView& view) const;
+  [[nodiscard]] std::vector<float> on_sensor(const RenderedView& view, const Shot& shot) const;
   [[nodiscard]] std::uint8_t quantized(float signal) const;
-  void expose(const float* linear, std::size_t stride, const Shot& shot, std::mt19937& random,
-              std::uint8_t* levels) const;
 
   SensorEffectsConfig config_;
   PixelRays rays_;
   LensClutter clutter_;
   std::vector<float> relative_light_;  ///< 1 at the centre, less in the corners.
   std::vector<float> noise_tile_;      ///< Unit variance, correlated, square; it repeats.
-  std::vector<float> response_;        ///< Grey level over the square root of the signal.
+  std::vector<float> response_;        ///< Grey level by the square root of the signal.
 };
 
 }  // namespace km

@@ -9,15 +9,6 @@ namespace km {
 struct SensorEffectsConfig {
   static constexpr const char* kSection = "sensor";
 
-  double vignetting = 0.2;
-  double lens_blur_px = 0.6;  ///< With this value the Vicon room has the same variance of the
-                              ///< Laplacian as recorded images.
-  double read_noise = 1.0;
-  double photon_noise = 2.0;
-  double noise_correlation_px = 1.2;  ///< Demosaicing, filters and JPEG leave little fine noise.
-  double gamma = 1.0;
-  double target_level = 0.55;
-  double adaptation = 0.02;
   double unit_exposure_s = 0.005;
   double max_exposure_s = 0.015;
   bool motion_blur = true;
@@ -31,17 +22,6 @@ struct SensorEffectsConfig {
   int rain_drops = 0;
 
   void visit_fields(auto& visitor) {
-    visitor.field("vignetting", vignetting, {0.0, 0.9},
-                  "share of light lost in the corners; it falls as the fourth power of a cosine");
-    visitor.field("lens_blur_px", lens_blur_px, {0.0, 5.0}, "px, standard deviation of a point");
-    visitor.field("read_noise", read_noise, {0.0, 50.0}, "grey levels, in the dark");
-    visitor.field("photon_noise", photon_noise, {0.0, 50.0},
-                  "grey levels just below saturation; it falls with the square root of the light");
-    visitor.field("noise_correlation_px", noise_correlation_px, {0.0, 4.0}, "px; 0: white noise");
-    visitor.field("gamma", gamma, {1.0, 3.0}, "grey = signal^(1 / gamma); 1: linear");
-    visitor.field("target_level", target_level, {0.05, 0.95}, "mean grey, share of saturation");
-    visitor.field("adaptation", adaptation, {0.001, 1.0},
-                  "share of the way to the target, in log exposure, per frame at 20 Hz");
     visitor.field("unit_exposure_s", unit_exposure_s, {1e-5, 1.0},
                   "s, shutter time at which a white wall in the sun saturates");
     visitor.field("max_exposure_s", max_exposure_s, {1e-5, 1.0},

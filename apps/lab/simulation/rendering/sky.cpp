@@ -91,24 +91,21 @@ Eigen::Vector3f direction_of(int column, int row) {
 }
 
 // Between a texel and its neighbours to the right and below.
-template <typename Value>
-Value bilinear(const Value* texel, float x, float y) {
-  const Value low = texel[0] + x * (texel[1] - texel[0]);
-  const Value high = texel[kSize] + x * (texel[kSize + 1] - texel[kSize]);
+float bilinear(const float* texel, float x, float y) {
+  const float low = texel[0] + x * (texel[1] - texel[0]);
+  const float high = texel[kSize] + x * (texel[kSize + 1] - texel[kSize]);
   return low + y * (high - low);
 }
 
 }  // namespace
 
 Sky::Sky(const Lighting& lighting) {
-  color_.reserve(static_cast<std::size_t>(kSize) * kSize);
+  std::vector<Eigen::Vector3f> colors;
+  colors.reserve(static_cast<std::size_t>(kSize) * kSize);
   for (int row = 0; row < kSize; ++row)
     for (int column = 0; column < kSize; ++column)
-      color_.push_back(sky_color(direction_of(column, row), lighting));
-  measure_and_scale(lighting.ambient);
-}
-
-void Sky::measure_and_scale(float ambient) {
+      colors.push_back(sky_color(direction_of(column, row), lighting));
+  Eigen::Vector3f haze = Eigen::Vector3f::Zero();
   float irradiance = 0.0F;
   float weight = 0.0F;
   float horizon_weight = 0.0F;
@@ -118,22 +115,20 @@ void Sky::measure_and_scale(float ambient) {
       const Eigen::Vector3f d = direction_of(column, row);
       const float solid_angle =
           (1.0F + d.z()) * (1.0F + d.z());  // solid angle of a texel, up to a factor
-      const Eigen::Vector3f& color = color_[static_cast<std::size_t>(row * kSize + column)];
+      const Eigen::Vector3f& color = colors[static_cast<std::size_t>(row * kSize + column)];
       irradiance += solid_angle * d.z() * luminance_of(color);
       weight += solid_angle * d.z();
       if (d.z() > 0.15F) continue;
-      haze_color_ += color;
+      haze += color;
       horizon_weight += 1.0F;
     }
   }
-  const float scale = ambient * weight / irradiance;
-  haze_color_ *= scale / horizon_weight;
-  haze_luminance_ = luminance_of(haze_color_);
-  luminance_.reserve(color_.size());
-  for (Eigen::Vector3f& color : color_) {
-    color *= scale;
-    luminance_.push_back(luminance_of(color));
-  }
+  const float scale = lighting.ambient * weight / irradiance;
+  haze *= scale / horizon_weight;
+  haze_luminance_ = luminance_of(haze);
+  luminance_.reserve(colors.size());
+  for (const Eigen::Vector3f& color : colors)
+    luminance_.push_back(luminance_of(Eigen::Vector3f(color * scale)));
 }
 
 inline Sky::Cell Sky::cell_of(float dx, float dy, float dz) {
@@ -152,11 +147,6 @@ inline Sky::Cell Sky::cell_of(float dx, float dy, float dz) {
 float Sky::luminance(const Eigen::Vector3f& direction) const {
   const Cell c = cell_of(direction.x(), direction.y(), direction.z());
   return bilinear(luminance_.data() + c.index, c.x, c.y);
-}
-
-Eigen::Vector3f Sky::color(const Eigen::Vector3f& direction) const {
-  const Cell c = cell_of(direction.x(), direction.y(), direction.z());
-  return bilinear(color_.data() + c.index, c.x, c.y);
 }
 
 Lanes Sky::luminance(const Lanes3& directions) const {

@@ -18,13 +18,11 @@ class Sky {
 
   /// `direction` need not have unit length.
   [[nodiscard]] float luminance(const Eigen::Vector3f& direction) const;
-  [[nodiscard]] Eigen::Vector3f color(const Eigen::Vector3f& direction) const;
   /// Luminance for sixteen directions.
   [[nodiscard]] Lanes luminance(const Lanes3& directions) const;
 
   /// Mean radiance at the horizon: distant surfaces fade to it.
   [[nodiscard]] float haze_luminance() const { return haze_luminance_; }
-  [[nodiscard]] const Eigen::Vector3f& haze_color() const { return haze_color_; }
 
  private:
   /// Position in the table: the upper hemisphere in stereographic projection.
@@ -33,12 +31,9 @@ class Sky {
     float x = 0.0F, y = 0.0F;
   };
   [[nodiscard]] static Cell cell_of(float x, float y, float z);
-  void measure_and_scale(float ambient);
 
   std::vector<float> luminance_;
-  std::vector<Eigen::Vector3f> color_;
   float haze_luminance_ = 0.0F;
-  Eigen::Vector3f haze_color_ = Eigen::Vector3f::Zero();
 };
 
 }  // namespace km

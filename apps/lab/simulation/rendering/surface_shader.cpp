@@ -8,7 +8,7 @@
 namespace km {
 namespace {
 
-// Terms of a point's radiance, as factors for grey and for colour:
+// Terms of a point's radiance:
 // albedo * (sky + lamps) + mirrored_sky * sky(mirrored) + mirrored_rest + haze, and albedo * sun.
 struct Mixture {
   Lanes sun, sky, lamps;
@@ -148,11 +148,8 @@ Mixture mixture_of(const RenderScene& scene, const SurfacePoints& points) {
   return mixture;
 }
 
-using Grays = std::array<Shade<float>, kLanes>;
-using Colors = std::array<Shade<Eigen::Vector3f>, kLanes>;
-
 void shade_surfaces(const RenderScene& scene, const SurfacePoints& points, const Mixture& mixture,
-                    LaneMask /*wanted*/, Grays& shades) {
+                    Shades& shades) {
   const Lanes albedo = gray_albedo(points, taps_of(points));
   Lanes mirrored{};
   if (mixture.any_mirror) mirrored = scene.sky.luminance(mixture.mirrored);
@@ -165,56 +162,6 @@ void shade_surfaces(const RenderScene& scene, const SurfacePoints& points, const
       shades[i] = {ambient, albedo[i] * mixture.sun[i]};
     }
   });
-}
-
-Eigen::Vector3f color_albedo(const ShadingMaterial& material, const Taps& taps, std::size_t lane) {
-  Eigen::Vector3f base = Eigen::Vector3f::Zero();
-  Eigen::Vector3f detail = Eigen::Vector3f::Zero();
-  // A sample as large as a tile of the detail averages it completely.
-  const float base_width = taps.width_m[lane] * material.base.per_m;
-  const float detail_width = taps.width_m[lane] * material.detail.per_m;
-  const bool detailed = detail_width < 1.0F;
-  Eigen::Vector2f uv(taps.first_u[lane], taps.first_v[lane]);
-  const Eigen::Vector2f step(taps.step_u[lane], taps.step_v[lane]);
-  for (int i = 0; i < taps.count[lane]; ++i, uv += step) {
-    base += material.base.texture->color(uv * material.base.per_m, base_width);
-    if (detailed)
-      detail += material.detail.texture->color(uv * material.detail.per_m, detail_width);
-  }
-  const float share = 1.0F / static_cast<float>(taps.count[lane]);
-  const Eigen::Vector3f albedo = share * material.tint.cwiseProduct(base);
-  return detailed ? Eigen::Vector3f(2.0F * share * albedo.cwiseProduct(detail)) : albedo;
-}
-
-void shade_surfaces(const RenderScene& scene, const SurfacePoints& points, const Mixture& mixture,
-                    LaneMask wanted, Colors& shades) {
-  // A warm sun and a blue sky; both of luminance 1.
-  const Eigen::Vector3f sunlight(1.06F, 0.995F, 0.87F);
-  const Eigen::Vector3f skylight(0.93F, 1.0F, 1.2F);
-  const Taps taps = taps_of(points);
-  for (std::size_t i = 0; i < kLanes; ++i) {
-    if (!has_lane(wanted, i)) continue;
-    const Eigen::Vector3f albedo = color_albedo(*points.material[i], taps, i);
-    const Eigen::Vector3f light =
-        mixture.sky[i] * skylight + Eigen::Vector3f::Constant(mixture.lamps[i]);
-    shades[i].sun = mixture.sun[i] * albedo.cwiseProduct(sunlight);
-    shades[i].ambient = albedo.cwiseProduct(light) +
-                        Eigen::Vector3f::Constant(mixture.mirrored_rest[i]) +
-                        mixture.haze[i] * scene.sky.haze_color();
-    if (mixture.mirrored_sky[i] > 0.0F)
-      shades[i].ambient += mixture.mirrored_sky[i] * scene.sky.color(mixture.mirrored.at(i));
-  }
-}
-
-void shade_sky(const Sky& sky, const Lanes3& directions, LaneMask wanted, Grays& shades) {
-  const Lanes radiance = sky.luminance(directions);
-  for (std::size_t i = 0; i < kLanes; ++i)
-    if (has_lane(wanted, i)) shades[i] = {radiance[i], 0.0F};
-}
-
-void shade_sky(const Sky& sky, const Lanes3& directions, LaneMask wanted, Colors& shades) {
-  for (std::size_t i = 0; i < kLanes; ++i)
-    if (has_lane(wanted, i)) shades[i] = {sky.color(directions.at(i)), Eigen::Vector3f::Zero()};
 }
 
 Lanes3 directions_of(const RayPacket& rays) {
@@ -281,18 +228,15 @@ LaneMask shadowed(const SceneView& scene, LaneMask wanted, const SurfacePoints& 
   return (dark & wanted) | scene.occluded(wanted & ~dark, rays);
 }
 
-template <typename Value>
 void shade(const RenderScene& scene, const SurfaceHits& hits, const SurfacePoints& points,
-           LaneMask wanted, std::array<Shade<Value>, kLanes>& shades) {
-  const LaneMask surface = wanted & hits.surface;
-  if (surface != 0) shade_surfaces(scene, points, mixture_of(scene, points), surface, shades);
-  if (const LaneMask sky = wanted & ~hits.surface; sky != 0)
-    shade_sky(scene.sky, directions_of(hits.rays), sky, shades);
+           LaneMask wanted, Shades& shades) {
+  if ((wanted & hits.surface) != 0)
+    shade_surfaces(scene, points, mixture_of(scene, points), shades);
+  const LaneMask sky = wanted & ~hits.surface;
+  if (sky == 0) return;
+  const Lanes radiance = scene.sky.luminance(directions_of(hits.rays));
+  for (std::size_t i = 0; i < kLanes; ++i)
+    if (has_lane(sky, i)) shades[i] = {radiance[i], 0.0F};
 }
-
-template void shade<float>(const RenderScene&, const SurfaceHits&, const SurfacePoints&, LaneMask,
-                           std::array<Shade<float>, kLanes>&);
-template void shade<Eigen::Vector3f>(const RenderScene&, const SurfaceHits&, const SurfacePoints&,
-                                     LaneMask, std::array<Shade<Eigen::Vector3f>, kLanes>&);
 
 }  // namespace km

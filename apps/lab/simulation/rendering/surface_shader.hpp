@@ -4,7 +4,6 @@
 #include <array>
 
 #include "apps/lab/simulation/rendering/light_volume.hpp"
-#include "apps/lab/simulation/rendering/moved_surfaces.hpp"
 #include "apps/lab/simulation/rendering/sky.hpp"
 #include "apps/lab/simulation/rendering/surfaces.hpp"
 #include "apps/lab/simulation/world/world.hpp"
@@ -36,13 +35,12 @@ struct SceneView {
   [[nodiscard]] LaneMask occluded(LaneMask active, RayPacket& rays) const;
 };
 
-/// Radiance along one ray, split into two parts, of which a shadow removes one. Value is float
-/// (grey) or Eigen::Vector3f (colour).
-template <typename Value>
+/// Radiance along one ray, split into two parts, of which a shadow removes one.
 struct Shade {
-  Value ambient;  ///< All light except for the sun.
-  Value sun;      ///< Light of the sun if it is not hidden.
+  float ambient = 0.0F;  ///< All light except for the sun.
+  float sun = 0.0F;      ///< Light of the sun if it is not hidden.
 };
+using Shades = std::array<Shade, kLanes>;
 
 /// Lanes of `wanted` that the sun does not reach: in shadow, or turned away from it. Precondition:
 /// all lanes of `wanted` have been located.
@@ -51,8 +49,7 @@ struct Shade {
 
 /// Radiance of each wanted lane, haze included; undefined for the other lanes. Precondition: the
 /// lanes of `wanted` that are in hits.surface have been located.
-template <typename Value>
 void shade(const RenderScene& scene, const SurfaceHits& hits, const SurfacePoints& points,
-           LaneMask wanted, std::array<Shade<Value>, kLanes>& shades);
+           LaneMask wanted, Shades& shades);
 
 }  // namespace km

@@ -32,12 +32,10 @@ void require_indices(const World& world, const SurfaceMesh& mesh) {
 ShadingMaterial shading_material(const World& world, const Material& material) {
   ShadingMaterial result;
   const auto layer = [&world](std::uint16_t texture, float period_m) {
-    const Texture& tile = world.textures[texture];
-    return TextureLayer{&tile, tile.gray_texels(), 1.0F / period_m};
+    return TextureLayer{world.textures[texture].gray_texels(), 1.0F / period_m};
   };
   result.base = layer(material.base, material.base_period_m);
   result.detail = layer(material.detail, material.detail_period_m);
-  result.tint = material.tint;
   result.tint_luminance = luminance_of(material.tint);
   result.specular = material.specular;
   result.glow = material.glow;
@@ -45,7 +43,7 @@ ShadingMaterial shading_material(const World& world, const Material& material) {
   if (material.label == SurfaceClass::kTent) result.transmission = 0.15F;
   if (material.label == SurfaceClass::kCurtain) result.transmission = 0.3F;
   result.mean_luminance =
-      luminance_of(material.tint.cwiseProduct(result.base.texture->color({0.5F, 0.5F}, 1.0F)));
+      luminance_of(material.tint.cwiseProduct(world.textures[material.base].mean_color()));
   result.label = static_cast<LabelId>(material.label);
   result.foliage = material.label == SurfaceClass::kVegetation;
   return result;
@@ -215,7 +213,7 @@ TextureLanes textures_of(const SurfacePoints& points, TextureLayer ShadingMateri
   return textures;
 }
 
-// As in Texture: between two levels the blend is linear in the footprint.
+// Between two levels the blend is linear in the footprint.
 void blend_levels(const TextureLanes& textures, const Taps& taps, LevelBlend& blend) {
   for (std::size_t i = 0; i < kLanes; ++i) {
     const auto size = std::bit_cast<float>((127 + textures.log_size[i]) << 23);
@@ -362,5 +360,37 @@ Lanes gray_albedo(const SurfacePoints& points, const Taps& taps) {
   });
   return albedo;
 }
+
+namespace {
+
+// Moves the vertices of each object once, with all triangles that use them.
+SurfaceMesh moved(const World& shapes, std::span<const SE3> poses) {
+  if (poses.size() != shapes.objects.size())
+    throw std::invalid_argument("moved surfaces: " + std::to_string(poses.size()) + " poses for " +
+                                std::to_string(shapes.objects.size()) + " objects");
+  SurfaceMesh mesh = shapes.mesh;
+  std::vector<bool> is_moved(mesh.vertices.size(), false);
+  std::size_t triangles = 0;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const WorldObject& object = shapes.objects[i];
+    const Eigen::Isometry3f T(poses[i].matrix().cast<float>());
+    for (std::size_t t = object.first_triangle; t < object.end_triangle; ++t, ++triangles) {
+      for (const std::uint32_t v : mesh.triangles.at(t)) {
+        if (is_moved.at(v)) continue;
+        is_moved[v] = true;
+        mesh.vertices[v] = T * mesh.vertices[v];
+        mesh.normals[v] = T.linear() * mesh.normals[v];
+      }
+    }
+  }
+  if (triangles != mesh.triangles.size())
+    throw std::invalid_argument("moved surfaces: triangles without an object");
+  return mesh;
+}
+
+}  // namespace
+
+MovedSurfaces::MovedSurfaces(const World& shapes, std::span<const SE3> poses)
+    : mesh_(moved(shapes, poses)), surfaces_(shapes, mesh_), tracer_(mesh_) {}
 
 }  // namespace km

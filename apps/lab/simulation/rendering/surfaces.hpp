@@ -2,11 +2,14 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "apps/lab/simulation/rendering/ray_tracer.hpp"
 #include "apps/lab/simulation/world/world.hpp"
+#include "modules/core/geometry.hpp"
 
 namespace km {
 
@@ -28,7 +31,6 @@ struct alignas(64) SurfaceRecord {
 };
 
 struct TextureLayer {
-  const Texture* texture = nullptr;
   Texture::GrayTexels gray;
   float per_m = 1.0F;  ///< Tiles per metre.
 };
@@ -37,7 +39,6 @@ struct TextureLayer {
 struct ShadingMaterial {
   TextureLayer base;
   TextureLayer detail;
-  Eigen::Vector3f tint = Eigen::Vector3f::Ones();
   float tint_luminance = 1.0F;
   float specular = 0.0F;
   float glow = 0.0F;
@@ -139,5 +140,24 @@ struct Taps {
 
 /// Luminance of the albedo of each lane's material: tint * base * detail.
 [[nodiscard]] Lanes gray_albedo(const SurfacePoints& points, const Taps& taps);
+
+/// Surfaces of things that move, where they are at one instant. Immutable.
+class MovedSurfaces {
+ public:
+  /// `shapes`: a world whose objects are the things, each in its own frame. `poses[i]` is the pose
+  /// of shapes.objects[i]. `shapes` must outlive this. Throws std::invalid_argument unless there is
+  /// one pose for each object, and an object has all triangles.
+  MovedSurfaces(const World& shapes, std::span<const SE3> poses);
+  MovedSurfaces(const MovedSurfaces&) = delete;
+  MovedSurfaces& operator=(const MovedSurfaces&) = delete;
+
+  [[nodiscard]] const SurfaceTable& surfaces() const { return surfaces_; }
+  [[nodiscard]] const RayTracer& tracer() const { return tracer_; }
+
+ private:
+  SurfaceMesh mesh_;
+  SurfaceTable surfaces_;
+  RayTracer tracer_;
+};
 
 }  // namespace km

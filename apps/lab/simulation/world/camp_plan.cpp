@@ -6,8 +6,8 @@
 #include <numbers>
 
 #include "apps/lab/simulation/world/canvas.hpp"
-#include "apps/lab/simulation/world/routes.hpp"
 #include "apps/lab/simulation/world/seeded_random.hpp"
+#include "apps/lab/simulation/world/world.hpp"
 
 namespace km {
 namespace {

@@ -5,7 +5,6 @@
 
 #include "apps/lab/simulation/world/buildings.hpp"
 #include "apps/lab/simulation/world/objects.hpp"
-#include "apps/lab/simulation/world/places.hpp"
 #include "apps/lab/simulation/world/scene.hpp"
 #include "apps/lab/simulation/world/streets.hpp"
 #include "apps/lab/simulation/world/world.hpp"
@@ -112,9 +111,9 @@ constexpr int kParkColumn = 1;
 constexpr int kParkRow = 1;
 
 /// Widths of lots that fill `length`, 9 to 14 m each, or all equal.
-std::vector<float> lots(float length, bool alike, SeededRandom& random) {
+std::vector<float> lots(float length, bool equal, SeededRandom& random) {
   std::vector<float> widths;
-  if (alike) {
+  if (equal) {
     const int count = std::max(1, static_cast<int>(length / 9.0F));
     widths.assign(static_cast<std::size_t>(count), length / static_cast<float>(count));
     return widths;
@@ -206,7 +205,7 @@ void add_skyline(Scene& scene, const CityPlan& plan, std::uint64_t seed) {
   }
 }
 
-void add_blocks(Scene& scene, const CityPlan& plan, std::uint64_t seed, bool alike) {
+void add_blocks(Scene& scene, const CityPlan& plan, std::uint64_t seed) {
   SeededRandom random = SeededRandom::stream(seed, 23);
   const std::uint64_t terrace_seed = seed * 7 + 3;  // one terrace of equal houses for three streets
   for (int column = 0; column < CityPlan::kBlocks; ++column) {
@@ -219,20 +218,18 @@ void add_blocks(Scene& scene, const CityPlan& plan, std::uint64_t seed, bool ali
       const auto sides = CityPlan::sides(kerb);
       const auto block_seed =
           seed * 100 + static_cast<std::uint64_t>(CityPlan::kBlocks * column + row);
-      const bool terrace_south = alike || (column != 1 && row == 1);
-      const bool terrace_north = alike || (column == 2 && row == 0);
+      const bool terrace_south = column != 1 && row == 1;
+      const bool terrace_north = column == 2 && row == 0;
       add_row(scene, sides[0], true, terrace_south, terrace_south ? terrace_seed : block_seed * 4);
       add_row(scene, sides[2], true, terrace_north,
               terrace_north ? terrace_seed : block_seed * 4 + 2);
       for (const std::size_t side : {1U, 3U})
-        add_short_side(scene, sides[side], !alike && random.chance(0.5),
-                       alike ? terrace_seed : block_seed * 4 + side);
+        add_short_side(scene, sides[side], random.chance(0.5), block_seed * 4 + side);
     }
   }
   std::uint64_t side_seed = seed * 1000 + 900;
-  for (const StreetSide& side : plan.outer_sides())
-    add_row(scene, side, false, alike, alike ? terrace_seed : ++side_seed);
-  if (!alike) add_skyline(scene, plan, seed);
+  for (const StreetSide& side : plan.outer_sides()) add_row(scene, side, false, false, ++side_seed);
+  add_skyline(scene, plan, seed);
 }
 
 constexpr float kParking_m = -kSidewalk_m - 1.05F;  // middle of the parking lane, y of a side
@@ -348,21 +345,20 @@ Lighting daylight(std::uint64_t seed) {
   return lighting;
 }
 
-World city_of(std::uint64_t seed, bool alike) {
+}  // namespace
+
+World make_city(std::uint64_t seed) {
   const CityPlan plan = make_city_plan(seed);
   Scene scene(seed);
   SeededRandom random = SeededRandom::stream(seed, 31);
   add_streets(scene, plan, random);
-  add_blocks(scene, plan, seed, alike);
-  const auto furnish = [&](const StreetSide& side) {
-    if (alike) random = SeededRandom::stream(seed, 32);  // the same draws for every side
-    add_sidewalk_objects(scene, side, random);
-  };
+  add_blocks(scene, plan, seed);
   for (int column = 0; column < CityPlan::kBlocks; ++column) {
     for (int row = 0; row < CityPlan::kBlocks; ++row)
-      for (const StreetSide& side : CityPlan::sides(plan.block(column, row))) furnish(side);
+      for (const StreetSide& side : CityPlan::sides(plan.block(column, row)))
+        add_sidewalk_objects(scene, side, random);
   }
-  for (const StreetSide& side : plan.outer_pieces()) furnish(side);
+  for (const StreetSide& side : plan.outer_pieces()) add_sidewalk_objects(scene, side, random);
 
   World world;
   world.name = "city";
@@ -372,16 +368,6 @@ World city_of(std::uint64_t seed, bool alike) {
   world.ground_height = [plan](double x, double y) { return plan.ground(x, y); };
   world.routes = city_routes(plan);
   return world;
-}
-
-}  // namespace
-
-World make_city(std::uint64_t seed) {
-  return city_of(seed, false);
-}
-
-World make_uniform_city(std::uint64_t seed) {
-  return city_of(seed, true);
 }
 
 }  // namespace km

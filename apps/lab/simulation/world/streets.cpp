@@ -8,9 +8,9 @@
 #include <span>
 #include <vector>
 
-#include "apps/lab/simulation/world/routes.hpp"
 #include "apps/lab/simulation/world/scene.hpp"
 #include "apps/lab/simulation/world/seeded_random.hpp"
+#include "apps/lab/simulation/world/world.hpp"
 
 namespace km {
 namespace {

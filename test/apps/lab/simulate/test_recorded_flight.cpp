@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <string>
 
-#include "apps/lab/simulate/recorded_flight.hpp"
+#include "apps/lab/simulate/robot_scenario.hpp"
 #include "modules/core/lie.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/temporary_folder.hpp"
@@ -75,14 +75,6 @@ TEST_CASE("True poses may be TUM text", "[simulate]") {
   CHECK(flight.truth[1].velocity_world.isZero());
 }
 
-TEST_CASE("Files with other contents have other fingerprints", "[simulate]") {
-  const TemporaryFolder folder;
-  const auto truth = folder.write("t.csv", kEuroc);
-  const auto a = read_recorded_flight(truth, folder.write("i.csv", kImu)).fingerprint;
-  const auto b = read_recorded_flight(truth, folder.write("i.csv", kImu + "2900,1,1,1,1,1,1\n"));
-  CHECK(a != b.fingerprint);
-}
-
 TEST_CASE("Recordings that cannot be used are refused by file and line", "[simulate]") {
   CHECK_THAT(refusal_of_flight(kEuroc + "3000,1,2,x,1,0,0,0\n", kImu),
              Catch::Contains("truth.csv line 5: 'x' is not a number"));
@@ -94,54 +86,6 @@ TEST_CASE("Recordings that cannot be used are refused by file and line", "[simul
   CHECK_THAT(refusal_of_flight("", kImu), Catch::Contains("truth.csv: holds no data"));
   CHECK_THAT(refusal_of_flight(kEuroc, "9000,1,2,3,4,5,6\n9900,1,2,3,4,5,7\n"),
              Catch::Contains("do not overlap in time"));
-}
-
-TEST_CASE("A damaged gzip file is named", "[simulate]") {
-  const TemporaryFolder folder;
-  const auto truth = write_gzip(folder, "t.csv.gz", kEuroc);
-  fs::resize_file(truth, fs::file_size(truth) - 12);
-  CHECK_THROWS_WITH(read_recorded_flight(truth, folder.write("i.csv", kImu)),
-                    Catch::Contains("t.csv.gz: damaged"));
-}
-
-TEST_CASE("A published flight is read whole", "[simulate]") {
-  const auto truth = shared_data("euroc/groundtruth_only/V1_02_medium.csv.gz");
-  const auto imu = shared_data("euroc/imu_only/V1_02_medium.imu.csv.gz");
-  if (!truth || !imu) return;
-  const RecordedFlight flight = read_recorded_flight(*truth, *imu);
-  CHECK(flight.imu.size() == 17100);  // as its description says
-  CHECK(flight.truth.front().stamp == 1403715524907143168);
-}
-
-TEST_CASE(
-    "Motion capture is steadied by the gyroscope, less so poses that were fused with its samples",
-    "[simulate]") {
-  struct Row {
-    const char *truth, *imu;
-    double least_mrad, most_mrad;
-  };
-  const auto [truth_name, imu_name, least_mrad, most_mrad] =
-      GENERATE(Row{"tumvi_rooms/groundtruth/dataset-room1_512_16.txt.gz",
-                   "tumvi_rooms/imu/room1.txt.gz", 5.0, 8.0},
-               Row{"euroc/groundtruth_only/V1_02_medium.csv.gz",
-                   "euroc/imu_only/V1_02_medium.imu.csv.gz", 0.0, 3.0});
-  const auto truth = shared_data(truth_name);
-  const auto imu = shared_data(imu_name);
-  if (!truth || !imu) return;
-  const RecordedFlight as_is = read_recorded_flight(*truth, *imu);
-  const RecordedFlight steadied = read_recorded_flight(*truth, *imu, true);
-  CHECK_THAT(steadied.fingerprint, Catch::Contains("rotations steadied by the gyroscope"));
-  REQUIRE(steadied.truth.size() == as_is.truth.size());
-  double squares = 0.0;
-  for (std::size_t k = 0; k < as_is.truth.size(); ++k) {
-    const SE3 &a = as_is.truth[k].T_world_body, &b = steadied.truth[k].T_world_body;
-    REQUIRE(a.translation() == b.translation());
-    squares += std::pow(angle_of(a.linear().transpose() * b.linear()), 2);
-  }
-  const double rms_mrad = 1e3 * std::sqrt(squares / static_cast<double>(as_is.truth.size()));
-  CAPTURE(truth_name, rms_mrad);
-  CHECK(rms_mrad >= least_mrad);
-  CHECK(rms_mrad <= most_mrad);
 }
 
 }  // namespace km

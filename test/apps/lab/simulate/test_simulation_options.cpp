@@ -1,8 +1,11 @@
-#include <algorithm>
 #include <catch2/catch.hpp>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
 #include <string>
 #include <vector>
 
+#include "apps/lab/simulate/effects.hpp"
 #include "apps/lab/simulate/simulation_options.hpp"
 #include "test/support/temporary_folder.hpp"
 
@@ -13,7 +16,7 @@ SimulationOptions parse(std::vector<std::string> arguments) {
   CLI::App app;
   SimulationOptions options;
   define(app, options);
-  std::ranges::reverse(arguments);  // CLI11 takes them from the end
+  std::ranges::reverse(arguments);  // as CLI11 expects words
   app.parse(std::move(arguments));
   return completed(options);
 }
@@ -29,18 +32,6 @@ std::string refusal_of_options(const std::vector<std::string>& arguments) {
   return {};
 }
 
-}  // namespace
-
-TEST_CASE("A short command has sensible defaults", "[simulate]") {
-  const auto options = parse({"--world", "vicon_room", "--output", "x"});
-  CHECK(options.world == WorldKind::kViconRoom);
-  CHECK(options.names == std::vector<std::string>{"robot0", "robot1", "robot2"});
-  CHECK(options.width == 752);
-  CHECK(options.height == 480);
-  CHECK_FALSE(options.depth);
-  CHECK(options.threads >= 1);
-}
-
 TEST_CASE("An RGB-D rig has depth at the images' rate", "[simulate]") {
   const auto options = parse({"--world", "camp", "--rig", "rgbd", "--rate", "15", "--resolution",
                               "376x240", "--output", "x"});
@@ -52,24 +43,25 @@ TEST_CASE("An RGB-D rig has depth at the images' rate", "[simulate]") {
 }
 
 TEST_CASE("Bad arguments are refused with their name and value", "[simulate]") {
-  CHECK_THAT(refusal_of_options({"--resolution", "752"}),
-             Catch::Contains("752 is not WIDTHxHEIGHT"));
-  CHECK_THAT(refusal_of_options({"--resolution", "8x8"}), Catch::Contains("from 16 to 8192"));
-  CHECK_THAT(refusal_of_options({"--resolution", "752x480x3"}),
-             Catch::Contains("command line: resolution = "));
-  CHECK_THAT(refusal_of_options({"--robots", "0"}), Catch::Contains("command line: robots = "));
-  CHECK_THAT(refusal_of_options({"--rate", "nan"}), Catch::Contains("command line: rate = "));
-  CHECK_THAT(refusal_of_options({"--duration", "-5"}),
-             Catch::Contains("command line: duration = "));
-  CHECK_THAT(refusal_of_options({"--rig", "mono"}),
-             Catch::Contains("mono") && Catch::Contains("rgbd"));
-  CHECK_THAT(refusal_of_options({"--seed", "-1"}), Catch::Contains("command line: seed = "));
-  CHECK_THAT(refusal_of_options({"--image-format", "bmp"}), Catch::Contains("bmp"));
-  CHECK_THAT(refusal_of_options({"--depth", "--depth-rate", "7"}),
-             Catch::Contains("--rate 20 is not a multiple of --depth-rate 7"));
-  CHECK_THAT(refusal_of_options({"--ideal-depth"}), Catch::Contains("--ideal-depth need --depth"));
-  CHECK_THAT(refusal_of_options({"--start", "3"}), Catch::Contains("need --trajectory"));
-  CHECK_THAT(refusal_of_options({"--trajectory", "/nowhere.csv"}), Catch::Contains("/nowhere.csv"));
+  struct Row {
+    std::vector<std::string> words;
+    const char* message;
+  };
+  const Row row = GENERATE(
+      Row{{"--resolution", "752"}, "752 is not WIDTHxHEIGHT"},
+      Row{{"--resolution", "8x8"}, "from 16 to 8192"}, Row{{"--robots", "0"}, "robots = "},
+      Row{{"--rate", "nan"}, "rate = "}, Row{{"--duration", "-5"}, "duration = "},
+      Row{{"--rig", "mono"}, "rgbd"}, Row{{"--seed", "-1"}, "seed = "},
+      Row{{"--depth", "--depth-rate", "7"}, "--rate 20 is not a multiple of --depth-rate 7"},
+      Row{{"--depth-rate", "5"}, "--depth-rate and --ideal-depth need --depth"},
+      Row{{"--end", "3"}, "need --trajectory"},
+      Row{{"--set", "timing.drift=7"}, "unknown key timing.drift"},
+      Row{{"--set", "sensor.dirt=7"}, "sensor.dirt = 7 is outside 0 .. 1"},
+      Row{{"--set", "dirt=1"}, "not of the form section.key=value"},
+      Row{{"--difficulty", "4"}, "difficulty = 4"},
+      Row{{"--trajectory", "/nowhere.csv"}, "/nowhere.csv"});
+  CAPTURE(row.words);
+  CHECK_THAT(refusal_of_options(row.words), Catch::Contains(row.message));
 }
 
 TEST_CASE("Recorded motion needs a pair of files for each robot", "[simulate]") {
@@ -85,57 +77,10 @@ TEST_CASE("Recorded motion needs a pair of files for each robot", "[simulate]") 
              Catch::Contains("one name per --trajectory"));
   CHECK_THAT(refusal_of_options({"--trajectory", a, "--imu", a, "--names", "../a"}),
              Catch::Contains("'../a'"));
-  CHECK_THAT(refusal_of_options({"--trajectory", a, "--imu", a, "--start", "9", "--end", "8"}),
-             Catch::Contains("--end is not after --start"));
   const auto options =
       parse({"--world", "vicon_room", "--output", "x", "--trajectory", a, b, "--imu", a, b});
   CHECK(options.names == std::vector<std::string>{"V1_02_medium", "V1_03"});
   CHECK(options.robots == 2);
-}
-
-TEST_CASE("Recorded motion may come from another rig", "[simulate]") {
-  const TemporaryFolder folder;
-  const std::string flight = folder.write("room1.csv", "").string();
-  std::string camera =
-      "  camera_model: pinhole\n  distortion_model: equidistant\n"
-      "  distortion_coeffs: [0.003, 0.0007, -0.002, 0.0002]\n"
-      "  intrinsics: [190.9, 190.9, 254.9, 256.9]\n  resolution: [512, 510]\n";
-  const std::string chain =
-      folder
-          .write("camchain.yaml",
-                 "cam0:\n  T_cam_imu: [[1,0,0,0], [0,1,0,0], [0,0,1,0], [0,0,0,1]]\n" + camera +
-                     "cam1:\n  T_cam_imu: [[1,0,0,-0.1], [0,1,0,0], [0,0,1,0], [0,0,0,1]]\n" +
-                     camera)
-          .string();
-  const std::vector<std::string> recorded = {"--world",      "vicon_room", "--output", "x",
-                                             "--trajectory", flight,       "--imu",    flight};
-  CHECK_FALSE(parse(recorded).rig.has_value());
-  std::vector<std::string> words = recorded;
-  words.insert(words.end(), {"--calibration", chain});
-  const auto options = parse(words);
-  REQUIRE(options.rig.has_value());
-  CHECK(options.rig->stereo.cameras[0].lens.model() == LensModel::kEquidistant);
-  CHECK(options.width == 512);
-  CHECK(options.height == 510);
-  CHECK_THAT(command_line(options), Catch::Contains(" --calibration camchain.yaml"));
-  CHECK_THAT(refusal_of_options({"--calibration", chain}),
-             Catch::Contains("--calibration, --names"));
-  words.back() = flight;
-  CHECK_THROWS_WITH(parse(words), Catch::Contains("room1.csv"));
-}
-
-TEST_CASE("Options may come from a file, and the command line has the last word", "[simulate]") {
-  const TemporaryFolder folder;
-  const std::string file =
-      folder
-          .write("a.yaml",
-                 "world: camp  # tents\nlabels: true\nresolution: 64x48\nduration: 12.5\n")
-          .string();
-  const auto options = parse({"--config", file, "--duration", "7", "--output", "x"});
-  CHECK(options.world == WorldKind::kCamp);
-  CHECK(options.labels);
-  CHECK(options.width == 64);
-  CHECK(options.duration_s == 7.0);
 }
 
 TEST_CASE("All errors of a file of options are reported by line", "[simulate]") {
@@ -161,22 +106,37 @@ TEST_CASE("The files of options that come with the program can be used", "[simul
   CHECK(options.robots == 3);
 }
 
-TEST_CASE("Threads and the place of the output are no parameters of the bytes", "[simulate]") {
-  const auto a = parse({"--world", "city", "--output", "a", "--threads", "1"});
-  const auto b = parse({"--world", "city", "--output", "b", "--threads", "7"});
-  CHECK(parameters(a) == parameters(b));
-  CHECK(command_line(a) == command_line(b));
-  CHECK(parameters(a) != parameters(parse({"--world", "city", "--output", "a", "--seed", "2"})));
-  CHECK(parameters(a) != parameters(parse({"--world", "city", "--output", "a", "--labels"})));
+TEST_CASE("Each level is harder than the one before, and level 0 has no effects", "[simulate]") {
+  const Effects none = load_effects(0, {});
+  CHECK(none.inertial.gyro_scale == 0.0);
+  CHECK(none.timing.dropped_share == 0.0);
+  CHECK(none.traffic.cars == 0);
+  CHECK_FALSE(parse({"--world", "city", "--output", "x"}).is_disturbed());
+  for (int level = 1; level <= kHardestLevel; ++level) {
+    CAPTURE(level);
+    const Effects before = load_effects(level - 1, {}), here = load_effects(level, {});
+    CHECK(here.sensor.rolling_shutter_s > before.sensor.rolling_shutter_s);
+    CHECK(here.sensor.dirt > before.sensor.dirt);
+    CHECK(here.inertial.gyro_scale > before.inertial.gyro_scale);
+    CHECK(here.calibration_error.focal_share > before.calibration_error.focal_share);
+    CHECK(here.timing.dropped_share > before.timing.dropped_share);
+    CHECK(here.traffic.people > before.traffic.people);
+  }
 }
 
-TEST_CASE("The command in the README makes the same recordings", "[simulate]") {
-  const auto options = parse({"--world", "city", "--output", "DIR", "--rig", "rgbd", "--labels",
-                              "--duration", "12.5", "--image-format", "png", "--depth-rate", "5"});
-  std::istringstream command(command_line(options));
-  std::vector<std::string> words(std::istream_iterator<std::string>(command), {});
-  words.erase(words.begin());
-  CHECK(parameters(parse(words)) == parameters(options));
+TEST_CASE("A single key has priority over the level", "[simulate]") {
+  const TemporaryFolder folder;
+  const std::string file =
+      folder.write("a.yaml", "difficulty: 2\nset: [sensor.dirt=0.7]\n").string();
+  CHECK(parse({"--config", file, "--world", "city", "--output", "x"}).effects.sensor.dirt == 0.7);
+  const auto options = parse({"--config", file, "--set", "sensor.glare=0", "timing.drift_ppm=7",
+                              "--robots", "2", "--world", "camp", "--output", "x"});
+  CHECK(options.effects.sensor.glare == 0.0);
+  CHECK(options.effects.timing.drift_ppm == 7.0);
+  CHECK(options.effects.sensor.rolling_shutter_s == 0.015);
+  CHECK(options.robots == 2);
+  CHECK(options.is_disturbed());
 }
 
+}  // namespace
 }  // namespace km

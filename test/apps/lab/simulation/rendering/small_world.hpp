@@ -55,6 +55,12 @@ class Builder {
   World world_;
 };
 
+/// One view of a world.
+inline RenderedView view_of(const World& world, const Camera& camera, const SE3& T_world_body,
+                            const RenderRequest& request = {}) {
+  return Renderer(world).render(PixelRays(camera), T_world_body, request);
+}
+
 /// Radiance of a pixel.
 inline float at(const RenderedView& view, int x, int y) {
   return view.radiance[static_cast<std::size_t>(y) * static_cast<std::size_t>(view.width) +

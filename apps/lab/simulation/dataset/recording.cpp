@@ -1,17 +1,157 @@
-#include "apps/lab/simulation/dataset/recording_texts.hpp"
+#include "apps/lab/simulation/dataset/recording.hpp"
 
+#include <fcntl.h>
+#include <unistd.h>
+#include <algorithm>
 #include <array>
 #include <bit>
+#include <cerrno>
+#include <cstring>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <span>
 #include <sstream>
+#include <stdexcept>
+#include <string>
 #include <vector>
 
-#include "apps/lab/simulation/dataset/number_text.hpp"
 #include "modules/core/json.hpp"
+#include "modules/images/image_codec.hpp"
+#include "modules/images/image_view.hpp"
 
 namespace km {
+namespace {
+
+constexpr int kJpegQuality = 92;
+
+void require_size(int width, int height, std::size_t pixels) {
+  if (width <= 0 || height <= 0 ||
+      pixels != static_cast<std::size_t>(width) * static_cast<std::size_t>(height))
+    throw std::invalid_argument("an image of " + std::to_string(width) + 'x' +
+                                std::to_string(height) + " has not " + std::to_string(pixels) +
+                                " pixels");
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> encode_gray(const GrayImage& image) {
+  require_size(image.width, image.height, image.pixels.size());
+  return encode_jpeg(view(image), kJpegQuality);
+}
+
+std::vector<std::uint8_t> encode_depth(int width, int height,
+                                       const std::vector<std::uint16_t>& depth_mm) {
+  require_size(width, height, depth_mm.size());
+  return encode_png(view(width, height, CV_16UC1, depth_mm));
+}
+
+std::vector<std::uint8_t> encode_labels(int width, int height, const std::vector<LabelId>& labels) {
+  require_size(width, height, labels.size());
+  return encode_png(view(width, height, CV_8UC1, labels));
+}
+
+namespace {
+
+const char* folder_name(ImageChannel channel) {
+  switch (channel) {
+    case ImageChannel::kLeft:
+      return "cam0";
+    case ImageChannel::kRight:
+      return "cam1";
+    case ImageChannel::kDepth:
+      return "depth0";
+    case ImageChannel::kLabels:
+      break;
+  }
+  return "label0";
+}
+
+namespace fs = std::filesystem;
+
+[[noreturn]] void fail(const fs::path& file, int error) {
+  const char* const help = error == ENOSPC || error == EDQUOT
+                               ? "; make room and run the same command again to continue"
+                               : "";
+  throw RecordingError(file.string() + ": cannot be written: " + std::strerror(error) + help);
+}
+
+// Returns 0, or the errno of the failure.
+int write_all(int descriptor, std::span<const std::uint8_t> bytes) {
+  while (!bytes.empty()) {
+    const ssize_t written = ::write(descriptor, bytes.data(), bytes.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) return errno;
+    bytes = bytes.subspan(static_cast<std::size_t>(written));
+  }
+  return 0;
+}
+
+}  // namespace
+
+std::filesystem::path RecordingLayout::folder(ImageChannel channel) const {
+  return mav0_ / folder_name(channel);
+}
+
+std::filesystem::path RecordingLayout::image(ImageChannel channel, Stamp stamp) const {
+  return folder(channel) / "data" / (std::to_string(stamp) + image_extension(channel));
+}
+
+std::filesystem::path RecordingLayout::list(ImageChannel channel) const {
+  return folder(channel) / "data.csv";
+}
+
+std::filesystem::path RecordingLayout::calibration(ImageChannel channel) const {
+  return folder(channel) / "sensor.yaml";
+}
+
+std::filesystem::path RecordingLayout::truth() const {
+  return mav0_ / "state_groundtruth_estimate0" / "data.csv";
+}
+
+const char* RecordingLayout::image_extension(ImageChannel channel) {
+  const bool lossless = channel == ImageChannel::kDepth || channel == ImageChannel::kLabels;
+  return lossless ? ".png" : ".jpg";
+}
+
+void write_whole_file(const fs::path& file, std::span<const std::uint8_t> bytes) {
+  fs::path part = file;
+  part += ".part";
+  int descriptor = ::open(part.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+  if (descriptor < 0 && errno == ENOENT) {
+    std::error_code error;
+    fs::create_directories(file.parent_path(), error);
+    if (error) fail(file.parent_path(), error.value());
+    descriptor = ::open(part.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+  }
+  if (descriptor < 0) fail(file, errno);
+  int error = write_all(descriptor, bytes);
+  if (::close(descriptor) != 0 && error == 0) error = errno;  // network disks report errors here
+  if (error == 0 && ::rename(part.c_str(), file.c_str()) != 0) error = errno;
+  if (error == 0) return;
+  ::unlink(part.c_str());
+  fail(file, error);
+}
+
+void write_whole_file(const fs::path& file, std::string_view text) {
+  write_whole_file(file,
+                   std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size()));
+}
+
+bool is_whole_image(const fs::path& file) {
+  constexpr std::array<std::uint8_t, 8> kPngEnd = {'I', 'E', 'N', 'D', 0xAE, 0x42, 0x60, 0x82};
+  constexpr std::array<std::uint8_t, 2> kJpegEnd = {0xFF, 0xD9};
+  const int descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
+  if (descriptor < 0) return false;
+  std::array<std::uint8_t, 8> tail{};
+  const off_t size = ::lseek(descriptor, 0, SEEK_END);
+  const bool read = size > 8 && ::pread(descriptor, tail.data(), tail.size(), size - 8) == 8;
+  ::close(descriptor);
+  if (!read) return false;
+  return file.extension() == ".png"
+             ? tail == kPngEnd
+             : std::equal(kJpegEnd.begin(), kJpegEnd.end(), tail.end() - kJpegEnd.size());
+}
+
 namespace {
 
 void append(std::string& text, const Eigen::Vector3d& values) {
@@ -42,52 +182,13 @@ std::string list_text(std::span<const double> values) {
   return text + ']';
 }
 
-// Kalibr's description of a lens: camera_model with the parameters before fu in its intrinsics, and
-// distortion_model with its coefficients.
-struct LensTexts {
-  const char* camera_model = "pinhole";
-  std::span<const double> first = {};
-  const char* first_names = "";
-  const char* distortion_model = "radial-tangential";
-  std::span<const double> coefficients = {};
-  const char* names = "k1, k2, p1, p2";
-};
-
-LensTexts texts_of(const Lens& lens) {
-  const std::span<const double> k = lens.coefficients();
-  switch (lens.model()) {
-    case LensModel::kRadialTangential:
-      return {.coefficients = k,
-              .names = k.size() == 4 ? "k1, k2, p1, p2" : "k1, k2, p1, p2, k3, ..."};
-    case LensModel::kEquidistant:
-      return {.distortion_model = "equidistant", .coefficients = k, .names = "k1, k2, k3, k4"};
-    case LensModel::kOmnidirectional:
-      return {.camera_model = "omni",
-              .first = k.first(1),
-              .first_names = "xi, ",
-              .coefficients = k.subspan(1)};
-    case LensModel::kDoubleSphere:
-      return {.camera_model = "ds",
-              .first = k,
-              .first_names = "xi, alpha, ",
-              .distortion_model = "none",
-              .names = "none"};
-  }
-  return {};
-}
-
 std::string optics(const Camera& camera, double rate_hz) {
-  const LensTexts lens = texts_of(camera.lens);
-  const double scale = lens.first.empty() ? 1.0 : 1.0 + lens.first[0];  // see Lens
-  std::vector<double> intrinsics(lens.first.begin(), lens.first.end());
-  intrinsics.insert(intrinsics.end(), {scale * camera.fx, scale * camera.fy, camera.cx, camera.cy});
   std::ostringstream text;
   text << "rate_hz: " << number_text(rate_hz) << "\nresolution: [" << camera.width << ", "
-       << camera.height << "]\ncamera_model: " << lens.camera_model
-       << "\nintrinsics: " << list_text(intrinsics) << "  # " << lens.first_names
-       << "fu, fv, cu, cv [px]\ndistortion_model: " << lens.distortion_model
-       << "\ndistortion_coefficients: " << list_text(lens.coefficients) << "  # " << lens.names
-       << '\n';
+       << camera.height << "]\ncamera_model: pinhole\nintrinsics: "
+       << list_text(std::array{camera.fx, camera.fy, camera.cx, camera.cy})
+       << "  # fu, fv, cu, cv [px]\ndistortion_model: radial-tangential\ndistortion_coefficients: "
+       << list_text(camera.lens.coefficients()) << "  # k1, k2, p1, p2\n";
   return text.str();
 }
 
