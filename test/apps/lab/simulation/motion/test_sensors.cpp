@@ -89,11 +89,11 @@ struct PredictionErrors {
 
 PredictionErrors predict_seconds(const BodyTrajectory& trajectory, double rate_hz) {
   ImuSimulation options;
-  options.noise = {.rate_hz = rate_hz,
-                   .gyro_noise_density = 0.0,
+  options.noise = {.gyro_noise_density = 0.0,
                    .gyro_random_walk = 0.0,
                    .accel_noise_density = 0.0,
-                   .accel_random_walk = 0.0};
+                   .accel_random_walk = 0.0,
+                   .rate_hz = rate_hz};
   options.initial_gyro_bias = options.initial_accel_bias = 0.0;
   const std::vector<ImuSample> samples =
       samples_of(simulate_imu(trajectory, kFlightEpoch, options));
