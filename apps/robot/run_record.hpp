@@ -208,14 +208,11 @@ class RecorderNode final : public Node {
   RecorderNode(RobotId robot, std::function<void(JournalEntry)> publish);
   ~RecorderNode() override { stop(); }
 
-  /// Records everything published on `topic`, for any T that RunRecord takes.
-  template <typename T>
-  void record(Topic<T>& topic) {
-    record(In<T>(topic));
-  }
-  template <typename T>
-  void record(In<T> topic) {
-    topic.subscribe([this](const std::shared_ptr<const T>& message) { add(message); });
+  /// Records everything published on these topics, for any T that RunRecord
+  /// takes.
+  void record(auto&&... topics) {
+    const auto post = [this](const auto& message) { this->add(message); };
+    (topics.subscribe(post), ...);
   }
   template <typename T>
   void add(std::shared_ptr<const T> message) {

@@ -34,7 +34,7 @@ namespace {
 
 constexpr std::string_view kRecordNode = "record";
 constexpr int kMeshPoints = 200000, kMeshFaces = 50000;  // largest mesh for viewers
-constexpr double kMeshBytesPerS = 2e6;  // average rate of its faces
+constexpr double kMeshBytesPerS = 2e6;                   // average rate of its faces
 
 template <typename T>
 void forward(In<T> from, Out<T> to) {
@@ -407,27 +407,12 @@ void Robot::add_records() {
   recorder_ = &add<RecorderNode>(false, identity_.robot,
                                  [this](const JournalEntry& event) { publish(event); });
   if (has_solution()) recorder_->add(std::make_shared<const TeamSolution>(restored_->solution));
-  recorder_->record(topics_.restored_inlier_sets);
-  recorder_->record(topics_.restored_odometry);
-  recorder_->record(topics_.odometry);
-  recorder_->record(topics_.keyframe_odometry);
-  recorder_->record(topics_.odometry_statistics);
-  recorder_->record(topics_.keyframes);
-  recorder_->record(topics_.replies.received);
-  recorder_->record(topics_.closure_restarts);
-  recorder_->record(topics_.closures);
-  recorder_->record(topics_.outcomes);
-  recorder_->record(topics_.restored_outcomes);
-  recorder_->record(topics_.place_queries);
-  recorder_->record(topics_.own_inlier_sets);
-  recorder_->record(topics_.shared_inlier_sets.received);
-  recorder_->record(topics_.trajectory);
-  recorder_->record(topics_.progress);
-  recorder_->record(topics_.closure_verdicts);
-  recorder_->record(topics_.dense_sensing_progress);
-  recorder_->record(topics_.mapping_progress);
-  recorder_->record(topics_.maps);
-  recorder_->record(topics_.optimized_meshes);
+  Topics& t = topics_;
+  recorder_->record(t.restored_inlier_sets, t.restored_odometry, t.odometry, t.keyframe_odometry,
+                    t.odometry_statistics, t.keyframes, t.replies.received, t.closure_restarts,
+                    t.closures, t.outcomes, t.restored_outcomes, t.place_queries, t.own_inlier_sets,
+                    t.shared_inlier_sets.received, t.trajectory, t.progress, t.closure_verdicts,
+                    t.dense_sensing_progress, t.mapping_progress, t.maps, t.optimized_meshes);
   topics_.packets.subscribe(
       [this](const auto& packet) { input_time_.reach(packet->frame->stamp); });
   topics_.progress.subscribe([this](const auto& progress) {
