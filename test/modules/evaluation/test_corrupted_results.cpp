@@ -4,7 +4,6 @@
 
 #include "modules/core/input_file.hpp"
 #include "modules/core/json.hpp"
-#include "modules/core/label_palette.hpp"
 #include "modules/evaluation/closure_truth.hpp"
 #include "modules/evaluation/trajectory_error.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
@@ -81,11 +80,6 @@ TEST_CASE("Corrupted tables of a run are refused with file and line", "[evaluati
           const Json json = read_json(folder.write("summary.json", text));
           (void)number_at(json, "/pgo/cost");
         });
-  }
-  SECTION("label_palette.csv") {
-    check_corrupted<std::invalid_argument>(
-        "name,red,green,blue,alpha,id\nfloor,10,20,30,255,1\nwall,11,20,30,255,2\n", "palette",
-        [](const std::string& text) { (void)parse_label_palette(text, "palette"); });
   }
 }
 
