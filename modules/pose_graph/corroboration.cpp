@@ -11,7 +11,7 @@
 #include "modules/core/lie.hpp"
 #include "modules/pose_graph/closure_places.hpp"
 #include "modules/pose_graph/cycle_mixture.hpp"
-#include "modules/pose_graph/two_closure_cycle.hpp"
+#include "modules/pose_graph/odometry_cycles.hpp"
 
 namespace km {
 namespace {

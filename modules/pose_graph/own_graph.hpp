@@ -9,7 +9,7 @@
 #include "modules/core/pose_graph.hpp"
 #include "modules/core/position_fix.hpp"
 #include "modules/pose_graph/closure_places.hpp"
-#include "modules/pose_graph/odometry_judgement.hpp"
+#include "modules/pose_graph/odometry_noise.hpp"
 #include "modules/pose_graph/pose_edge.hpp"
 #include "modules/pose_graph/team_messages.hpp"
 #include "modules/pose_graph/vertical_prior.hpp"

@@ -5,7 +5,7 @@
 #include <stdexcept>
 
 #include "modules/pose_graph/frame_entry.hpp"
-#include "modules/pose_graph/precision_limits.hpp"
+#include "modules/pose_graph/pair_consensus.hpp"
 #include "modules/pose_graph/status_schedule.hpp"
 
 namespace km {

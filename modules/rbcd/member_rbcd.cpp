@@ -8,7 +8,6 @@
 #include <stdexcept>
 #include <utility>
 
-#include "modules/rbcd/rounding.hpp"
 #include "modules/rbcd/stiefel.hpp"
 #include "modules/rbcd/truncated_newton.hpp"
 

@@ -2,6 +2,7 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "modules/core/lie.hpp"
 #include "modules/rbcd/rank_dispatch.hpp"
 
 namespace km {
@@ -77,6 +78,16 @@ LiftedPoses lift(std::span<const SE3> poses, Eigen::Index rank) {
   for (std::size_t i = 0; i < poses.size(); ++i)
     X.middleCols<4>(4 * static_cast<Eigen::Index>(i)) = lift(L, poses[i]);
   return X;
+}
+
+std::vector<SE3> round_to_poses(const LiftedPoses& X, const Eigen::MatrixXd& anchor) {
+  const Eigen::Matrix<double, 3, Eigen::Dynamic> Yt = anchor.leftCols<3>().transpose();
+  std::vector<SE3> poses;
+  poses.reserve(static_cast<std::size_t>(pose_count(X)));
+  for (Eigen::Index i = 0; i < pose_count(X); ++i)
+    poses.push_back(make_pose(nearest_rotation(Yt * X.middleCols<3>(4 * i)),
+                              Yt * (X.col(4 * i + 3) - anchor.col(3))));
+  return poses;
 }
 
 }  // namespace km

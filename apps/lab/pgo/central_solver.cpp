@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "apps/lab/pgo/team_graph.hpp"
-#include "modules/rbcd/rounding.hpp"
+#include "modules/rbcd/stiefel.hpp"
 
 namespace km {
 namespace {

@@ -7,9 +7,9 @@
 
 #include "apps/lab/pgo/odometry_start.hpp"
 #include "modules/pose_graph/lone_solution.hpp"
-#include "modules/pose_graph/odometry_judgement.hpp"
+#include "modules/pose_graph/odometry_noise.hpp"
+#include "modules/pose_graph/pair_consensus.hpp"
 #include "modules/pose_graph/pose_edge.hpp"
-#include "modules/pose_graph/precision_limits.hpp"
 #include "modules/pose_graph/team_plan.hpp"
 
 namespace km {

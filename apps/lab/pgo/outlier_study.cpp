@@ -18,7 +18,7 @@
 #include "modules/pose_graph/lone_solution.hpp"
 #include "modules/pose_graph/robust_schedule.hpp"
 #include "modules/pose_graph/tree_front.hpp"
-#include "modules/rbcd/rounding.hpp"
+#include "modules/rbcd/stiefel.hpp"
 #include "modules/recorded_graph/recorded_graph.hpp"
 
 namespace km {

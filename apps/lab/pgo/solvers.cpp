@@ -11,8 +11,8 @@
 #include "modules/core/symmetric_eigen.hpp"
 #include "modules/pose_graph/chordal.hpp"
 #include "modules/pose_graph/tree_newton.hpp"
-#include "modules/rbcd/rounding.hpp"
 #include "modules/rbcd/solver_choice.hpp"
+#include "modules/rbcd/stiefel.hpp"
 
 namespace km {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "apps/lab/pgo/solvers.hpp"
 #include "modules/evaluation/trajectory_error.hpp"
-#include "modules/rbcd/rounding.hpp"
+#include "modules/rbcd/stiefel.hpp"
 
 namespace km {
 namespace {

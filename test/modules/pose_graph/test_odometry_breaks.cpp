@@ -2,7 +2,7 @@
 #include <random>
 
 #include "modules/core/lie.hpp"
-#include "modules/pose_graph/odometry_judgement.hpp"
+#include "modules/pose_graph/odometry_noise.hpp"
 #include "test/support/random_pose.hpp"
 
 namespace km {

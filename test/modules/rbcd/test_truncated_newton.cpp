@@ -1,6 +1,6 @@
 #include <catch2/catch.hpp>
 
-#include "modules/rbcd/rounding.hpp"
+#include "modules/rbcd/stiefel.hpp"
 #include "test/support/pose_graph_problems.hpp"
 
 namespace km {

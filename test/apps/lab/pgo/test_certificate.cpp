@@ -5,7 +5,7 @@
 #include "apps/lab/pgo/central_solver.hpp"
 #include "modules/core/lie.hpp"
 #include "modules/core/symmetric_eigen.hpp"
-#include "modules/rbcd/rounding.hpp"
+#include "modules/rbcd/stiefel.hpp"
 #include "test/support/pose_graph_problems.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/team_graphs.hpp"
