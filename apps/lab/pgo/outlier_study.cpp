@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <map>
 #include <stdexcept>
 #include <utility>
 
+#include "apps/lab/pgo/agent_team.hpp"
 #include "apps/lab/pgo/odometry_start.hpp"
 #include "apps/lab/pgo/solvers.hpp"
 #include "apps/lab/pgo/team_graph.hpp"
@@ -14,12 +14,10 @@
 #include "modules/outlier_rejection/chi_squared.hpp"
 #include "modules/outlier_rejection/pcm.hpp"
 #include "modules/pose_graph/chordal.hpp"
-#include "modules/pose_graph/corroboration.hpp"
 #include "modules/pose_graph/lone_solution.hpp"
 #include "modules/pose_graph/robust_schedule.hpp"
 #include "modules/pose_graph/tree_front.hpp"
 #include "modules/rbcd/stiefel.hpp"
-#include "modules/recorded_graph/recorded_graph.hpp"
 
 namespace km {
 namespace {
@@ -75,43 +73,25 @@ PlacedTeam solve_reference(const ScenarioGraph& drawn) {
   return solve_centrally(honest, std::move(kept), drawn.truth);
 }
 
-// An edge in the robots' own numbering of poses.
-RelativePose relative_pose(const TeamGraph& graph, const BlockEdge& e) {
-  return {graph.keyframe_of(e.i), graph.keyframe_of(e.j), e.T_i_j,
-          covariance_in({e.kappa, e.tau}, graph.dimension)};
-}
-
-// The odometry of each robot, by pose of the graph. Throws std::invalid_argument if the odometry of
-// a robot is interrupted.
-std::vector<OdometryPose> odometry_of_team(const TeamGraph& graph,
-                                           const std::vector<bool>& odometry) {
-  std::vector<RecordedGraph> chains(graph.robots());
-  for (std::size_t k = 0; k < odometry.size(); ++k) {
-    const BlockEdge& e = graph.edges[k];
-    if (odometry[k] && graph.robot_of(e.i) == graph.robot_of(e.j))
-      chains[graph.robot_of(e.i)].odometry.push_back(relative_pose(graph, e));
-  }
-  std::vector<OdometryPose> poses;
-  for (std::size_t robot = 0; robot < chains.size(); ++robot) {
-    RecordedGraph& chain = chains[robot];
-    chain.robot = static_cast<RobotId>(robot);
-    std::ranges::sort(chain.odometry, {}, &RelativePose::from);
-    std::size_t chained = 0;
-    while (chained < chain.odometry.size() && chain.odometry[chained].from.index == chained)
-      ++chained;
-    if (chained + 1 < static_cast<std::size_t>(graph.poses_of(robot)))
-      throw std::invalid_argument(
-          "no odometry leads to pose " +
-          to_string(graph.ids[static_cast<std::size_t>(graph.first[robot]) + chained + 1]));
-    std::ranges::move(odometry_poses(chain), std::back_inserter(poses));
-  }
-  return poses;
+PlacedTeam solve_by_robots(const TeamGraph& graph) {
+  AgentTeamRun run = run_agent_team(graph, {});
+  PlacedTeam placed{.T_frame_kf = std::move(run.T_world_kf),
+                    .frame_of = {},
+                    .kept = std::move(run.kept),
+                    .decided = run.settled,
+                    .rounds = run.rounds,
+                    .bytes = run.bytes};
+  for (std::size_t robot = 0; robot < graph.robots(); ++robot)
+    placed.frame_of.insert(placed.frame_of.end(), static_cast<std::size_t>(graph.poses_of(robot)),
+                           run.world_of[robot]);
+  return placed;
 }
 
 PlacedTeam solve_by(const std::string& method, const ScenarioGraph& drawn,
                     const OutlierStudyOptions& options) {
   const TeamGraph& graph = drawn.graph;
   if (method == "reference") return solve_reference(drawn);
+  if (method == "robots") return solve_by_robots(graph);
   if (method == "gnc") return solve_by_gnc(graph);
   std::vector<bool> kept(graph.edges.size(), true);
   if (method.starts_with("pcm")) kept = pairwise_consistent(graph, options.pcm);
@@ -127,17 +107,10 @@ PlacedTeam solve_by(const std::string& method, const ScenarioGraph& drawn,
 
 std::vector<bool> pairwise_consistent(const TeamGraph& graph, const PcmConfig& config) {
   std::vector<bool> kept = odometry_edges(graph);
-  const std::vector<OdometryPose> poses = odometry_of_team(graph, kept);
   std::map<std::pair<RobotId, RobotId>, Pcm> pairs;
   std::map<ClosureId, std::size_t> edge_of;
-  for (std::size_t k = 0; k < kept.size(); ++k) {
-    if (kept[k]) continue;
-    const RelativePose measured = relative_pose(graph, graph.edges[k]);
-    const Closure closure{.from = poses[static_cast<std::size_t>(graph.edges[k].i)],
-                          .to = poses[static_cast<std::size_t>(graph.edges[k].j)],
-                          .T_from_to = measured.T_from_to,
-                          .covariance = measured.covariance};
-    if (!edge_of.emplace(closure.id(), k).second) continue;
+  for (const auto& [edge, closure] : team_closures(graph)) {
+    if (kept[edge] || !edge_of.emplace(closure.id(), edge).second) continue;
     const auto [a, b] = std::minmax({closure.from.id.robot, closure.to.id.robot});
     Pcm& pcm = pairs.try_emplace({a, b}, a, b, config).first->second;
     (void)pcm.add(closure);

@@ -20,6 +20,7 @@ false closures for every 100 true ones. They join uniformly drawn pairs of poses
 uniform rotation and translation, and the weights of a true closure.
 
 Methods:
+  robots     the robots' own code, from measurements to published poses; not in the plane
   newton     the robots' members of sessions, see solve: they reject false closures
   pcm        pairwise consistency: between two robots, and inside one, the largest set of
              closures that agree pairwise along the odometry, by exact clique search;
@@ -65,7 +66,7 @@ void define(CLI::App& app, OutliersCommand& command) {
       ->check(CLI::Range(0.0, 10000.0))
       ->delimiter(',');
   app.add_option("--methods", study.methods,
-                 "See below. In a scenario the default is newton,trust-all,pcm,gnc,reference")
+                 "See below. In a scenario the default is robots,trust-all,pcm,gnc,reference")
       ->check(CLI::IsMember(kRejections).description(""))
       ->delimiter(',');
   app.add_option("--seeds", study.seeds,
@@ -93,7 +94,7 @@ void set_scenario(CLI::App& app, const OutliersCommand& command, OutlierStudyOpt
     scenario.robots = command.input.robots;
   scenario.keep_steps = command.input.keep_steps;
   if (app.count("--methods") == 0)
-    study.methods = {"newton", "trust-all", "pcm", "gnc", "reference"};
+    study.methods = {"robots", "trust-all", "pcm", "gnc", "reference"};
   if (app.count("--seeds") == 0) study.seeds = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10};
 }
 

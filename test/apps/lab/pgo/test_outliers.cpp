@@ -158,11 +158,13 @@ TEST_CASE("pairwise consistency refuses a robot with interrupted odometry", "[ou
 
 TEST_CASE("rejected closures do not distort the map, and kept false ones do", "[outliers]") {
   std::vector<std::size_t> remaining;
+  std::vector<std::string> methods = kRejections;
+  std::erase(methods, "robots");  // they use one of several closures between two poses
   const OutlierStudy study = run_outlier_study(
-      clean_graph(5), {.shares_percent = {0.0, 30.0}, .methods = kRejections}, {},
+      clean_graph(5), {.shares_percent = {0.0, 30.0}, .methods = methods}, {},
       [&](std::size_t done, std::size_t all) { remaining.push_back(all - done); });
   CHECK(study.certified);
-  REQUIRE(study.results.size() == 2 * kRejections.size());
+  REQUIRE(study.results.size() == 2 * methods.size());
   CHECK(remaining.size() == study.results.size() + 1);
   CHECK(remaining.back() == 0);
   for (const OutlierResult& result : study.results) {

@@ -331,7 +331,7 @@ TEST_CASE("The robots' sessions stand noise and places that are not as claimed",
   CAPTURE(row.scenario, seed);
   const OutlierStudy study = run_outlier_study(
       partition_contiguously(read_g2o(*file), 1, row.graph),
-      {.scenario = scenario_of(row.scenario), .methods = {"newton", "reference"}, .seeds = {seed}},
+      {.scenario = scenario_of(row.scenario), .methods = {"robots", "reference"}, .seeds = {seed}},
       {});
   const OutlierResult& robots = study.results.at(0);
   CHECK(robots.decided);
@@ -373,7 +373,7 @@ TEST_CASE("Odometry that is 20 times as noisy as it claims costs no true closure
   CAPTURE(seed);
   const OutlierStudy study = run_outlier_study(
       partition_contiguously(read_g2o(*file), 1, "sphere2500"),
-      {.scenario = scenario, .methods = {"newton", "reference"}, .seeds = {seed}}, {});
+      {.scenario = scenario, .methods = {"robots", "reference"}, .seeds = {seed}}, {});
   CHECK(study.results.at(0).true_lost == 0);
   CHECK(study.results.at(0).rms_m <= 1.1 * study.results.at(1).rms_m);
 }

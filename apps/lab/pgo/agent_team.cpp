@@ -1,0 +1,348 @@
+#include "apps/lab/pgo/agent_team.hpp"
+
+#include <algorithm>
+#include <iterator>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <stdexcept>
+#include <utility>
+
+#include "modules/outlier_rejection/witnessed_pair.hpp"
+#include "modules/pose_graph/corroboration.hpp"
+#include "modules/pose_graph/team_agent.hpp"
+#include "modules/pose_graph/team_message_bytes.hpp"
+#include "modules/rbcd/solver_choice.hpp"
+#include "modules/recorded_graph/recorded_graph.hpp"
+
+namespace km {
+namespace {
+
+constexpr double kTick_s = 0.05;  // period of TeamNode
+constexpr double kDelay_s = 1e-3;
+// Most bytes with which the network states kind, number and receiver of a message of its sender.
+constexpr std::size_t kMessageHead = 8;
+// Longest wait for the next session, beyond PoseGraphConfig::session_wait_s. A team without a
+// change for that long is finished.
+constexpr double kMargin_s = 5.0;
+
+// An edge in the robots' own numbering of poses.
+RelativePose relative_pose(const TeamGraph& graph, const BlockEdge& e) {
+  return {graph.keyframe_of(e.i), graph.keyframe_of(e.j), e.T_i_j,
+          covariance_in({e.kappa, e.tau}, graph.dimension)};
+}
+
+bool inside_a_robot(const TeamGraph& graph, const BlockEdge& e) {
+  return graph.robot_of(e.i) == graph.robot_of(e.j);
+}
+
+// The steps of odometry of each robot; [k][i] is robot k's step from keyframe i to i + 1. Throws
+// std::invalid_argument if a robot's odometry is interrupted.
+std::vector<std::vector<RelativePose>> team_odometry(const TeamGraph& graph) {
+  const std::vector<bool> odometry = odometry_edges(graph);
+  std::vector<std::vector<RelativePose>> steps(graph.robots());
+  for (std::size_t k = 0; k < odometry.size(); ++k)
+    if (odometry[k] && inside_a_robot(graph, graph.edges[k]))
+      steps[graph.robot_of(graph.edges[k].i)].push_back(relative_pose(graph, graph.edges[k]));
+  for (std::size_t robot = 0; robot < graph.robots(); ++robot) {
+    std::ranges::sort(steps[robot], {}, [](const RelativePose& step) { return step.from; });
+    std::size_t chained = 0;
+    while (chained < steps[robot].size() && steps[robot][chained].from.index == chained) ++chained;
+    const auto pose = static_cast<std::size_t>(graph.first[robot]) + chained + 1;
+    if (chained + 1 < static_cast<std::size_t>(graph.poses_of(robot)))
+      throw std::invalid_argument("no odometry leads to pose " + to_string(graph.ids[pose]));
+  }
+  return steps;
+}
+
+using RobotPair = std::pair<RobotId, RobotId>;
+
+// A closure, and the time at which both of its ends have been played.
+struct PlayedClosure {
+  double at_s = 0.0;
+  Closure closure;
+};
+
+// Decides whether a pair of robots is joined, as PcmNode does.
+class PlayedPair {
+ public:
+  PlayedPair(const RobotPair& pair, const PcmConfig& config)
+      : pair_(pair), wait_s_(config.witness_wait_s), closures_(pair.first, pair.second, config) {}
+
+  void add(const Closure& closure, double now_s) {
+    const PcmAddResult result = closures_.add(closure);
+    changed_ |= result == PcmAddResult::kAdded || result == PcmAddResult::kGrew;
+    if (!since_s_) since_s_ = now_s;
+  }
+  // The inlier set, if it has changed and its closures count.
+  std::optional<InlierSet> take(double now_s) {
+    const bool inside = pair_.first == pair_.second;
+    if (!changed_ || !(inside || closures_.is_witnessed() || now_s - *since_s_ >= wait_s_))
+      return std::nullopt;
+    changed_ = false;
+    return InlierSet{pair_.first, pair_.second, ++version_, closures_.closures()};
+  }
+  [[nodiscard]] bool waits() const { return changed_; }
+
+ private:
+  RobotPair pair_;
+  double wait_s_;
+  WitnessedPair closures_;
+  std::optional<double> since_s_;
+  bool changed_ = false;
+  std::uint32_t version_ = 0;
+};
+
+class AgentTeam {
+ public:
+  AgentTeam(const TeamGraph& graph, const AgentTeamOptions& options)
+      : graph_(graph), options_(options), odometry_(team_odometry(graph)) {
+    for (const TeamClosure& measured : team_closures(graph)) {
+      const Closure& closure = measured.closure;
+      const auto later = std::max(closure.from.id.index, closure.to.id.index);
+      closures_.push_back({played_s(later), closure});
+    }
+    std::ranges::stable_sort(closures_, {}, &PlayedClosure::at_s);
+    for (std::size_t k = 0; k < graph.robots(); ++k)
+      members_.push_back({.agent = std::make_unique<TeamAgent>(options.pose_graph, peer(k),
+                                                               solver_choice(options.pose_graph))});
+    LinksReport links{.links = {}, .version = 1};
+    for (std::size_t k = 0; k < members_.size(); ++k) {
+      std::set<RobotId> others;
+      for (std::size_t other = 0; other < members_.size(); ++other)
+        if (other != k) others.insert(static_cast<RobotId>(other));
+      links.links.report(static_cast<RobotId>(k), std::move(others));
+    }
+    for (const Member& member : members_) member.agent->update_links(links);
+  }
+
+  AgentTeamRun run() {
+    const double quiet_s = options_.pose_graph.session_wait_s + kMargin_s;
+    double last_change_s = 0.0;
+    while (now_s_ - last_change_s < quiet_s && now_s_ < options_.longest_s) {
+      const bool played = play();
+      const bool idle = exchange();
+      if (played || pending() || !settled()) last_change_s = now_s_;
+      if (settled() && changed_) last_change_s = now_s_;
+      changed_ = false;
+      if (idle) {
+        next_tick_s_ = std::max(next_tick_s_, now_s_) + kTick_s;
+        now_s_ = next_tick_s_;
+        for (Member& member : members_) member.due = true;
+      } else {
+        now_s_ += kDelay_s;
+      }
+    }
+    return result(now_s_ - last_change_s >= quiet_s, last_change_s);
+  }
+
+ private:
+  struct Member {
+    std::unique_ptr<TeamAgent> agent;
+    std::optional<Trajectory> trajectory = {};
+    OptimizerProgress progress = {};
+    std::size_t keyframes = 0;      // played
+    std::size_t session_bytes = 0;  // sent
+    AgentCost cost = {};
+    bool due = true;
+  };
+  struct Delivery {
+    std::size_t to = 0;
+    TeamMessage message;
+  };
+
+  static TeamPeer peer(std::size_t robot) { return {static_cast<RobotId>(robot), 1}; }
+  [[nodiscard]] double played_s(KeyframeIndex keyframe) const {
+    return options_.keyframes_per_s > 0.0 ? keyframe / options_.keyframes_per_s : 0.0;
+  }
+
+  // Gives the robots their measurements up to now. True if there were any.
+  bool play() {
+    bool any = false;
+    for (std::size_t k = 0; k < members_.size(); ++k) {
+      Member& member = members_[k];
+      const auto poses = static_cast<std::size_t>(graph_.poses_of(k));
+      for (std::size_t& i = member.keyframes;
+           i < poses && played_s(static_cast<KeyframeIndex>(i)) <= now_s_; ++i) {
+        KeyframeOdometry keyframe;
+        keyframe.id = {static_cast<RobotId>(k), static_cast<KeyframeIndex>(i)};
+        if (i > 0) {
+          keyframe.T_previous_kf = odometry_[k][i - 1].T_from_to;
+          keyframe.covariance = odometry_[k][i - 1].covariance;
+        }
+        (void)member.agent->add(keyframe);
+        member.due = any = true;
+      }
+    }
+    for (; next_closure_ < closures_.size() && closures_[next_closure_].at_s <= now_s_;
+         ++next_closure_) {
+      const Closure& closure = closures_[next_closure_].closure;
+      const RobotPair pair = std::minmax({closure.from.id.robot, closure.to.id.robot});
+      for (const RobotId robot : std::set{pair.first, pair.second})
+        (void)members_[robot].agent->add(closure);
+      pairs_.try_emplace(pair, pair, options_.pcm).first->second.add(closure, now_s_);
+      any = true;
+    }
+    for (auto& [pair, played] : pairs_)
+      if (const auto set = played.take(now_s_)) {
+        for (const RobotId robot : std::set{pair.first, pair.second}) {
+          (void)members_[robot].agent->add(*set);
+          members_[robot].due = true;
+        }
+        any = true;
+      }
+    return any;
+  }
+
+  [[nodiscard]] bool pending() const {
+    return next_closure_ < closures_.size() ||
+           std::ranges::any_of(pairs_, [](const auto& pair) { return pair.second.waits(); });
+  }
+
+  // Calls work(agent) and adds its CPU time to that of the robot.
+  decltype(auto) measure(Member& member, auto&& work) {
+    const CpuStopwatch stopwatch{options_.meter, member.cost.cpu_s};
+    return work(*member.agent);
+  }
+
+  // Delivers the messages in flight and steps each robot that is due. True if no robot is due and
+  // no message is in flight afterwards.
+  bool exchange() {
+    for (const Delivery& delivery : std::exchange(in_flight_, {})) {
+      measure(members_[delivery.to],
+              [&](TeamAgent& agent) { (void)agent.receive(delivery.message); });
+      members_[delivery.to].due = true;
+    }
+    for (std::size_t k = 0; k < members_.size(); ++k)
+      if (members_[k].due) step(k);
+    return in_flight_.empty() &&
+           std::ranges::none_of(members_, [](const Member& member) { return member.due; });
+  }
+
+  void step(std::size_t robot) {
+    Member& member = members_[robot];
+    TeamOutput output =
+        measure(member, [&](TeamAgent& agent) { return agent.step(now_s_, member.session_bytes); });
+    member.due = output.more;
+    changed_ |= output.trajectory.has_value();
+    if (output.trajectory) member.trajectory = std::move(output.trajectory);
+    if (output.progress) member.progress = std::move(*output.progress);
+    for (std::string& notice : output.notices)
+      notices_.push_back("robot " + std::to_string(robot) + ": " + std::move(notice));
+    for (const TeamMessage& message : output.messages) send(robot, message);
+  }
+
+  // Sends a message to its receivers: robots that all receive each other.
+  void send(std::size_t robot, const TeamMessage& message) {
+    const std::vector<std::uint8_t> bytes = encode(message);
+    const auto* reliable = std::get_if<ReliableMessage>(&message);
+    for (std::size_t to = 0; to < members_.size(); ++to) {
+      if (to == robot || (reliable != nullptr && reliable->to != to)) continue;
+      auto decoded = decode_team_message({.kind = kind_of(message),
+                                          .sender = peer(robot),
+                                          .to = static_cast<RobotId>(to),
+                                          .bytes = bytes});
+      if (!decoded.value) throw std::runtime_error("run_agent_team: a message cannot be decoded");
+      in_flight_.push_back({to, std::move(*decoded.value)});
+      const std::size_t sent = kMessageHead + bytes.size();
+      members_[robot].session_bytes += std::holds_alternative<TeamStatus>(message) ? 0 : sent;
+      members_[robot].cost.sent[message.index()] += sent;
+      members_[to].cost.received[message.index()] += sent;
+      bytes_ += sent;
+    }
+    if (const auto* session = std::get_if<Session>(&message)) sessions_.insert(session->id);
+  }
+
+  [[nodiscard]] bool settled() const {
+    return std::ranges::all_of(members_,
+                               [](const Member& member) { return member.progress.settled; });
+  }
+
+  [[nodiscard]] AgentTeamRun result(bool settled, double seconds) const {
+    AgentTeamRun run{.T_world_kf = {},
+                     .world_of = {},
+                     .tentative = {},
+                     .kept = odometry_edges(graph_),
+                     .settled = settled,
+                     .seconds = seconds,
+                     .bytes = bytes_,
+                     .costs = {},
+                     .sessions = sessions_.size(),
+                     .notices = notices_};
+    for (const Member& member : members_) run.costs.push_back(member.cost);
+    for (std::size_t k = 0; k < members_.size(); ++k) {
+      const Member& member = members_[k];
+      const auto poses = static_cast<std::size_t>(graph_.poses_of(k));
+      const bool published = member.trajectory && member.trajectory->T_world_kf.size() == poses;
+      const std::vector<SE3>& own =
+          published ? member.trajectory->T_world_kf : member.agent->poses();
+      run.T_world_kf.insert(run.T_world_kf.end(), own.begin(), own.end());
+      run.world_of.push_back(published ? member.trajectory->anchor : static_cast<RobotId>(k));
+      const std::vector<RobotId>& uncertain = members_[run.world_of.back()].progress.tentative;
+      run.tentative.push_back(std::ranges::binary_search(uncertain, static_cast<RobotId>(k)));
+      run.rounds = std::max(run.rounds, static_cast<std::size_t>(member.progress.round));
+    }
+    for (const TeamClosure& measured : team_closures(graph_)) {
+      const ClosureId id = measured.closure.id();
+      const auto [a, b] = std::pair(id.from.robot, id.to.robot);
+      run.kept[measured.edge] =
+          run.world_of[a] == run.world_of[b] && !rejects(a, id) && !rejects(b, id);
+    }
+    return run;
+  }
+
+  [[nodiscard]] bool rejects(RobotId robot, const ClosureId& id) const {
+    const auto& decided = members_[robot].agent->decided();
+    const auto verdict = decided.find(id);
+    return verdict != decided.end() && !verdict->second;
+  }
+
+  const TeamGraph& graph_;
+  const AgentTeamOptions& options_;
+  std::vector<std::vector<RelativePose>> odometry_;
+  std::vector<PlayedClosure> closures_;  // ascending by time
+  std::size_t next_closure_ = 0;
+  std::map<RobotPair, PlayedPair> pairs_;
+  std::vector<Member> members_;
+  std::vector<Delivery> in_flight_;
+  std::size_t bytes_ = 0;
+  std::set<SessionId> sessions_;
+  std::vector<std::string> notices_;
+  double now_s_ = 0.0;
+  double next_tick_s_ = 0.0;
+  bool changed_ = false;
+};
+
+}  // namespace
+
+std::vector<TeamClosure> team_closures(const TeamGraph& graph) {
+  std::vector<OdometryPose> poses;
+  const auto odometry = team_odometry(graph);
+  for (std::size_t robot = 0; robot < graph.robots(); ++robot) {
+    RecordedGraph chain;
+    chain.robot = static_cast<RobotId>(robot);
+    chain.odometry = odometry[robot];
+    std::ranges::move(odometry_poses(chain), std::back_inserter(poses));
+  }
+  const std::vector<bool> step = odometry_edges(graph);
+  std::vector<TeamClosure> closures;
+  for (std::size_t k = 0; k < graph.edges.size(); ++k) {
+    const BlockEdge& e = graph.edges[k];
+    if (step[k] && inside_a_robot(graph, e)) continue;
+    const RelativePose measured = relative_pose(graph, e);
+    closures.push_back({k, Closure{.from = poses[static_cast<std::size_t>(e.i)],
+                                   .to = poses[static_cast<std::size_t>(e.j)],
+                                   .T_from_to = measured.T_from_to,
+                                   .covariance = measured.covariance}});
+  }
+  return closures;
+}
+
+AgentTeamRun run_agent_team(const TeamGraph& graph, const AgentTeamOptions& options) {
+  if (graph.dimension != 3)
+    throw std::invalid_argument("run_agent_team: the graph is planar, robots solve in space");
+  return AgentTeam(graph, options).run();
+}
+
+}  // namespace km

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "apps/lab/pgo/round_meter.hpp"
+#include "apps/lab/pgo/team_graph.hpp"
+#include "modules/core/pose_graph.hpp"
+#include "modules/outlier_rejection/pcm_config.hpp"
+#include "modules/pose_graph/pose_graph_config.hpp"
+
+namespace km {
+
+/// An edge of a team's graph as a closure between robots. Robot k has id k, and its keyframes are
+/// its poses, numbered from 0.
+struct TeamClosure {
+  std::size_t edge = 0;  ///< Index in TeamGraph::edges.
+  Closure closure;       ///< Closure with the odometry of both ends.
+};
+
+/// All edges that are no step of a robot's own odometry, in the order of the edges. Odometry
+/// between two robots is included. Throws std::invalid_argument if a robot's odometry is
+/// interrupted.
+[[nodiscard]] std::vector<TeamClosure> team_closures(const TeamGraph& graph);
+
+struct AgentTeamOptions {
+  PoseGraphConfig pose_graph = {};
+  PcmConfig pcm = {};            ///< Decides when the closures of a pair count; `selection` is
+                                 ///< witness.
+  double keyframes_per_s = 0.0;  ///< Rate at which robots play their graphs [1/s]; 0: all at once.
+  double longest_s = 3600.0;     ///< Limit of the virtual time of the run [s].
+  TeamMeter meter = {};
+};
+
+/// Messages and processor time of one robot of a run.
+struct AgentCost {
+  std::array<std::size_t, 4> sent = {};      ///< Bytes by TeamMessageKind; a message counts once
+                                             ///< per receiver.
+  std::array<std::size_t, 4> received = {};  ///< Bytes by TeamMessageKind.
+  double cpu_s = 0.0;
+};
+
+/// Result of a run.
+struct AgentTeamRun {
+  std::vector<SE3> T_world_kf;    ///< Published poses, in the numbering of the graph.
+  std::vector<RobotId> world_of;  ///< By robot: id of the robot whose odometry frame is its
+                                  ///< `world`.
+  std::vector<bool> tentative;    ///< By robot: closures at a single place tie it to `world`.
+  std::vector<bool> kept;         ///< By edge of the graph: used in the published solution.
+  bool settled = false;           ///< False: the run ended at longest_s.
+  double seconds = 0.0;           ///< Virtual time of the last change [s].
+  std::size_t rounds = 0;         ///< Maximum over the robots.
+  std::size_t bytes = 0;          ///< Sent by all robots; a message counts once per receiver.
+  std::vector<AgentCost> costs;   ///< By robot.
+  std::size_t sessions = 0;       ///< Number of sessions of the team.
+  std::vector<std::string> notices;
+};
+
+/// Runs the robots' own code on a recorded graph, from measurements to published poses. Each robot
+/// is a TeamAgent with the solvers of solver_choice(). The agents exchange encoded messages over
+/// perfect links in virtual time. Closures inside a robot count at once. Closures between two
+/// robots count when WitnessedPair has its witnesses, or `pcm.witness_wait_s` after the first one.
+/// If several closures join the same two poses, the robots use one (see OwnGraph), and all of
+/// them have the same value in `kept`. Deterministic. Throws std::invalid_argument if the graph is
+/// planar or the odometry of a robot is interrupted.
+[[nodiscard]] AgentTeamRun run_agent_team(const TeamGraph& graph, const AgentTeamOptions& options);
+
+}  // namespace km
