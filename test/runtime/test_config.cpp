@@ -80,14 +80,6 @@ TEST_CASE("A key that is absent keeps its default", "[config]") {
   CHECK(loaded(nothing) == ToyConfig{});
 }
 
-TEST_CASE("Every kind of field is read", "[config]") {
-  ConfigLayers layers;
-  layers.add_text(
-      "toy: {count: 9, length_m: 2e-1, level: 65, flag: true, name: n, colour: red, hosts: [a, b]}",
-      "a.yaml");
-  CHECK(loaded(layers) == ToyConfig{9, 0.2, 65, true, "n", Colour::kRed, {"a", "b"}});
-}
-
 TEST_CASE("A configuration error names every problem with file and line", "[config]") {
   const std::string text = complaint(
       "toy:\n  count: many\n  length_m: 7\n  level: 256\n  flag: perhaps\n  colour: blue\n"

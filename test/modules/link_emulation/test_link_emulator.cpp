@@ -117,17 +117,6 @@ TEST_CASE("A delay is exact, and jitter stays within its bounds", "[link_emulati
   CHECK(std::abs(sum_s / kFrames - 0.3) < 5.0 * 0.1 / std::sqrt(12.0 * kFrames));
 }
 
-TEST_CASE("Jitter lets frames overtake others", "[link_emulation]") {
-  LinkPlan link;
-  link.jitter_s = 1.0;
-  LinkEmulator emulator(script_of(2, link));
-  for (int i = 0; i < 20; ++i) emulator.send(0, 1e-3 * i, frame_to(1));
-  const auto arrived = all_of(emulator);
-  REQUIRE(arrived.size() == 20);
-  CHECK(std::ranges::is_sorted(arrived, {}, &SentFrame::due_s));
-  CHECK_FALSE(std::ranges::is_sorted(arrived, {}, &SentFrame::sent_s));
-}
-
 TEST_CASE("The share of lost frames is the probability", "[link_emulation]") {
   LinkPlan link;
   link.loss = GENERATE(0.0, 0.05, 0.3, 1.0);

@@ -117,27 +117,6 @@ TEST_CASE("An inconsistent message of the overlay is refused", "[overlay]") {
   }
 }
 
-TEST_CASE("A malformed packet of the overlay is refused", "[overlay]") {
-  auto sent =
-      encoded_by<TeamLanePacket>(kSelf, {packet_of(message_of(OverlayStream::kIntroduction))});
-  REQUIRE(decoded(sent).value);
-  SECTION("no content") {
-    sent.wire.content._length = 0;
-  }
-  SECTION("missing content") {
-    sent.wire.content._buffer = nullptr;
-  }
-  SECTION("truncated content") {
-    sent.wire.content._length = 5;
-  }
-  SECTION("an introduction without a name") {
-    sent.content[sent.content.size() - 3] = '\n';
-  }
-  const auto arrived = decoded(sent);
-  CHECK_FALSE(arrived.value);
-  CHECK(arrived.refusal != nullptr);
-}
-
 TEST_CASE("Reports of links are restored, and malformed ones are refused", "[overlay]") {
   const std::vector<TeamPeer> links{{1, 5}, {200, 6}, {60000, 7}};
   CHECK(decode_links(encode_links(links)) == links);

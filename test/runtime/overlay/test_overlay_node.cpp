@@ -202,29 +202,6 @@ TEST_CASE("Relayed messages arrive on the topics of directly received ones", "[o
   CHECK(a.sets_sent_directly.messages().size() == 1);
 }
 
-TEST_CASE("With keys a message without the signature of its origin is neither read nor stored",
-          "[overlay]") {
-  Chain chain(true);
-  Relaying &a = *chain.robots[0], &b = *chain.robots[1], &c = *chain.robots[2];
-  c.peers.reported(identity_of(0));
-  Octets bow = a.content_of({.id = {0, 0}, .words = {{3, 1}}});
-  REQUIRE(c.receive(process_of(0), bow).empty());
-  chain.change = [](OverlayMessage& message) {
-    if (message.stream == OverlayStream::kBag) message.content.front() ^= 1U;
-  };
-  chain.run(20.0);
-  CHECK(b.peers.current(0) == process_of(0));
-  CHECK(b.got_bows.messages().empty());
-  REQUIRE_FALSE(chain.refusals.empty());
-  CHECK(chain.refusals[0] == "not signed by its origin, or changed on its way");
-
-  bow = a.content_of({.id = {0, 1}, .words = {{3, 1}}});
-  bow.back() ^= 1U;
-  CHECK(c.receive(process_of(0), bow) == "not signed by its origin, or changed on its way");
-  CHECK(c.receive(process_of(0), {1, 2, 3}) == "shorter than its tail");
-  CHECK(c.got_bows.messages().size() == 1);
-}
-
 TEST_CASE("States and calls of the overlay reach the readers of their streams", "[overlay]") {
   const bool has_keys = GENERATE(false, true);
   CAPTURE(has_keys);
