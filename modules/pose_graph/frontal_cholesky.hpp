@@ -37,8 +37,6 @@ class FrontalCholesky {
   /// In single precision.
   [[nodiscard]] BlockMatrix selected_inverse(const BlockMatrix& kept) const;
 
-  [[nodiscard]] const EliminationPlan& plan() const { return *plan_; }
-
  private:
   bool factorise_front(std::size_t f, const BlockMatrix& A);
   void add_to_schur(const EliminationPlan::Front& front, const Eigen::MatrixXd& rest);

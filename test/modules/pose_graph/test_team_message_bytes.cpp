@@ -244,39 +244,6 @@ TEST_CASE("Invalid poses of a member are refused", "[pose_graph]") {
         [](P& m) { std::swap(m.verdicts[0].id.from, m.verdicts[0].id.to); }}});
 }
 
-TEST_CASE("Corrupted bytes give a message or a reason", "[pose_graph]") {
-  const auto seed = GENERATE(1U, 2U, 3U, 4U);
-  CAPTURE(seed);
-  std::mt19937 random(seed);
-  const std::vector<TeamMessage> originals = one_of_each();
-  std::size_t taken = 0;
-  for (int run = 0; run < 30000; ++run) {
-    const TeamMessage& original = originals[random() % originals.size()];
-    Bytes bytes = encode(original);
-    const std::size_t changes = 1 + random() % 3;
-    for (std::size_t k = 0; k < changes; ++k) {
-      const std::size_t place = random() % bytes.size();
-      const auto value = static_cast<std::uint8_t>(random());
-      switch (random() % 3) {
-        case 0:
-          bytes[place] = value;
-          break;
-        case 1:
-          bytes.insert(bytes.begin() + static_cast<std::ptrdiff_t>(place), value);
-          break;
-        default:
-          bytes.erase(bytes.begin() + static_cast<std::ptrdiff_t>(place));
-      }
-    }
-    const auto result = decoded_as(original, bytes);
-    if (result.value.has_value() == (result.refusal != nullptr)) FAIL("neither or both");
-    // An accepted message can be forwarded.
-    if (result.value && !decoded_as(original, encode(*result.value)).value) FAIL("not stable");
-    taken += result.value ? 1 : 0;
-  }
-  CHECK(taken > 1000);  // most of the changed bytes may have any value
-}
-
 TEST_CASE("a solver's message that is too large is reported once, with the way out",
           "[pose_graph]") {
   TeamNotices notices(1);

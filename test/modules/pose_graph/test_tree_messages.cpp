@@ -285,17 +285,6 @@ TEST_CASE("A message with a wrong byte is refused, or is another valid message",
   CHECK(largest_resident_kb() - before_kb < 512 * 1024);
 }
 
-TEST_CASE("Random bytes do no harm", "[pose_graph]") {
-  std::mt19937 rng(8);
-  for (int n = 0; n < 20000; ++n) {
-    Bytes bytes(std::uniform_int_distribution<std::size_t>(1, 200)(rng));
-    for (std::uint8_t& b : bytes)
-      b = static_cast<std::uint8_t>(std::uniform_int_distribution<int>(0, 255)(rng));
-    bytes[0] = static_cast<std::uint8_t>(1 + n % 2);
-    check_harmless(bytes);
-  }
-}
-
 // A message without its last `bytes`, which are zeros.
 ByteWriter without_zeros(Bytes message, std::size_t bytes) {
   REQUIRE(std::all_of(message.end() - static_cast<std::ptrdiff_t>(bytes), message.end(),
