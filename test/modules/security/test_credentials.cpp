@@ -1,7 +1,12 @@
 #include <catch2/catch.hpp>
 
+#include <fstream>
+#include <iterator>
+#include <string>
+
 #include "modules/security/credentials.hpp"
 #include "modules/security/signing.hpp"
+#include "test/modules/security/hex.hpp"
 #include "test/modules/security/toy_team.hpp"
 
 namespace km {
@@ -23,6 +28,35 @@ TEST_CASE("Credentials are unchanged by writing and reading", "[security]") {
   CHECK(parsed.value->exchange == exchange);
   CHECK(is_signed_by_robot(*parsed.value, identity));
   CHECK(is_signed_by(team.authority(), claimed_certificate(*parsed.value, identity, "survey")));
+}
+
+TEST_CASE("Certificates and credentials have the bytes of the test vectors in SECURITY",
+          "[security]") {
+  Secret<32> authority_seed, robot_seed;
+  std::fill_n(authority_seed.data(), 32, std::uint8_t{1});
+  std::fill_n(robot_seed.data(), 32, std::uint8_t{2});
+  const SigningKey authority = signing_key_from(authority_seed);
+  const SigningKey robot = signing_key_from(robot_seed);
+  Certificate certificate = {.team = "survey", .robot = 7, .name = "alice"};
+  certificate.key = public_key_of(robot);
+  certificate.valid_from_s = 1700000000;
+  certificate.valid_until_s = 1800000000;
+  sign(certificate, authority);
+  CHECK(certificate.signature ==
+        array_from_hex<64>("52d382e44c67c87f84a1ad7d68bc47dcb147327a0bd7ce0e3a47df1a912ab72e"
+                           "290d720cd929212ad8045f6da1a1927f13e60d689f30cc9ffcacb8d921d8ca07"));
+
+  ExchangeKey exchange;
+  exchange.fill(3);
+  RobotIdentity identity = toy_identity(7, "alice");
+  identity.protocol = 1;
+  identity.boot = 65536;
+  const std::string credentials =
+      to_text(make_credentials(certificate, public_key_of(authority), robot, identity, exchange));
+  std::ifstream page(".github/SECURITY.md");
+  std::string text(std::istreambuf_iterator<char>(page), {});
+  std::erase_if(text, [](char c) { return c == ' ' || c == '\n'; });
+  CHECK_THAT(text, Catch::Contains(credentials));
 }
 
 TEST_CASE("Credentials are signed with every field of the identity", "[security]") {
