@@ -12,7 +12,6 @@
 namespace km {
 namespace {
 
-constexpr int kPartBlocks = 12;  // regions with longer sides are divided
 constexpr std::uint64_t kColumnX0 = 0x0101010101010101, kColumnX7 = kColumnX0 << 7U;
 
 bool less(const Eigen::Vector3i& a, const Eigen::Vector3i& b) {
@@ -105,30 +104,18 @@ void DistanceField::find_surface() {
   is_surface_outdated_ = false;
 }
 
-void DistanceField::compute(std::vector<Eigen::Vector3i> targets) {
+void DistanceField::compute(const std::vector<Eigen::Vector3i>& targets) {
   if (targets.empty()) return;
   if (is_surface_outdated_) find_surface();
   Box box{targets.front(), targets.front()};
-  for (const Eigen::Vector3i& target : targets)
+  std::vector<DistanceTarget> outputs;
+  for (const Eigen::Vector3i& target : targets) {
     box = {box.low.cwiseMin(target), box.high.cwiseMax(target)};
-  compute_parts({box.low, box.high.array() + 1}, std::move(targets));
-}
-
-// Divides long regions, so that little time and memory goes to the space between distant targets.
-void DistanceField::compute_parts(const Box& box, std::vector<Eigen::Vector3i> targets) {
-  if (targets.empty()) return;
-  const Eigen::Vector3i side = box.high - box.low;
-  Eigen::Index axis = 0;
-  if (side.maxCoeff(&axis) <= kPartBlocks) return compute_part(box, targets);
-  const int middle = (box.low[axis] + box.high[axis]) / 2;
-  const auto split =
-      std::stable_partition(targets.begin(), targets.end(),
-                            [&](const Eigen::Vector3i& target) { return target[axis] < middle; });
-  Box low = box, high = box;
-  low.high[axis] = high.low[axis] = middle;
-  compute_parts(high, {split, targets.end()});
-  targets.erase(split, targets.end());
-  compute_parts(low, std::move(targets));
+    Block& block = *blocks_.at(target);
+    outputs.push_back({target, &block.squared});
+    block.outdated = false;
+  }
+  find_surface_distances(surface_near({box.low, box.high.array() + 1}), reach_, outputs);
 }
 
 // The surface within reach of `box`.
@@ -154,14 +141,6 @@ SurfaceBox DistanceField::surface_near(const Box& box) const {
         block->surface;
   }
   return surface;
-}
-
-void DistanceField::compute_part(const Box& box, const std::vector<Eigen::Vector3i>& targets) {
-  std::vector<DistanceTarget> outputs;
-  for (const Eigen::Vector3i& target : targets)
-    outputs.push_back({target, &blocks_.at(target)->squared});
-  find_surface_distances(surface_near(box), reach_, outputs);
-  for (const Eigen::Vector3i& target : targets) blocks_.at(target)->outdated = false;
 }
 
 double DistanceField::signed_distance(const Block& block, int x, int y, int z) const {
@@ -215,7 +194,7 @@ std::vector<DistanceField::SlicePoint> DistanceField::slice(double z_m) {
     positions.push_back(position);
     if (block->outdated) outdated.push_back(position);
   }
-  compute(std::move(outdated));
+  compute(outdated);
   std::ranges::sort(positions, less);
   std::vector<SlicePoint> points;
   for (const Eigen::Vector3i& position : positions)

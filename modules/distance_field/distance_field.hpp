@@ -88,9 +88,7 @@ class DistanceField {
   [[nodiscard]] BlockBits surface_of(const Eigen::Vector3i& position, const Block& block) const;
   void find_surface();
   [[nodiscard]] SurfaceBox surface_near(const Box& box) const;
-  void compute(std::vector<Eigen::Vector3i> targets);
-  void compute_parts(const Box& box, std::vector<Eigen::Vector3i> targets);
-  void compute_part(const Box& box, const std::vector<Eigen::Vector3i>& targets);
+  void compute(const std::vector<Eigen::Vector3i>& targets);
   [[nodiscard]] double signed_distance(const Block& block, int x, int y, int z) const;
 
   const double voxel_m_, max_m_;
