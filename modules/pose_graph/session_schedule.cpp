@@ -1,6 +1,7 @@
 #include "modules/pose_graph/session_schedule.hpp"
 
 #include <algorithm>
+#include <tuple>
 
 namespace km {
 namespace {
@@ -12,6 +13,20 @@ constexpr double kIdle = 4.0;
 // Factor on the waits while the place of a member in the team's frame is not certain. A session may
 // join it, or correct a frame that is wrong as a whole.
 constexpr double kNotJoined = 0.25;
+
+constexpr double kEarly = 0.5;  // earliest time of a changed status [periods]
+
+bool same_graph_size(const TeamStatus& a, const TeamStatus& b) {
+  return a.keyframes == b.keyframes && a.revision == b.revision;
+}
+
+// All except for keyframes and revision.
+bool same_rest(const TeamStatus& a, const TeamStatus& b) {
+  const auto rest = [](const TeamStatus& s) {
+    return std::tie(s.sender, s.frame, s.frame_version, s.offers, s.method, s.upright, s.datum);
+  };
+  return rest(a) == rest(b) && a.T_odom_first.matrix() == b.T_odom_first.matrix();
+}
 
 }  // namespace
 
@@ -37,6 +52,19 @@ bool SessionSchedule::is_worthwhile(double ended_s, double now_s) const {
       has_new() && static_cast<double>(closures_) >=
                        (1.0 + patience() * config_.session_growth) * static_cast<double>(used_);
   return grown || now_s - changed_s_ >= kAtRest_s || now_s - ended_s >= longest_wait_s();
+}
+
+bool StatusSchedule::may_be_due(double now_s) const {
+  return now_s - last_s_ >= kEarly * kTeamStatusPeriod_s;
+}
+
+StatusSchedule::Due StatusSchedule::due(const TeamStatus& status, double now_s) {
+  const bool urgent = !sent_ || !same_rest(status, *sent_);
+  if (!urgent && now_s - last_s_ < kTeamStatusPeriod_s) return Due::kNo;
+  last_s_ = now_s;
+  if (!urgent && same_graph_size(status, *sent_)) return Due::kProgress;
+  sent_ = status;
+  return Due::kStatus;
 }
 
 }  // namespace km

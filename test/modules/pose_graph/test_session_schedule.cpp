@@ -5,6 +5,8 @@
 namespace km {
 namespace {
 
+using Due = StatusSchedule::Due;
+
 // Seconds after the last session until the next one, while odometry changes the graph all the time.
 double wait_s(SessionSchedule& schedule, std::uint64_t closures, bool all_joined = true) {
   for (double now_s = 0.0;; now_s += 0.5) {
@@ -13,6 +15,36 @@ double wait_s(SessionSchedule& schedule, std::uint64_t closures, bool all_joined
     schedule.opened();
     return now_s;
   }
+}
+
+TEST_CASE("A status that has not changed is not sent", "[status_schedule]") {
+  StatusSchedule schedule;
+  TeamStatus status;
+  status.keyframes = 5;
+  CHECK(schedule.due(status, 0.0) == Due::kStatus);
+  CHECK_FALSE(schedule.may_be_due(0.4));
+  CHECK(schedule.due(status, 0.9) == Due::kNo);
+  CHECK(schedule.due(status, 1.0) == Due::kProgress);
+  CHECK(schedule.due(status, 1.9) == Due::kNo);
+}
+
+TEST_CASE("A changed status is sent twice per period, one with a grown graph once",
+          "[status_schedule]") {
+  StatusSchedule schedule;
+  TeamStatus status;
+  status.keyframes = 5;
+  REQUIRE(schedule.due(status, 0.0) == Due::kStatus);
+  status.keyframes = 6;
+  status.revision = 6;
+  CHECK(schedule.due(status, 0.5) == Due::kNo);
+  CHECK(schedule.due(status, 1.0) == Due::kStatus);
+  status.keyframes = 7;
+  status.frame_version = 1;
+  CHECK(schedule.due(status, 1.5) == Due::kStatus);
+  CHECK(schedule.due(status, 2.0) == Due::kNo);
+  CHECK(schedule.due(status, 2.5) == Due::kProgress);
+  status.offers.emplace_back();
+  CHECK(schedule.due(status, 3.0) == Due::kStatus);
 }
 
 }  // namespace
