@@ -7,6 +7,7 @@
 #include <iterator>
 #include <memory>
 #include <utility>
+#include <variant>
 
 #include "modules/core/calibration_limits.hpp"
 #include "modules/core/image_size.hpp"
@@ -25,43 +26,16 @@ constexpr double kSevenScenesRate_hz = 30.0;
 constexpr double kStructuredLightRange_m = 8.0;
 
 // A row of a list: the time and the text behind it.
-struct ListedFile {
-  Stamp stamp = 0;
-  int line = 0;
-  int row = 0;  // index of the row: faulty rows count, blank lines do not
-  std::string name;
-};
+using ListedFile = StampedRow<std::string>;
 
 // The rows `time [s] ...` of a list. Faulty rows are counted.
 std::vector<ListedFile> read_times(const fs::path& file, std::size_t fields, ReaderReport& report) {
-  constexpr double kMost_s = 4e9;
-  ReaderReport faults;
-  std::vector<ListedFile> rows;
-  std::vector<Stamp> stamps;
-  std::vector<int> lines;
-  const std::string text = read_file(file);
-  for (int index = -1; const TextRow& row : split_rows(text)) {
-    ++index;
-    const auto seconds = number_in(row, 0);
-    std::string why;
-    if (row.fields.size() < fields)
-      why = std::to_string(row.fields.size()) + " fields, expected " + std::to_string(fields);
-    else if (!seconds || !(*seconds >= 0.0 && *seconds < kMost_s))
-      why = readable(row.fields[0], 40) + " is no time in seconds";
-    if (!why.empty()) {
-      faults.add(ReaderFault::kMalformedRow, at_line(file, row.line) + ": " + why);
-      continue;
-    }
-    stamps.push_back(nanoseconds(*seconds));
-    lines.push_back(row.line);
-    rows.push_back({stamps.back(), row.line, index, fields > 1 ? std::string(row.fields[1]) : ""});
-  }
-  const std::vector<bool> counts = in_order(stamps, lines, file, faults);
-  std::size_t row = 0;
-  std::erase_if(rows, [&](const ListedFile&) { return !counts[row++]; });
-  if (rows.empty()) refuse_list(file, "no time in it", faults);
-  report.add(faults);
-  return rows;
+  using Parsed = std::variant<std::string, RowFault>;
+  const auto name_of = [&](const TextRow& row) -> Parsed {
+    return fields > 1 ? std::string(row.fields[1]) : "";
+  };
+  return read_ordered_rows<std::string>(file, fields, "no time in it", report, name_of,
+                                        stamp_of_seconds);
 }
 
 [[noreturn]] void refuse(const fs::path& file, int line, const std::string& problem) {
@@ -245,7 +219,7 @@ ImageFolder read_kitti_folder(const fs::path& folder) {
   result.list = folder / "times.txt";
   const std::vector<ListedFile> times = read_times(result.list, 1, result.report);
   for (const ListedFile& row : times) {
-    const std::string stem = six_digits(row.row);
+    const std::string stem = six_digits(row.index);
     result.frames.push_back({.stamp = row.stamp,
                              .left = image_file(images[0], stem),
                              .right = image_file(images[1], stem),
@@ -253,7 +227,7 @@ ImageFolder read_kitti_folder(const fs::path& folder) {
                              .depth = {},
                              .labels = {}});
   }
-  count_images_without_time(images[0], times.back().row + 1, result);
+  count_images_without_time(images[0], times.back().index + 1, result);
   const fs::path calib = folder / "calib.txt";
   const std::array<ListedProjection, 2> P = {read_projection(calib, "P" + numbers[0]),
                                              read_projection(calib, "P" + numbers[1])};
@@ -303,10 +277,10 @@ ImageFolder read_tum_folder(const fs::path& folder, const DepthCamera& camera) {
   for (const ListedFile& row : read_times(result.list, 2, result.report)) {
     const ListedFile* depth = nearest(depths, row.stamp);
     result.frames.push_back({.stamp = row.stamp,
-                             .left = folder / row.name,
+                             .left = folder / row.value,
                              .right = {},
                              .line = row.line,
-                             .depth = depth != nullptr ? folder / depth->name : fs::path(),
+                             .depth = depth != nullptr ? folder / depth->value : fs::path(),
                              .labels = {}});
   }
   result.rig = rgbd_sensors(camera);

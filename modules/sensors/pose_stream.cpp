@@ -14,18 +14,6 @@ namespace {
 constexpr std::size_t kPose = 8, kPoseWithCovariance = 8 + 36;
 constexpr double kMaxRounding = 0.01;  // norm of a quaternion in rounded text
 
-std::variant<Stamp, RowFault> stamp_of_seconds(const TextRow& row, std::size_t fields) {
-  constexpr double kMost_s = 4e9;
-  if (row.fields.size() < fields)
-    return RowFault{ReaderFault::kMalformedRow,
-                    "has " + std::to_string(row.fields.size()) + " fields, not 8 or 44"};
-  const auto seconds = parse_double(row.fields[0]);
-  if (!seconds || !(*seconds >= 0.0 && *seconds < kMost_s))
-    return RowFault{ReaderFault::kMalformedRow,
-                    std::string(row.fields[0]) + " is no time in seconds"};
-  return nanoseconds(*seconds);
-}
-
 std::variant<MeasuredPose, RowFault> parse_pose(const TextRow& row) {
   const std::size_t count = row.fields.size();
   if (count != kPose && count != kPoseWithCovariance)
@@ -89,9 +77,8 @@ std::optional<MeasuredPose> measured_pose(const RosOdometry& message, const SE3&
 
 PoseStream read_pose_file(const std::filesystem::path& file, ReaderReport& report) {
   PoseStream poses;
-  for (const auto& row :
-       read_ordered_rows<MeasuredPose>(file, kPose, "no pose in it: t[s] x y z qx qy qz qw", report,
-                                       parse_pose, stamp_of_seconds))
+  for (const auto& row : read_ordered_rows<MeasuredPose>(
+           file, 1, "no pose in it: t[s] x y z qx qy qz qw", report, parse_pose, stamp_of_seconds))
     poses.add(row.stamp, row.value);
   return poses;
 }

@@ -45,7 +45,8 @@ std::vector<TextRow> rows_below_header(const std::string& text) {
   std::vector<TextRow> rows = split_rows(text);
   if (rows.empty()) return rows;
   const std::string_view head = rows.front().fields.front();
-  if (!head.empty() && std::isalpha(static_cast<unsigned char>(head.front())) != 0)
+  if (!head.empty() && std::isalpha(static_cast<unsigned char>(head.front())) != 0 &&
+      !parse_double(head))
     rows.erase(rows.begin());
   return rows;
 }
@@ -58,6 +59,17 @@ std::variant<Stamp, RowFault> stamp_of(const TextRow& row, std::size_t fields) {
   const auto stamp = parse_int64(head);
   if (stamp && *stamp > 0) return *stamp;
   return RowFault{ReaderFault::kMalformedRow, std::string(head) + " is not a stamp in nanoseconds"};
+}
+
+std::variant<Stamp, RowFault> stamp_of_seconds(const TextRow& row, std::size_t fields) {
+  constexpr double kMost_s = 4e9;
+  if (row.fields.size() < fields)
+    return RowFault{ReaderFault::kMalformedRow, std::to_string(row.fields.size()) +
+                                                    " fields, expected " + std::to_string(fields)};
+  const auto seconds = parse_double(row.fields[0]);
+  if (seconds && *seconds >= 0.0 && *seconds < kMost_s) return nanoseconds(*seconds);
+  return RowFault{ReaderFault::kMalformedRow,
+                  readable(row.fields[0], 40) + " is no time in seconds"};
 }
 
 std::vector<bool> in_order(const std::vector<Stamp>& stamps, const std::vector<int>& lines,

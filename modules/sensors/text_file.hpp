@@ -34,14 +34,20 @@ template <typename Value>
 struct StampedRow {
   Stamp stamp = 0;
   int line = 0;
+  int index = 0;  ///< Number of rows before it; faulty rows count, blank lines do not.
   Value value;
 };
 
-/// Rows of `text` without the header, which is a first row that starts with a letter.
+/// Rows of `text` without the header, which is a first row that starts with a letter and not with a
+/// number ("nan").
 [[nodiscard]] std::vector<TextRow> rows_below_header(const std::string& text);
 
 /// The stamp [ns] at the start of a row; a fault unless the row has at least `fields` fields.
 [[nodiscard]] std::variant<Stamp, RowFault> stamp_of(const TextRow& row, std::size_t fields);
+
+/// The time [s] at the start of a row; a fault unless the row has at least `fields` fields.
+[[nodiscard]] std::variant<Stamp, RowFault> stamp_of_seconds(const TextRow& row,
+                                                             std::size_t fields);
 
 /// True for each valid stamp (see judge_stamps()). Invalid stamps are counted in `report`, with
 /// `file` and their `lines`.
@@ -63,7 +69,8 @@ template <typename Value, typename Parse>
   std::vector<StampedRow<Value>> rows;
   std::vector<Stamp> stamps;
   std::vector<int> lines;
-  for (const TextRow& row : rows_below_header(text)) {
+  for (int index = -1; const TextRow& row : rows_below_header(text)) {
+    ++index;
     const auto count = [&](const RowFault& fault) {
       faults.add(fault.fault, at_line(file, row.line) + ": " + fault.why);
     };
@@ -79,7 +86,7 @@ template <typename Value, typename Parse>
     }
     stamps.push_back(std::get<Stamp>(stamp));
     lines.push_back(row.line);
-    rows.push_back({stamps.back(), row.line, std::get<Value>(std::move(value))});
+    rows.push_back({stamps.back(), row.line, index, std::get<Value>(std::move(value))});
   }
   const std::vector<bool> counts = in_order(stamps, lines, file, faults);
   std::size_t row = 0;
