@@ -7,7 +7,7 @@
 
 #include "apps/doctor/network_facts.hpp"
 #include "modules/diagnosis/examination.hpp"
-#include "runtime/dds/participant.hpp"
+#include "test/support/process.hpp"
 
 namespace km {
 namespace {
@@ -145,10 +145,11 @@ TEST_CASE("The doctor finds a robot on its domain, and its address on another on
   config.domain = static_cast<int>(device() % 90);
   config.team = "test-" + std::to_string(device());
   config.interface = "lo";
-  config.spdp_interval_s = 0.2;
-  const DdsParticipant alice(config, {.robot = 7, .name = "alice", .boot = random_boot_id()});
-  const std::string found = GENERATE("alice (id 7)", "warning network.other_domain");
-  if (found != "alice (id 7)") ++config.domain;
+  const Process peer({KM_BIN_DIR "/test_dds_peer", "7", "", "dds.team=" + config.team,
+                      "dds.domain=" + std::to_string(config.domain), "dds.interface=lo",
+                      "dds.spdp_interval_s=0.2"});
+  const std::string found = GENERATE("(id 7)", "warning network.other_domain");
+  if (found != "(id 7)") ++config.domain;
   const auto text = [&] {
     const NetworkFacts facts = probe_network(config, 0.5, [](std::string_view, double) {});
     return ids_of(facts) + to_text(examine_network(facts).figures);
