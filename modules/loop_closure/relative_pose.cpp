@@ -126,7 +126,6 @@ class ThreePointProblem {
     }
   }
 
-  std::size_t size() const { return pairs_.size(); }
   std::size_t drawable() const { return solid_.size(); }
 
   std::optional<SE3> solve(std::span<const std::size_t> sample) const {
@@ -152,11 +151,6 @@ class ThreePointProblem {
     const bool is_outlier = a.has_depth ? is_outlier_along_an_axis(T_a_b.inverse(), a, b)
                                         : is_outlier_along_an_axis(T_a_b, b, a);
     return is_outlier ? kOutlier : pair_error(T_a_b, pairs_[i]).relative();
-  }
-
-  std::optional<SE3> polish(const SE3& T_a_b, std::span<const std::size_t> inliers) const {
-    const std::optional<PoseFit> fit = refine_pose(T_a_b, pairs_, inliers, kPolishSteps);
-    return fit ? std::optional(fit->T_a_b) : std::nullopt;
   }
 
  private:
@@ -320,7 +314,7 @@ RansacResult ransac_pose(std::span<const ImagePair> pairs, const RansacOptions& 
                          std::mt19937& rng) {
   const ThreePointProblem problem(pairs);
   RansacResult best;
-  const std::size_t n = problem.size();
+  const std::size_t n = pairs.size();
   const std::size_t drawable = problem.drawable();
   if (drawable < ThreePointProblem::kSampleSize) return best;
 
@@ -350,8 +344,8 @@ RansacResult ransac_pose(std::span<const ImagePair> pairs, const RansacOptions& 
     }
     const std::optional<SE3> T_a_b = problem.solve(sample);
     if (!T_a_b || !consider(*T_a_b)) continue;
-    const std::optional<SE3> polished = problem.polish(*best.T_a_b, best.inliers);
-    if (polished) consider(*polished);
+    const auto polished = refine_pose(*best.T_a_b, pairs, best.inliers, kPolishSteps);
+    if (polished) consider(polished->T_a_b);
     const double share = static_cast<double>(best.inliers.size()) / static_cast<double>(n);
     const double clean = std::pow(share, static_cast<double>(sample.size()));
     const double adapted =

@@ -96,14 +96,6 @@ TEST_CASE("refinement reaches the truth of points without noise", "[relative_pos
   CHECK(se3_log(T_a_b.inverse() * fit->T_a_b).norm() < 1e-6);  // keypoints are floats
 }
 
-TEST_CASE("two pairs do not determine a pose", "[relative_pose]") {
-  std::mt19937 rng(1);
-  const KeyframePair keyframes = make_keyframe_pair(rng, 2, {}, 0.0);
-  const std::vector<ImagePair> pairs = image_pairs(keyframes, {});
-  const std::vector<std::size_t> one = {0};
-  CHECK_FALSE(refine_pose(camera_pose(keyframes), pairs, one, 5));
-}
-
 TEST_CASE("RANSAC finds the pose and the inliers among 70 % outliers", "[relative_pose]") {
   const auto seed = GENERATE(range(1U, 6U));
   CAPTURE(seed);

@@ -149,18 +149,6 @@ TEST_CASE("The keyframes of a restarted peer are searched again and those of a r
   if (restarted) CHECK(robot.candidates.received[1].match == KeyframeId{kSelf, 1});
 }
 
-TEST_CASE("A return to a place after the gap is a candidate inside one robot",
-          "[place_recognition][node]") {
-  Robot robot(kSelf);  // the gap is 20 keyframes
-  robot.node.step(keyframe({kSelf, 0}, {1, 2, 3, 4}));
-  for (std::uint32_t i = 1; i < 20; ++i) robot.node.step(keyframe({kSelf, i}, {50, 51, 4, 5}));
-  CHECK(robot.candidates.received.empty());
-  robot.node.step(keyframe({kSelf, 20}, {1, 2, 3, 4}));
-  REQUIRE(robot.candidates.received.size() == 1);
-  CHECK(robot.candidates.received[0].query == KeyframeId{kSelf, 20});
-  CHECK(robot.candidates.received[0].match == KeyframeId{kSelf, 0});
-}
-
 // A keyframe of one place, whose depth is known.
 Keyframe view(KeyframeIndex index) {
   Keyframe result = keyframe({kSelf, index}, {1, 2, 3, 4}, 10.0);
