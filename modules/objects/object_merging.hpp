@@ -8,7 +8,7 @@
 namespace km {
 
 /// True if two objects are copies or parts of one: same layer and class, and overlapping boxes (see
-/// ObjectsConfig::merge_overlap).
+/// kMergeOverlap in the source).
 [[nodiscard]] bool are_same(const MapObject& a, const MapObject& b, const ObjectsConfig& config);
 
 /// Replaces objects that are the same by one, until no two are. The box of the result contains the

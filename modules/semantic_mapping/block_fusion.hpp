@@ -16,7 +16,7 @@ namespace km {
 /// Blocks in which a depth view shows surface, including those for which the map has no room.
 struct NearBlocks {
   std::vector<VoxelBlock*> blocks;
-  std::size_t refused = 0;    ///< Requests for a block beyond `max_blocks` or BlockMap::kReach.
+  std::size_t refused = 0;  ///< Requests for a block beyond `max_blocks` or BlockMap::kReach.
 };
 
 /// The blocks within kNearVoxels of the surface, found by a subsample of the pixels about one voxel
@@ -76,7 +76,7 @@ class BlockFusion {
   Eigen::Matrix3f step_;    // columns: M times one voxel along x, y, z
   double block_m_;
   float truncation_, voxel_, near_, closest_, max_weight_;
-  float variance_, quadratic_variance_;  // depth_sigma_m^2, depth_sigma_per_m^2
+  float variance_, quadratic_variance_;  // kDepthSigma_m^2, depth_sigma_per_m^2
 };
 
 }  // namespace km

@@ -80,9 +80,8 @@ void Map2dNode::make_map() {
   next_s_ = end_s + std::max(kPeriod_s, (end_s - start_s) * (1.0 - kShare) / kShare);
   if (result.status == Map2dStatus::kTooLarge)
     log::limited(log::Level::kWarn, name(), "too large")
-        << "no 2D map: it needs " << fixed(result.cells_needed, 0)
-        << " cells, more than max_cells (" << kMaxMap2dCells
-        << "); raise map_2d.max_cells or map_2d.resolution_m";
+        << "no 2D map: it needs " << fixed(result.cells_needed, 0) << " cells, more than "
+        << kMaxMap2dCells << "; raise map_2d.resolution_m";
   if (result.status != Map2dStatus::kMade) return;
   log::debug(name()) << result.grid.width << " x " << result.grid.height << " cells from "
                      << views_.size() << " images in " << fixed(end_s - start_s, 3) << " s";
