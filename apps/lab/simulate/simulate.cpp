@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <cmath>
 #include <exception>
 #include <functional>
@@ -339,15 +340,24 @@ class Simulation {
   }
 
   void record_frames() const {
-    constexpr std::size_t kReports = 10;
-    std::mutex mutex;
+    using Clock = std::chrono::steady_clock;
+    constexpr std::chrono::seconds kReportInterval(3);
+    const Clock::time_point start = Clock::now();
+    Clock::time_point reported = start;
+    std::mutex mutex;  // guards `reported` and `done`
     std::size_t done = 0;
-    run_parallel(options_.threads, frames_.size(), [&](std::size_t i) {
+    const std::size_t all = frames_.size();
+    run_parallel(options_.threads, all, [&](std::size_t i) {
       cameras_[frames_[i].robot]->record(frames_[i].index);
       const std::lock_guard lock(mutex);
-      ++done;
-      if (done * kReports / frames_.size() > (done - 1) * kReports / frames_.size())
-        std::cout << done << " of " << frames_.size() << " frames" << std::endl;
+      const Clock::time_point now = Clock::now();
+      if (++done < all && now - reported < kReportInterval) return;
+      reported = now;
+      std::cout << done << " of " << all << " frames, " << 100 * done / all << " %";
+      const auto rest = (now - start) * (all - done) / done;
+      if (done < all)
+        std::cout << ", " << std::chrono::ceil<std::chrono::seconds>(rest).count() << " s left";
+      std::cout << std::endl;
     });
   }
 

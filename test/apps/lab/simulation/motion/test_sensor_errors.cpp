@@ -70,7 +70,7 @@ TEST_CASE("Biases drift with the sensor's temperature, and the truth has their v
   config.warm_gyro_rps = 0.01;
   config.warm_accel_mps2 = 0.1;
   const auto samples =
-      simulate_imu(Turntable(0.0, 120.0), kClockStart, ideal_with(draw_inertial_errors(config, 5)));
+      simulate_imu(Turntable(0.0, 120.5), kClockStart, ideal_with(draw_inertial_errors(config, 5)));
   for (const int seconds : {0, 60, 120}) {
     CAPTURE(seconds);
     const SimulatedImu& at = samples.at(static_cast<std::size_t>(200 * seconds));
