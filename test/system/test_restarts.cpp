@@ -25,7 +25,7 @@ TEST_CASE(
     "A robot that is killed and restarted joins its team again, with its new incarnation only",
     "[system]") {
   const RobotId killed = GENERATE(RobotId{0}, RobotId{1});
-  const bool is_elsewhere = killed == 0;  // where the new incarnation begins
+  const bool is_elsewhere = killed == 0;  // the new incarnation begins at another place
   const std::uint32_t killed_at = is_elsewhere ? 62 : 54;
   CAPTURE(killed);
   const TemporaryFolder folder;

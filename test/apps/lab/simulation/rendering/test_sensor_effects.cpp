@@ -186,7 +186,7 @@ TEST_CASE("A rolling shutter shears a vertical edge by rate * focal length * tim
   const double shear_px = rate_rps * camera.fx * config.rolling_shutter_s / camera.height;
   for (const int row : {5, 20, 60, 75}) {
     CAPTURE(row, rate_rps);
-    // The five samples of a pixel (0, 1/8 and 3/8 px from its centre on both sides) count an edge
+    // A pixel has five samples, 0, 1/8 and 3/8 px from its centre on both sides. They count an edge
     // with an error of at most 0.175 px; the tangent of 0.03 rad adds 0.001 px.
     CHECK(edge_px(view, row) == Approx(60.0 + shear_px * (row + 0.5 - 40.0)).margin(0.18));
   }
