@@ -18,7 +18,7 @@ inline std::vector<StereoPairFile> list_keyframe_pairs(const std::filesystem::pa
     return Files(folder / row.fields[1], folder / row.fields[2]);
   };
   std::vector<StereoPairFile> pairs;
-  for (const auto& [stamp, line, files] :
+  for (const auto& [stamp, line, index, files] :
        read_ordered_rows<Files>(folder / "pairs.csv", 3, "lists no stereo pair", report, files_of))
     pairs.push_back({stamp, files.first, files.second, line, {}, {}});
   return pairs;

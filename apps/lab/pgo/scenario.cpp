@@ -185,7 +185,7 @@ NoiseSigma sigma_of(const Precision& precision, int dimension) {
           std::sqrt(1.0 / precision.tau)};
 }
 
-Precision precision_of(const NoiseSigma& sigma, int dimension) {
+Precision precision_of_noise(const NoiseSigma& sigma, int dimension) {
   return {(dimension == 2 ? 1.0 : 0.5) / (sigma.rotation_rad * sigma.rotation_rad),
           1.0 / (sigma.translation_m * sigma.translation_m)};
 }
@@ -242,7 +242,7 @@ void measure(ScenarioGraph& drawn, const Scenario& scenario, std::mt19937& rng) 
     const SE3 T_i_j = drawn.truth[static_cast<std::size_t>(e.i)].inverse() *
                       drawn.truth[static_cast<std::size_t>(e.j)];
     e.T_i_j = moved_by(T_i_j, errors, claimed);
-    const Precision claims = precision_of(claimed, graph.dimension);
+    const Precision claims = precision_of_noise(claimed, graph.dimension);
     e.kappa = claims.kappa;
     e.tau = claims.tau;
     constexpr double kExact = 1e-12;  // lower bound, because a variance of 0 has no finite weight
@@ -253,7 +253,7 @@ void measure(ScenarioGraph& drawn, const Scenario& scenario, std::mt19937& rng) 
 
 // Claim of a false closure: that of the scenario, or else that of the first true closure.
 Precision closure_claims(const TeamGraph& graph, const Scenario& scenario) {
-  if (scenario.closure_sigma) return precision_of(*scenario.closure_sigma, graph.dimension);
+  if (scenario.closure_sigma) return precision_of_noise(*scenario.closure_sigma, graph.dimension);
   const std::vector<bool> odometry = odometry_edges(graph);
   const auto closure = std::ranges::find(odometry, false);
   if (closure == odometry.end())
