@@ -341,28 +341,6 @@ TEST_CASE("The robots' sessions stand noise and places that are not as claimed",
   CHECK(robots.rms_m <= row.most_ratio * study.results.at(1).rms_m);
 }
 
-TEST_CASE("Many false closures that agree cost less than twice the rounds of few", "[scenario]") {
-  const auto file = shared_data("pose_graphs/3d/parking-garage.g2o");
-  if (!file) return;
-  const TeamGraph garage = partition_contiguously(read_g2o(*file), 1, "parking-garage");
-  // The sum of three seeds, because a single team may need one more session than another.
-  const auto rounds = [&](std::size_t size) {
-    const Scenario scenario{.robots = 3, .clusters = {.places = 5, .size = size}};
-    std::size_t sum = 0;
-    for (const OutlierResult& result :
-         run_outlier_study(garage,
-                           {.scenario = scenario, .methods = {"newton"}, .seeds = {1, 2, 3}}, {})
-             .results) {
-      CHECK(result.false_kept == 0);
-      sum += result.rounds;
-    }
-    return sum;
-  };
-  const std::size_t few = rounds(2), many = rounds(10);
-  CAPTURE(few, many);
-  CHECK(many < 2 * few);
-}
-
 TEST_CASE("Odometry that is 20 times as noisy as it claims costs no true closure", "[scenario]") {
   const auto file = shared_data("pose_graphs/3d/sphere2500.g2o");
   if (!file) return;
