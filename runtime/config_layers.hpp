@@ -17,7 +17,7 @@ namespace km {
 ///
 ///     ConfigLayers layers;
 ///     layers.add_file("config/robot.yaml");
-///     layers.add_override("tracker.max_features=300");
+///     layers.add_override("vio.gyro_noise_factor=16");
 ///     const auto vio = layers.load<VioConfig>();
 ///     const auto pcm = layers.load<PcmConfig>();
 ///     layers.finish();
