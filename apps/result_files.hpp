@@ -99,12 +99,13 @@ inline constexpr const char* kTrajectoryRoom = ".room_for_trajectories";
 inline constexpr const char* kSummaryRoom = ".room_for_summary";
 
 /// Throws std::runtime_error if `folder` has neither summary nor journal, but a file with the name
-/// of a result: no run has written this file, so none may replace it.
+/// of a result: no run has written this file, so none may replace it. Empty files may go.
 inline void expect_no_other_files(const std::filesystem::path& folder) {
   if (is_file(folder / kSummary) || is_file(folder / kJournal)) return;
   for (const std::string file : kResultFiles)
     // A run that has just begun has this file before its journal.
-    if (file != "config.yaml" && is_file(folder / file))
+    if (file != "config.yaml" && is_file(folder / file) &&
+        !std::filesystem::is_empty(folder / file))
       throw std::runtime_error(
           (folder / file).string() +
           ": would be replaced, and is of no run, because the folder has neither " + kSummary +

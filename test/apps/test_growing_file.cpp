@@ -2,6 +2,7 @@
 #include <filesystem>
 #include <string>
 
+#include "apps/result_files.hpp"
 #include "apps/robot/growing_file.hpp"
 #include "test/support/captured_log.hpp"
 #include "test/support/temporary_folder.hpp"
@@ -107,4 +108,14 @@ TEST_CASE("A file that is missing, or incomplete in its first row, begins from s
 }
 
 }  // namespace
+TEST_CASE("Results replace an empty file of no run, and no other", "[result_files]") {
+  const TemporaryFolder folder;
+  folder.write("traffic.csv", "");  // as one who watches the file creates it before the run
+  CHECK_NOTHROW(expect_no_other_files(folder.path()));
+  folder.write("traffic.csv", "mine");
+  CHECK_THROWS_WITH(remove_results(folder.path()),
+                    Catch::Contains("traffic.csv: would be replaced"));
+  CHECK(folder.read("traffic.csv") == "mine");
+}
+
 }  // namespace km
