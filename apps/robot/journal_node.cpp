@@ -1,6 +1,5 @@
 #include "apps/robot/journal_node.hpp"
 
-#include <chrono>
 #include <stdexcept>
 
 #include "modules/core/input_file.hpp"
@@ -12,7 +11,7 @@ namespace {
 // Long enough that a disk which stalls for a minute blocks no node.
 constexpr std::size_t kJournalQueue = 16384;
 // Keyframes wait for the sync, so it comes soon, but rarely enough for flash memory.
-constexpr std::chrono::milliseconds kSyncPeriod{500};
+constexpr double kSyncPeriod_s = 0.5;
 
 JournalFile begin_or_go_on(const std::filesystem::path& file, const RestoredRun* restored) {
   return restored == nullptr ? JournalFile(file) : JournalFile(file, restored->journal);
@@ -23,46 +22,34 @@ JournalFile begin_or_go_on(const std::filesystem::path& file, const RestoredRun*
 JournalNode::JournalNode(std::filesystem::path file, ResultWriter& results,
                          const JournalStart& start, const RestoredRun* restored,
                          const CameraCalibration& correction, const JournalTopics& topics)
-    : file_(std::move(file)),
+    // Disks that spin up or wait for other requests take long.
+    : WorkerNode({.name = "journal",
+                  .queue = kJournalQueue,
+                  .tick_s = kSyncPeriod_s,
+                  .step_limit_s = 120.0}),
+      file_(std::move(file)),
       results_(results),
       correction_(correction),
       topics_(topics),
       journal_(begin_or_go_on(file_, restored)),
-      known_keyframes_(restored == nullptr ? 0 : restored->keyframes.size()),
-      worker_(
-          kJournalQueue, Overflow::kBlock,
-          [this](const Input& input) {
-            std::visit([this](const auto& message) { step(message); }, input);
-          },
-          "journal", kSyncPeriod, [] { return Tick(); }) {
+      known_keyframes_(restored == nullptr ? 0 : restored->keyframes.size()) {
   if (restored != nullptr) {
     for (const Closure& closure : restored->closures)
       known_closures_.emplace(closure.from.id, closure.to.id);
     places_ = restored->places;
   }
   for (int copy = 0; copy < 2; ++copy) add(start);  // nothing can be restored without it
-  const auto post = [this](const auto& message) { worker_.post(message); };
-  topics.states.subscribe(post);
-  topics.odometry.subscribe(post);
+  follow(topics.states, topics.odometry, topics.new_closures, topics.new_restarts, topics.outcomes);
   topics.new_keyframes.subscribe([this](const auto& keyframe) {
     ++new_keyframes_;
-    worker_.post(keyframe);
+    post(keyframe);
   });
-  topics.new_closures.subscribe(post);
-  topics.new_restarts.subscribe(post);
-  topics.peer_closures.subscribe([this](const auto& closure) { worker_.post(FromPeer{closure}); });
-  topics.outcomes.subscribe(post);
-  if (restored == nullptr) topics.restored_outcomes.subscribe(post);
+  topics.peer_closures.subscribe([this](const auto& closure) { post(ClosureFromPeer{closure}); });
+  if (restored == nullptr) follow(topics.restored_outcomes);
   topics.peer_events.subscribe([this](const auto& event) {
     using enum PeerEventKind;
-    if (event->kind == kJoined || event->kind == kReported || event->kind == kResumed)
-      worker_.post(event);
+    if (event->kind == kJoined || event->kind == kReported || event->kind == kResumed) post(event);
   });
-}
-
-void JournalNode::stop() noexcept {
-  worker_.stop();
-  if (worker_.error() == nullptr) step(Tick());
 }
 
 std::optional<JournalPlace> JournalNode::add(const JournalEntry& entry) {
@@ -93,7 +80,7 @@ std::shared_ptr<const Keyframe> JournalNode::recall(KeyframeIndex keyframe) cons
   }
 }
 
-void JournalNode::step(Tick /*tick*/) {
+void JournalNode::step(const Tick& /*tick*/) {
   if (collect())
     results_.append(file_, [this](const auto& file) {
       do journal_.write();
@@ -139,7 +126,7 @@ void JournalNode::step(const Message<Closure>& closure) {
   held_back_.push_back(closure);
 }
 
-void JournalNode::step(const FromPeer& from_peer) {
+void JournalNode::step(const ClosureFromPeer& from_peer) {
   const Closure& closure = *from_peer.closure;
   if (known_closures_.emplace(closure.from.id, closure.to.id).second) add(closure);
 }

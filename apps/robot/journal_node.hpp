@@ -2,13 +2,11 @@
 
 #include <atomic>
 #include <cstddef>
-#include <exception>
 #include <filesystem>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <set>
-#include <string_view>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -20,9 +18,7 @@
 #include "modules/journal/journal_file.hpp"
 #include "modules/journal/restored_run.hpp"
 #include "runtime/dds/peer_table.hpp"
-#include "runtime/node.hpp"
-#include "runtime/ticking_worker.hpp"
-#include "runtime/topic.hpp"
+#include "runtime/worker_node.hpp"
 
 namespace km {
 
@@ -44,12 +40,20 @@ struct JournalTopics {
   Out<PeerEvent> restarts;
 };
 
+struct ClosureFromPeer {
+  Topic<Closure>::Message closure;
+};
+using JournalInput =
+    std::variant<Tick, Topic<OdometryState>::Message, Topic<KeyframeOdometry>::Message,
+                 Topic<Keyframe>::Message, Topic<Closure>::Message, ClosureFromPeer,
+                 Topic<ClosureOutcome>::Message, Topic<PeerEvent>::Message>;
+
 /// Writes the events of the run to the disk, several times a second, so that they survive a crash
 /// of the machine. Keyframes and closures are published only after they are written. Everything
 /// that other robots receive can therefore be restored: an index always stands for one keyframe,
 /// and both robots of a closure know the same measurement. If the disk is full or fails, all
 /// messages are published, the failure is reported, and the run continues.
-class JournalNode final : public Node {
+class JournalNode final : public WorkerNode<JournalInput> {
  public:
   /// Continues the journal of `restored`, or begins a new one. `results` outlives this. The
   /// estimated camera calibration is composed with `correction`, the correction already applied to
@@ -73,33 +77,21 @@ class JournalNode final : public Node {
   /// True while a keyframe waits until it is on the disk. Thread-safe.
   [[nodiscard]] bool holds_back() const { return new_keyframes_ > 0; }
 
-  std::string_view name() const override { return "journal"; }
-  void start() override { worker_.start(); }
-  /// Writes the remaining entries.
-  void stop() noexcept override;
-  std::exception_ptr error() const override { return worker_.error(); }
-  std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
-  /// Disks that spin up or wait for other requests take long.
-  double step_limit_s() const override { return 120.0; }
-  DurationHistogram timing() const override { return worker_.timing(); }
-
  private:
-  struct Tick {};
   template <typename T>
   using Message = typename Topic<T>::Message;
-  struct FromPeer {
-    Message<Closure> closure;
-  };
   using HeldBack = std::variant<Message<Keyframe>, Message<Closure>, Message<PeerEvent>>;
-  using Input =
-      std::variant<Tick, Message<OdometryState>, Message<KeyframeOdometry>, Message<Keyframe>,
-                   Message<Closure>, FromPeer, Message<ClosureOutcome>, Message<PeerEvent>>;
 
-  void step(Tick tick);
+  void handle(const Input& input) override {
+    std::visit([this](const auto& message) { step(message); }, input);
+  }
+  /// Writes the remaining entries.
+  void conclude() override { write(); }
+  void step(const Tick& tick);
   void step(const Message<OdometryState>& state);
   void step(const Message<KeyframeOdometry>& odometry);
   void step(const Message<Keyframe>& keyframe);
-  void step(const FromPeer& closure);
+  void step(const ClosureFromPeer& closure);
   void step(const Message<Closure>& closure);
   void step(const Message<ClosureOutcome>& outcome);
   void step(const Message<PeerEvent>& event);
@@ -122,7 +114,6 @@ class JournalNode final : public Node {
   mutable std::mutex mutex_;  // guards places_, and journal_ except for its write()
   std::vector<JournalPlace>
       places_;  // places of keyframes 0, 1, ..., up to the first that is not on the disk
-  TickingWorker<Input> worker_;
 };
 
 }  // namespace km

@@ -11,33 +11,32 @@
 namespace km {
 namespace {
 
-// The newest message of each kind is kept beside the queue, so one queued News stands for all.
+// The newest message of each kind is kept beside the queue, so one queued tick stands for all.
 constexpr std::size_t kMeshQueue = 1;
 
 }  // namespace
 
 MeshFilesNode::MeshFilesNode(std::filesystem::path folder, ResultWriter& results,
                              const MeshFilesTopics& topics)
-    : folder_(std::move(folder)),
-      results_(results),
-      worker_(
-          kMeshQueue, Overflow::kDropOldest,
-          [this](const News&) {
-            work_in_background();
-            take_latest();
-          },
-          "mesh_files") {
+    // A disk may stall for long, and no other thread waits for this node.
+    : WorkerNode({.name = "mesh_files",
+                  .queue = kMeshQueue,
+                  .overflow = Overflow::kDropOldest,
+                  .in_background = true,
+                  .step_limit_s = 300.0}),
+      folder_(std::move(folder)),
+      results_(results) {
   topics.keyframes.subscribe([this](const auto& keyframe) {
     if (keyframe->id.index == 0) first_keyframe_.put(keyframe);
   });
   topics.trajectory.subscribe([this](const auto& trajectory) { trajectory_.put(trajectory); });
-  follow(topics.maps, latest_map_);
-  follow(topics.optimized, optimized_);
-  follow(topics.maps_2d, map_2d_);
-  follow(topics.slices, slice_);
+  keep_newest(topics.maps, latest_map_);
+  keep_newest(topics.optimized, optimized_);
+  keep_newest(topics.maps_2d, map_2d_);
+  keep_newest(topics.slices, slice_);
 }
 
-void MeshFilesNode::take_latest() {
+void MeshFilesNode::handle(const Tick& /*tick*/) {
   if (const auto keyframe = first_keyframe_.take()) step(*keyframe);
   if (const auto trajectory = trajectory_.take()) step(*trajectory);
   if (const auto map = latest_map_.take()) {

@@ -1,11 +1,8 @@
 #pragma once
 
-#include <exception>
 #include <filesystem>
 #include <memory>
 #include <optional>
-#include <string_view>
-#include <vector>
 
 #include "apps/result_writer.hpp"
 #include "modules/core/occupancy_grid.hpp"
@@ -15,9 +12,7 @@
 #include "modules/mesh/map_mesh.hpp"
 #include "modules/mesh_deformation/mesh_corrector.hpp"
 #include "runtime/latest.hpp"
-#include "runtime/node.hpp"
-#include "runtime/topic.hpp"
-#include "runtime/worker.hpp"
+#include "runtime/worker_node.hpp"
 
 namespace km {
 
@@ -38,20 +33,12 @@ struct MeshFilesTopics {
 /// the optimised keyframes, in the team's frame. map.pgm and map.yaml are the 2D map for map_server
 /// of Nav2, in the team's frame. distance_field.ply is the last slice of the distance field, in the
 /// odometry frame. run.map is the mapper's mesh for a process that resumes the run.
-class MeshFilesNode final : public Node {
+class MeshFilesNode final : public WorkerNode<Tick> {
  public:
   /// `results` outlives this and records meshes that could not be written. Such a failure does not
   /// end the node.
   MeshFilesNode(std::filesystem::path folder, ResultWriter& results, const MeshFilesTopics& topics);
-
-  std::string_view name() const override { return "mesh_files"; }
-  void start() override { worker_.start(); }
-  void stop() noexcept override { worker_.stop(); }
-  std::exception_ptr error() const override { return worker_.error(); }
-  std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
-  /// A disk may stall for long, and no other thread waits for this node.
-  double step_limit_s() const override { return 300.0; }
-  DurationHistogram timing() const override { return worker_.timing(); }
+  ~MeshFilesNode() override { stop(); }
 
   /// Handles one input synchronously. The thread calls these functions; tests can call them too.
   void step(const KeyframeOdometry& keyframe);
@@ -65,16 +52,16 @@ class MeshFilesNode final : public Node {
   void finish(const std::optional<Trajectory>& trajectory);
 
  private:
-  struct News {};  // at least one of the newest messages has changed
+  // A tick states that at least one of the newest messages has changed.
+  void handle(const Tick& tick) override;
 
   template <typename T>
-  void follow(In<T> topic, Latest<T>& newest) {
+  void keep_newest(In<T> topic, Latest<T>& newest) {
     topic.subscribe([this, &newest](const std::shared_ptr<const T>& message) {
       newest.put(message);
-      worker_.post(News());
+      post(Tick());
     });
   }
-  void take_latest();
   void write_map(const LabelledMesh& map);
 
   const std::filesystem::path folder_;
@@ -88,7 +75,6 @@ class MeshFilesNode final : public Node {
   Latest<OptimizedMesh> optimized_;
   Latest<OccupancyGrid> map_2d_;
   Latest<DistanceSlice> slice_;
-  Worker<News> worker_;  // last member: stops first
 };
 
 }  // namespace km

@@ -256,18 +256,11 @@ std::map<RobotId, ClosureTally> RunRecord::closure_tallies() const {
 }
 
 RecorderNode::RecorderNode(RobotId robot, std::function<void(JournalEntry)> publish)
-    : publish_(std::move(publish)),
-      record_(robot),
-      worker_(
-          kRecordQueue, Overflow::kBlock, [this](const Input& change) { apply(change); },
-          "recorder") {}
+    : WorkerNode({.name = "recorder", .queue = kRecordQueue}),
+      publish_(std::move(publish)),
+      record_(robot) {}
 
-void RecorderNode::stop() noexcept {
-  worker_.stop();
-  if (worker_.error() == nullptr) apply([this] { record_.state_poses(); });
-}
-
-void RecorderNode::apply(const Input& change) {
+void RecorderNode::handle(const Input& change) {
   std::vector<JournalEntry> events;
   {
     const std::lock_guard lock(mutex_);

@@ -2,14 +2,12 @@
 
 #include <atomic>
 #include <cstdint>
-#include <exception>
 #include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <set>
-#include <string_view>
 #include <vector>
 
 #include "apps/robot/run_findings.hpp"
@@ -29,9 +27,7 @@
 #include "modules/semantic_mapping/semantic_mapper.hpp"
 #include "modules/vio/vio_statistics.hpp"
 #include "runtime/dds/peer_table.hpp"
-#include "runtime/node.hpp"
-#include "runtime/topic.hpp"
-#include "runtime/worker.hpp"
+#include "runtime/worker_node.hpp"
 
 namespace km {
 
@@ -202,7 +198,7 @@ class RunRecord {
 
 /// Keeps what the other nodes publish, for the status line and the result files, and publishes the
 /// events of RunRecord.
-class RecorderNode final : public Node {
+class RecorderNode final : public WorkerNode<std::function<void()>> {
  public:
   /// `publish` is called on the recorder's thread, and by stop().
   RecorderNode(RobotId robot, std::function<void(JournalEntry)> publish);
@@ -216,7 +212,7 @@ class RecorderNode final : public Node {
   }
   template <typename T>
   void add(std::shared_ptr<const T> message) {
-    if (!frozen_) worker_.post([this, message] { record_.add(*message); });
+    if (!frozen_) this->post([this, message] { record_.add(*message); });
   }
 
   /// Later messages are not recorded: the results stay as they are when the robot leaves.
@@ -239,23 +235,16 @@ class RecorderNode final : public Node {
     return lock.owns_lock();
   }
 
-  std::string_view name() const override { return "recorder"; }
-  void start() override { worker_.start(); }
-  void stop() noexcept override;
-  std::exception_ptr error() const override { return worker_.error(); }
-  std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
-  DurationHistogram timing() const override { return worker_.timing(); }
-
  private:
-  using Input = std::function<void()>;
-
-  void apply(const Input& change);
+  void handle(const Input& change) override;
+  void conclude() override {
+    handle([this] { record_.state_poses(); });
+  }
 
   const std::function<void(JournalEntry)> publish_;
   mutable std::mutex mutex_;  // guards record_
   RunRecord record_;
   std::atomic<bool> frozen_ = false;
-  Worker<Input> worker_;  // last member: stops first
 };
 
 }  // namespace km

@@ -11,41 +11,34 @@
 #include <vector>
 
 #include "runtime/guarded_thread.hpp"
-#include "runtime/periodic.hpp"
 #include "runtime/supervisor.hpp"
-#include "runtime/worker.hpp"
+#include "runtime/worker_node.hpp"
 #include "test/support/captured_log.hpp"
 
 namespace km {
 namespace {
 
 // Notes when it is started and stopped; fails on demand.
-class ToyNode final : public Node {
+class ToyNode final : public WorkerNode<bool> {
  public:
   ToyNode(std::string name, std::vector<std::string>& diary)
-      : name_(std::move(name)), diary_(diary), worker_(4, Overflow::kBlock, [](bool fail) {
-          if (fail) throw std::runtime_error("the reason");
-        }) {}
+      : WorkerNode({.name = std::move(name), .queue = 4}), diary_(diary) {}
+  ~ToyNode() override { stop(); }
 
-  void post(bool fail) { worker_.post(fail); }
-
-  std::string_view name() const override { return name_; }
-  void start() override {
-    diary_.push_back("start " + name_);
-    worker_.start();
-  }
-  void stop() noexcept override {
-    if (worker_.error() == nullptr) diary_.push_back("stop " + name_);
-    worker_.stop();
-    pthread_sigmask(SIG_BLOCK, nullptr, &held_at_stop_);
-  }
+  void give(bool fail) { post(fail); }
   bool holds_at_stop(int signal) const { return sigismember(&held_at_stop_, signal) == 1; }
-  std::exception_ptr error() const override { return worker_.error(); }
 
  private:
-  std::string name_;
+  void handle(const bool& fail) override {
+    if (fail) throw std::runtime_error("the reason");
+  }
+  void start_sources() override { diary_.push_back("start " + std::string(name())); }
+  void conclude() override {
+    diary_.push_back("stop " + std::string(name()));
+    pthread_sigmask(SIG_BLOCK, nullptr, &held_at_stop_);
+  }
+
   std::vector<std::string>& diary_;
-  Worker<bool> worker_;
   sigset_t held_at_stop_{};
 };
 
@@ -70,42 +63,34 @@ TEST_CASE("Nodes are started sources last and stopped sources first", "[supervis
 }
 
 // A node with every kind of thread that a node may have; one of them fails.
-class ThreadsNode final : public Node {
+class ThreadsNode final : public WorkerNode<Tick> {
  public:
-  enum class Failing { kThread, kWorker, kPeriodic };
-  explicit ThreadsNode(Failing failing) : failing_(failing) {}
-
-  std::string_view name() const override { return "threads"; }
-  void start() override {
-    worker_.start();
-    ticks_.start();
-    receiver_.start("receiver", [this] { fail_if(Failing::kThread); });
-    worker_.post(0);
-  }
-  void stop() noexcept override {
-    receiver_.join();
-    ticks_.stop();
-    worker_.stop();
-  }
+  enum class Failing { kThread, kWorker };
+  explicit ThreadsNode(Failing failing)
+      : WorkerNode({.name = "threads", .tick_s = 1e-3}), failing_(failing) {}
+  ~ThreadsNode() override { stop(); }
   std::exception_ptr error() const override {
-    return first_of({worker_.error(), ticks_.error(), receiver_.error()});
+    return first_of({WorkerNode::error(), receiver_.error()});
   }
 
  private:
   void fail_if(Failing thread) const {
     if (failing_ == thread) throw std::runtime_error("the reason");
   }
+  void handle(const Tick& /*tick*/) override { fail_if(Failing::kWorker); }
+  void start_sources() override {
+    receiver_.start("receiver", [this] { fail_if(Failing::kThread); });
+  }
+  void stop_sources() noexcept override { receiver_.join(); }
 
   const Failing failing_;
   GuardedThread receiver_;
-  Periodic ticks_{std::chrono::milliseconds(1), [this] { fail_if(Failing::kPeriodic); }};
-  Worker<int> worker_{1, Overflow::kBlock, [this](int) { fail_if(Failing::kWorker); }};
 };
 
 TEST_CASE("An exception in any thread of a node ends the run with the name of the node",
           "[supervisor]") {
   using Failing = ThreadsNode::Failing;
-  const Failing failing = GENERATE(Failing::kThread, Failing::kWorker, Failing::kPeriodic);
+  const Failing failing = GENERATE(Failing::kThread, Failing::kWorker);
   Run run;
   run.supervisor.emplace<ThreadsNode>(failing);
   const RunResult result = run.supervisor.run([] { return false; }, 0.001);
@@ -120,50 +105,41 @@ TEST_CASE("A node that fails while it finishes its work is still reported", "[su
   auto& [log, diary, signals, supervisor] = run;
   ToyNode& node = supervisor.emplace<ToyNode>("odometry", diary);
   const RunResult result = supervisor.run([&] {
-    node.post(true);
+    node.give(true);
     return true;
   });
   REQUIRE(result.failure.has_value());
 }
 
 // Hangs in its first step until it is released.
-class HangingNode final : public Node {
+class HangingNode final : public WorkerNode<int> {
  public:
-  std::string_view name() const override { return "hanging"; }
-  void start() override { worker_.start(); }
-  void stop() noexcept override { worker_.stop(); }
-  std::exception_ptr error() const override { return worker_.error(); }
-  std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
-  double step_limit_s() const override { return 0.5; }
-
-  bool post() { return worker_.post(0); }
+  HangingNode() : WorkerNode({.name = "hanging", .step_limit_s = 0.5}) {}
+  ~HangingNode() override { stop(); }
+  bool give() { return post(0); }
   void release() { released_.set_value(); }
 
  private:
+  void handle(const int& /*input*/) override { released_.get_future().wait(); }
+
   std::promise<void> released_;
-  Worker<int> worker_{1, Overflow::kBlock, [this](int) { released_.get_future().wait(); }};
 };
 
-// Posts to a node without end.
-class FeedingNode final : public Node {
+// Posts to a node without end. Its limit would make it the first to be blamed.
+class FeedingNode final : public WorkerNode<int> {
  public:
-  explicit FeedingNode(HangingNode& next) : next_(next) {}
-  std::string_view name() const override { return "feeding"; }
-  void start() override {
-    worker_.start();
-    worker_.post(0);
-  }
-  void stop() noexcept override { worker_.stop(); }
-  std::exception_ptr error() const override { return worker_.error(); }
-  std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
-  double step_limit_s() const override { return 0.25; }  // it would be the first to be blamed
+  explicit FeedingNode(HangingNode& next)
+      : WorkerNode({.name = "feeding", .step_limit_s = 0.25}), next_(next) {}
+  ~FeedingNode() override { stop(); }
 
  private:
+  void handle(const int& /*input*/) override {
+    while (next_.give()) {
+    }
+  }
+  void start_sources() override { post(0); }
+
   HangingNode& next_;
-  Worker<int> worker_{1, Overflow::kBlock, [this](int) {
-                        while (next_.post()) {
-                        }
-                      }};
 };
 
 TEST_CASE("A node that hangs is abandoned and keeps no other from ending", "[supervisor]") {
@@ -189,7 +165,7 @@ TEST_CASE("A node that hangs does not keep a signal from ending the run", "[supe
   Run run;
   auto& [log, diary, signals, supervisor] = run;
   HangingNode& hanging = supervisor.emplace<HangingNode>();
-  hanging.post();
+  hanging.give();
   bool sent = false;
   const RunResult result = supervisor.run([&] {
     if (!std::exchange(sent, true)) kill(getpid(), SIGTERM);
@@ -206,7 +182,7 @@ TEST_CASE("Nodes are stopped during the run without waiting for them", "[supervi
   HangingNode& slow = supervisor.emplace<HangingNode>();
   ToyNode& after = supervisor.emplace<ToyNode>("after", diary);
   supervisor.emplace<ToyNode>("other", diary);
-  slow.post();
+  slow.give();
   bool asked = false;
   const RunResult result = supervisor.run(
       [&] {

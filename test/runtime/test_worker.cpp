@@ -14,9 +14,8 @@
 #include "runtime/bounded_queue.hpp"
 #include "runtime/latest.hpp"
 #include "runtime/thread.hpp"
-#include "runtime/ticking_worker.hpp"
 #include "runtime/topic.hpp"
-#include "runtime/worker.hpp"
+#include "runtime/worker_node.hpp"
 
 namespace km {
 namespace {
@@ -33,26 +32,55 @@ TEST_CASE("A worker handles everything posted, in order, before stop returns", "
   CHECK(worker.error() == nullptr);
 }
 
-TEST_CASE("A worker with ticks stops after its clock, so that a waiting tick is handled",
+// A node with a clock, whose first step waits until it is released.
+class ToyWorkerNode final : public WorkerNode<Tick> {
+ public:
+  ToyWorkerNode(std::vector<std::string>& diary, bool fails)
+      : WorkerNode({.name = "toy", .queue = 1, .tick_s = 1e-4, .step_limit_s = 7.0}),
+        diary_(diary),
+        fails_(fails) {}
+  ~ToyWorkerNode() override { stop(); }
+  void release() { released_.set_value(); }
+  [[nodiscard]] int handled() const { return handled_; }
+  using WorkerNode::load;
+
+ private:
+  void handle(const Tick& /*tick*/) override {
+    if (handled_++ == 0) released_.get_future().wait();
+    if (fails_) throw std::runtime_error("no");
+  }
+  void start_sources() override { diary_.emplace_back("sources"); }
+  void stop_sources() noexcept override { diary_.emplace_back("no sources"); }
+  void conclude() override { diary_.emplace_back("end"); }
+
+  std::vector<std::string>& diary_;
+  const bool fails_;
+  std::promise<void> released_;
+  std::atomic<int> handled_ = 0;
+};
+
+TEST_CASE("A node ends its sources, then its clock and its worker, and concludes once",
           "[worker]") {
-  std::promise<void> release;
-  const std::shared_future<void> released(release.get_future());
-  std::atomic<int> made = 0, handled = 0;
-  TickingWorker<int> worker(
-      1, Overflow::kBlock,
-      [&](int) {
-        released.wait();
-        ++handled;
-      },
-      "ticking", std::chrono::microseconds(100), [&] { return ++made; });
-  worker.start();
-  while (made < 3) std::this_thread::yield();  // one is handled, one is queued, one waits for room
-  const auto stopped = std::async(std::launch::async, [&] { worker.stop(); });
-  CHECK(stopped.wait_for(std::chrono::milliseconds(50)) == std::future_status::timeout);
-  release.set_value();
-  stopped.wait();
-  CHECK(handled == made);
-  CHECK_FALSE(worker.post(0));
+  const bool fails = GENERATE(false, true);
+  std::vector<std::string> diary;
+  {
+    ToyWorkerNode node(diary, fails);
+    CHECK(node.name() == "toy");
+    CHECK(node.step_limit_s() == 7.0);
+    node.start();
+    while (node.handled() == 0 || node.load().size == 0) std::this_thread::yield();
+    const auto stopped = std::async(std::launch::async, [&] { node.stop(); });
+    CHECK(stopped.wait_for(std::chrono::milliseconds(50)) == std::future_status::timeout);
+    node.release();
+    stopped.wait();
+    CHECK((node.error() != nullptr) == fails);
+    CHECK((fails || node.handled() >= 2));  // the queued tick is handled
+    CHECK(node.heartbeats().size() == 1);
+    CHECK(node.timing().count() == static_cast<std::uint64_t>(node.handled()));
+  }
+  std::vector<std::string> expected{"sources", "no sources", "end", "no sources"};
+  if (fails) std::erase(expected, "end");
+  CHECK(diary == expected);
 }
 
 TEST_CASE("A worker that throws keeps the exception and releases the threads that wait for it",
@@ -78,25 +106,6 @@ TEST_CASE("The thread of a worker carries its name", "[worker]") {
   CHECK(std::string(name.data()) == "a name far too ");
 }
 
-TEST_CASE("A worker that never started stops", "[worker]") {
-  Worker<int> worker(1, Overflow::kBlock, [](int) {});
-  worker.post(0);
-  worker.stop();
-  CHECK(worker.error() == nullptr);
-}
-
-TEST_CASE("A topic hands one shared message to every subscriber, in order", "[topic]") {
-  Topic<int> topic;
-  std::vector<std::pair<int, const int*>> received;
-  topic.subscribe([&](const auto& message) { received.emplace_back(1, message.get()); });
-  topic.subscribe([&](const auto& message) { received.emplace_back(2, message.get()); });
-  topic.publish(7);
-  REQUIRE(received.size() == 2);
-  CHECK(received[0].first == 1);
-  CHECK(received[1].first == 2);
-  CHECK(received[0].second == received[1].second);
-}
-
 // A node can neither write its inputs nor confuse the channels from peers and to peers.
 static_assert(!std::is_convertible_v<In<int>, Out<int>>);
 static_assert(!std::is_convertible_v<Out<int>, In<int>>);
@@ -109,8 +118,10 @@ TEST_CASE("A message published through one handle of a topic arrives at another 
   std::vector<int> received;
   in.subscribe([&](const auto& message) { received.push_back(*message); });
   out.publish(7);
-  out.publish(std::make_shared<const int>(8));
-  CHECK(received == std::vector<int>{7, 8});
+  const auto shared = std::make_shared<const int>(8);
+  in.subscribe([&](const auto& message) { received.push_back(message == shared ? 9 : 0); });
+  out.publish(shared);
+  CHECK(received == std::vector<int>{7, 8, 9});
 }
 
 TEST_CASE("A queue returns its values in order, also after it is closed", "[queue]") {
@@ -160,33 +171,7 @@ TEST_CASE("Closing a queue releases the threads that wait for it", "[queue]") {
   CHECK_FALSE(pushed.get());
 }
 
-TEST_CASE("A queue without room is refused", "[queue]") {
-  CHECK_THROWS_AS(BoundedQueue<int>(0, Overflow::kBlock), std::invalid_argument);
-}
-
-TEST_CASE("The newest value is taken, and only once", "[runtime]") {
-  Latest<int> latest;
-  CHECK(latest.take() == nullptr);
-  const auto old = std::make_shared<const int>(1);
-  latest.put(old);
-  latest.put(std::make_shared<const int>(2));
-  CHECK(old.use_count() == 1);  // no former value is kept
-  const auto taken = latest.take();
-  REQUIRE(taken != nullptr);
-  CHECK(*taken == 2);
-  CHECK(latest.take() == nullptr);
-}
-
-TEST_CASE("After close() values are refused and the last one can still be taken", "[runtime]") {
-  Latest<int> latest;
-  latest.put(std::make_shared<const int>(1));
-  latest.close();
-  latest.put(std::make_shared<const int>(2));
-  CHECK(*latest.take() == 1);
-  CHECK(latest.take() == nullptr);
-}
-
-TEST_CASE("A taker sees increasingly newer values while others are put, and the last one",
+TEST_CASE("A taker sees increasingly newer values while others are put, and the last one once",
           "[runtime]") {
   constexpr int kLast = 10000;
   Latest<int> latest;
@@ -202,6 +187,11 @@ TEST_CASE("A taker sees increasingly newer values while others are put, and the 
     }
   putter.join();
   CHECK(ascending);
+  CHECK(latest.take() == nullptr);
+  latest.put(std::make_shared<const int>(1));
+  latest.close();
+  latest.put(std::make_shared<const int>(2));
+  CHECK(*latest.take() == 1);
 }
 
 int niceness() {

@@ -10,34 +10,27 @@ constexpr std::size_t kQueue = 4096;  // minutes of images
 }  // namespace
 
 FixesNode::FixesNode(FixInput input, const FixesTopics& topics)
-    : reader_(std::move(input.reader)),
+    : WorkerNode({.name = AbsoluteFixesConfig::kSection, .queue = kQueue}),
+      reader_(std::move(input.reader)),
       association_(Eigen::Vector3d(reader_.config().lever_arm_m.data()),
                    reader_.config().used_correlation_s(), input.recorded),
       live_(std::move(input.live)),
-      topics_(topics),
-      worker_(
-          kQueue, Overflow::kBlock, [this](const Input& received) { step(received); },
-          AbsoluteFixesConfig::kSection) {
-  const auto post = [this](const auto& message) { worker_.post(message); };
-  topics_.states.subscribe(post);
-  topics_.restored_states.subscribe(post);
-  topics_.keyframes.subscribe(post);
+      topics_(topics) {
+  follow(topics.states, topics.restored_states, topics.keyframes);
 }
 
-void FixesNode::start() {
-  worker_.start();
+void FixesNode::start_sources() {
   if (live_ != nullptr) receiver_.start("fixes_live", [this] { receive(); });
 }
 
-void FixesNode::stop() noexcept {
+void FixesNode::stop_sources() noexcept {
   if (live_ != nullptr) live_->stop();
   receiver_.join();
-  worker_.stop();
 }
 
 void FixesNode::receive() {
   while (auto message = live_->next())
-    worker_.post(std::make_shared<const BagMessage>(*std::move(message)));
+    post(std::make_shared<const BagMessage>(*std::move(message)));
 }
 
 void FixesNode::step(const Input& input) {

@@ -6,15 +6,12 @@
 #include <memory>
 #include <mutex>
 #include <optional>
-#include <string_view>
 #include <variant>
 #include <vector>
 
 #include "modules/absolute_fixes/fix_association.hpp"
 #include "runtime/guarded_thread.hpp"
-#include "runtime/node.hpp"
-#include "runtime/topic.hpp"
-#include "runtime/worker.hpp"
+#include "runtime/worker_node.hpp"
 
 namespace km {
 
@@ -37,22 +34,18 @@ struct FixesTopics {
 
 /// Measures keyframes by absolute fixes (FixAssociation), in a thread. A second thread waits for
 /// live fixes.
-class FixesNode final : public Node {
+class FixesNode final
+    : public WorkerNode<
+          std::variant<Topic<OdometryState>::Message, Topic<KeyframeOdometry>::Message,
+                       std::shared_ptr<const BagMessage>>> {
  public:
   FixesNode(FixInput input, const FixesTopics& topics);
   ~FixesNode() override { stop(); }
 
-  std::string_view name() const override { return AbsoluteFixesConfig::kSection; }
-  void start() override;
-  void stop() noexcept override;
   std::exception_ptr error() const override {
-    return first_of({worker_.error(), receiver_.error()});
+    return first_of({WorkerNode::error(), receiver_.error()});
   }
-  std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
-  DurationHistogram timing() const override { return worker_.timing(); }
 
-  using Input = std::variant<Topic<OdometryState>::Message, Topic<KeyframeOdometry>::Message,
-                             std::shared_ptr<const BagMessage>>;
   /// Handles one input synchronously. The thread calls only this function.
   void step(const Input& input);
 
@@ -61,6 +54,9 @@ class FixesNode final : public Node {
   [[nodiscard]] std::optional<GeodeticPoint> datum() const;
 
  private:
+  void handle(const Input& input) override { step(input); }
+  void start_sources() override;
+  void stop_sources() noexcept override;
   void receive();
 
   mutable std::mutex mutex_;  // guards reader_ and association_
@@ -69,7 +65,6 @@ class FixesNode final : public Node {
   std::unique_ptr<BagReader> live_;
   const FixesTopics topics_;
   GuardedThread receiver_;
-  Worker<Input> worker_;  // last member: stops first
 };
 
 }  // namespace km

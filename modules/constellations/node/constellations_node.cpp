@@ -6,7 +6,6 @@
 
 #include "runtime/clock.hpp"
 #include "runtime/log.hpp"
-#include "runtime/thread.hpp"
 
 namespace km {
 namespace {
@@ -28,25 +27,23 @@ std::string text_of(const ConstellationSearch::Counts& counts) {
 
 ConstellationsNode::ConstellationsNode(const ConstellationsConfig& config, RobotId self,
                                        const ConstellationsTopics& topics)
-    : found_(topics.found),
+    : WorkerNode({.name = ConstellationsConfig::kSection,
+                  .queue = kInputs,
+                  .tick_s = kMatchTick_s,
+                  .in_background = true}),
+      found_(topics.found),
       outcomes_(topics.outcomes),
-      search_(self, config),
-      worker_(
-          kInputs, Overflow::kBlock,
-          [this](const Input& input) {
-            work_in_background();
-            step(input, steady_now_s());
-          },
-          ConstellationsConfig::kSection, steady_duration(kMatchTick_s), [] { return Tick(); }) {
-  for (const In<RobotObjects>& objects : {topics.own_objects, topics.peer_objects})
-    objects.subscribe([this](const auto& message) { post(message); });
-  topics.closures.subscribe([this](const auto& closure) { post(closure); });
-  topics.restarts.subscribe([this](const auto& event) { post(event); });
+      search_(self, config) {
+  const auto queue = [this](const auto& message) { count_and_post(message); };
+  topics.own_objects.subscribe(queue);
+  topics.peer_objects.subscribe(queue);
+  topics.closures.subscribe(queue);
+  topics.restarts.subscribe(queue);
 }
 
-void ConstellationsNode::post(Input input) {
+void ConstellationsNode::count_and_post(Input input) {
   ++posted_;
-  worker_.post(std::move(input));
+  post(std::move(input));
 }
 
 void ConstellationsNode::step(const Input& input, double now_s) {

@@ -1,18 +1,13 @@
 #pragma once
 
 #include <atomic>
-#include <exception>
-#include <string_view>
 #include <variant>
-#include <vector>
 
 #include "modules/constellations/constellation_search.hpp"
 #include "modules/core/pose_graph.hpp"
 #include "modules/objects/map_object.hpp"
 #include "runtime/dds/peer_table.hpp"
-#include "runtime/node.hpp"
-#include "runtime/ticking_worker.hpp"
-#include "runtime/topic.hpp"
+#include "runtime/worker_node.hpp"
 
 namespace km {
 
@@ -28,33 +23,25 @@ struct ConstellationsTopics {
 
 /// Finds places in common with robots with higher ids by their objects. Runs a ConstellationSearch
 /// on a thread of its own, which takes less than a tenth of a processor.
-class ConstellationsNode final : public Node {
+class ConstellationsNode final
+    : public WorkerNode<std::variant<Tick, Topic<RobotObjects>::Message, Topic<Closure>::Message,
+                                     Topic<PeerEvent>::Message>> {
  public:
   /// Throws ConfigError if `config` is out of bounds.
   ConstellationsNode(const ConstellationsConfig& config, RobotId self,
                      const ConstellationsTopics& topics);
   ~ConstellationsNode() override { stop(); }
 
-  std::string_view name() const override { return ConstellationsConfig::kSection; }
-  void start() override { worker_.start(); }
-  void stop() noexcept override { worker_.stop(); }
-  std::exception_ptr error() const override { return worker_.error(); }
-  std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
-  DurationHistogram timing() const override { return worker_.timing(); }
-
   /// True if the objects and closures so far lead to no further closure. Thread-safe.
   [[nodiscard]] bool is_done() const { return handled_ == posted_ && search_done_; }
-
-  struct Tick {};
-  using Input = std::variant<Tick, Topic<RobotObjects>::Message, Topic<Closure>::Message,
-                             Topic<PeerEvent>::Message>;
 
   /// Handles one input synchronously at time `now_s`. The thread calls only this function; tests
   /// can call it too.
   void step(const Input& input, double now_s);
 
  private:
-  void post(Input input);
+  void handle(const Input& input) override { step(input, steady_now_s()); }
+  void count_and_post(Input input);
   void search(double now_s);
 
   const Out<Closure> found_;
@@ -63,7 +50,6 @@ class ConstellationsNode final : public Node {
   double next_s_ = 0.0;                                // time of the next match
   std::atomic<std::size_t> posted_ = 0, handled_ = 0;  // inputs, without ticks
   std::atomic<bool> search_done_ = true;
-  TickingWorker<Input> worker_;
 };
 
 }  // namespace km

@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "runtime/log.hpp"
-#include "runtime/thread.hpp"
 
 namespace km {
 namespace {
@@ -26,24 +25,19 @@ double interval_of(double rate_hz) {
 
 DenseSensingNode::DenseSensingNode(DenseSensor sensor, LabelsFrom labels, double rate_hz,
                                    Overflow overflow, const DenseSensingTopics& topics)
-    : sensor_(std::move(sensor)),
+    : WorkerNode({.name = "dense_sensing",
+                  .queue = kQueuedFrames,
+                  .overflow = overflow,
+                  .in_background = true}),
+      sensor_(std::move(sensor)),
       wants_labels_(labels != LabelsFrom::kNone),
       interval_s_(interval_of(rate_hz)),
-      topics_(topics),
-      worker_(
-          kQueuedFrames, overflow,
-          [this](const auto& located) {
-            work_in_background();
-            step(*located);
-          },
-          "dense_sensing") {
+      topics_(topics) {
   topics_.load.subscribe([this](const auto& load) { gives_way_ = load->map; });
-  topics_.located.subscribe([this](const auto& located) { worker_.post(located); });
+  follow(topics.located);
 }
 
-void DenseSensingNode::stop() noexcept {
-  worker_.stop();
-  if (std::exchange(stopped_, true)) return;
+void DenseSensingNode::conclude() {
   const DenseSensingProgress& p = progress_;
   log::info(name()) << p.frames << " frames with depth, " << p.without_labels << " without labels, "
                     << p.dropped_under_load << " left out because processors were short";

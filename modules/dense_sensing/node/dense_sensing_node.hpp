@@ -1,18 +1,13 @@
 #pragma once
 
 #include <atomic>
-#include <exception>
 #include <optional>
-#include <string_view>
-#include <vector>
 
 #include "modules/core/dense_frame.hpp"
 #include "modules/core/odometry.hpp"
 #include "modules/core/processing_load.hpp"
 #include "modules/dense_sensing/dense_sensor.hpp"
-#include "runtime/node.hpp"
-#include "runtime/topic.hpp"
-#include "runtime/worker.hpp"
+#include "runtime/worker_node.hpp"
 
 namespace km {
 
@@ -25,7 +20,7 @@ struct DenseSensingTopics {
 };
 
 /// Makes depth and labels of the frames that are due, as a thread with one DenseSensor.
-class DenseSensingNode final : public Node {
+class DenseSensingNode final : public WorkerNode<Topic<LocatedFrame>::Message> {
  public:
   /// At most `rate_hz` frames a second are published, by their stamps. `overflow`: whether a full
   /// queue delays odometry or drops the oldest frame. Throws std::invalid_argument unless the rate
@@ -34,12 +29,6 @@ class DenseSensingNode final : public Node {
                    const DenseSensingTopics& topics);
   ~DenseSensingNode() override { stop(); }
 
-  std::string_view name() const override { return "dense_sensing"; }
-  void start() override { worker_.start(); }
-  /// Finishes queued frames and logs problems of frames, if any.
-  void stop() noexcept override;
-  std::exception_ptr error() const override { return worker_.error(); }
-  std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
   DurationHistogram timing() const override { return sensing_.histogram(); }
 
   /// Handles one frame synchronously. The thread calls only this function; tests and replay can
@@ -47,6 +36,9 @@ class DenseSensingNode final : public Node {
   void step(const LocatedFrame& located);
 
  private:
+  void handle(const Topic<LocatedFrame>::Message& located) override { step(*located); }
+  void conclude() override;
+
   DenseSensor sensor_;
   const bool wants_labels_;
   const double interval_s_;
@@ -55,8 +47,6 @@ class DenseSensingNode final : public Node {
   std::optional<Stamp> last_;
   DenseSensingProgress progress_;
   Timing sensing_;  // time of the due frames
-  bool stopped_ = false;
-  Worker<Topic<LocatedFrame>::Message> worker_;  // last member: stops first
 };
 
 }  // namespace km

@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "modules/core/distance_color.hpp"
-#include "runtime/thread.hpp"
 
 namespace km {
 namespace {
@@ -15,21 +14,13 @@ constexpr std::size_t kQueue = 256;
 }  // namespace
 
 DistanceFieldNode::DistanceFieldNode(double voxel_size_m, const DistanceFieldTopics& topics)
-    : voxel_size_m_(voxel_size_m),
-      slices_(topics.slices),
-      worker_(
-          kQueue, Overflow::kBlock,
-          [this](const auto& update) {
-            work_in_background();
-            step(*update);
-          },
-          "distance_field") {
-  topics.space.subscribe([this](const auto& update) { worker_.post(update); });
-}
-
-void DistanceFieldNode::stop() noexcept {
-  worker_.stop();
-  if (!std::exchange(stopped_, true) && newest_ && !error()) publish_slice();
+    : WorkerNode({.name = "distance_field",
+                  .queue = kQueue,
+                  .in_background = true,
+                  .step_limit_s = 120.0}),
+      voxel_size_m_(voxel_size_m),
+      slices_(topics.slices) {
+  follow(topics.space);
 }
 
 void DistanceFieldNode::step(const SpaceUpdate& update) {

@@ -1,15 +1,11 @@
 #pragma once
 
-#include <exception>
 #include <optional>
-#include <string_view>
 
 #include "modules/distance_field/distance_field.hpp"
 #include "modules/distance_field/distance_slice.hpp"
 #include "modules/semantic_mapping/space_changes.hpp"
-#include "runtime/node.hpp"
-#include "runtime/topic.hpp"
-#include "runtime/worker.hpp"
+#include "runtime/worker_node.hpp"
 
 namespace km {
 
@@ -21,7 +17,7 @@ struct DistanceFieldTopics {
 
 /// Keeps the distance field of the mapper's window on a thread of its own, while the mapper
 /// publishes its space. No update is dropped, because each one has only the changes since the last.
-class DistanceFieldNode final : public Node {
+class DistanceFieldNode final : public WorkerNode<Topic<SpaceUpdate>::Message> {
  public:
   static constexpr double kSlice_s = 1.0;  ///< Interval of slices, by stamps.
 
@@ -31,18 +27,14 @@ class DistanceFieldNode final : public Node {
   DistanceFieldNode(double voxel_size_m, const DistanceFieldTopics& topics);
   ~DistanceFieldNode() override { stop(); }
 
-  std::string_view name() const override { return "distance_field"; }
-  void start() override { worker_.start(); }
-  void stop() noexcept override;
-  std::exception_ptr error() const override { return worker_.error(); }
-  std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
-  double step_limit_s() const override { return 120.0; }
-  DurationHistogram timing() const override { return worker_.timing(); }
-
   /// Handles one update synchronously. The thread calls only this function; tests can call it too.
   void step(const SpaceUpdate& update);
 
  private:
+  void handle(const Topic<SpaceUpdate>::Message& update) override { step(*update); }
+  void conclude() override {
+    if (newest_) publish_slice();
+  }
   void publish_slice();
 
   const double voxel_size_m_;
@@ -50,8 +42,6 @@ class DistanceFieldNode final : public Node {
   const Out<DistanceSlice> slices_;
   double camera_z_m_ = 0.0;
   std::optional<Stamp> newest_, published_;
-  bool stopped_ = false;
-  Worker<Topic<SpaceUpdate>::Message> worker_;  // last member: stops first
 };
 
 }  // namespace km

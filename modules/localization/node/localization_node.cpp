@@ -11,11 +11,10 @@ constexpr std::size_t kQueueCapacity = 256;
 }  // namespace
 
 LocalizationNode::LocalizationNode(MapMatcher matcher, const LocalizationTopics& topics)
-    : matcher_(std::move(matcher)),
-      topics_(topics),
-      worker_(kQueueCapacity, Overflow::kBlock,
-              [this](const Topic<Keyframe>::Message& keyframe) { step(*keyframe); }) {
-  topics_.keyframes.subscribe([this](const auto& message) { worker_.post(message); });
+    : WorkerNode({.name = "localization", .queue = kQueueCapacity}),
+      matcher_(std::move(matcher)),
+      topics_(topics) {
+  follow(topics.keyframes);
 }
 
 void LocalizationNode::step(const Keyframe& keyframe) {

@@ -2,14 +2,9 @@
 
 #include <atomic>
 #include <cstddef>
-#include <exception>
-#include <string_view>
-#include <vector>
 
 #include "modules/localization/map_matcher.hpp"
-#include "runtime/node.hpp"
-#include "runtime/topic.hpp"
-#include "runtime/worker.hpp"
+#include "runtime/worker_node.hpp"
 
 namespace km {
 
@@ -21,16 +16,10 @@ struct LocalizationTopics {
 };
 
 /// Compares every keyframe of the robot with a finished map (MapMatcher), in a thread.
-class LocalizationNode final : public Node {
+class LocalizationNode final : public WorkerNode<Topic<Keyframe>::Message> {
  public:
   LocalizationNode(MapMatcher matcher, const LocalizationTopics& topics);
-
-  std::string_view name() const override { return "localization"; }
-  void start() override { worker_.start(); }
-  void stop() noexcept override { worker_.stop(); }
-  std::exception_ptr error() const override { return worker_.error(); }
-  std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
-  DurationHistogram timing() const override { return worker_.timing(); }
+  ~LocalizationNode() override { stop(); }
 
   /// Handles one keyframe synchronously. The thread calls only this function; tests can call it
   /// too.
@@ -41,11 +30,12 @@ class LocalizationNode final : public Node {
   [[nodiscard]] std::size_t matched() const { return matched_; }
 
  private:
+  void handle(const Topic<Keyframe>::Message& keyframe) override { step(*keyframe); }
+
   MapMatcher matcher_;
   const LocalizationTopics topics_;
   std::atomic<std::size_t> compared_ = 0;
   std::atomic<std::size_t> matched_ = 0;
-  Worker<Topic<Keyframe>::Message> worker_;  // last member: stops first
 };
 
 }  // namespace km

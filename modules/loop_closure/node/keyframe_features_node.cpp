@@ -15,17 +15,11 @@ KeyframeFeaturesNode::KeyframeFeaturesNode(const KeyframeFeaturesConfig& config,
                                            const StereoRig& rig,
                                            const KeyframeFeaturesTopics& topics,
                                            std::optional<KeypointDescriber> keypoint_describer)
-    : camera_(rig.cameras[0]),
+    : WorkerNode({.name = "keyframe_features", .queue = kFrameQueue}),
+      camera_(rig.cameras[0]),
       extractor_(rig, config, std::move(keypoint_describer)),
-      keyframes_(topics.keyframes),
-      worker_(
-          kFrameQueue, Overflow::kBlock,
-          [this](const Input& input) {
-            std::visit([this](const auto& message) { step(*message); }, input);
-          },
-          "keyframe_features") {
-  topics.odometry.subscribe([this](const auto& message) { worker_.post(message); });
-  topics.frames.subscribe([this](const auto& message) { worker_.post(message); });
+      keyframes_(topics.keyframes) {
+  follow(topics.odometry, topics.frames);
 }
 
 void KeyframeFeaturesNode::continue_from(const OdometryPose& last) {

@@ -1,18 +1,13 @@
 #pragma once
 
 #include <deque>
-#include <exception>
 #include <optional>
-#include <string_view>
 #include <variant>
-#include <vector>
 
 #include "modules/core/covariance.hpp"
 #include "modules/core/odometry.hpp"
 #include "modules/loop_closure/keyframe_features.hpp"
-#include "runtime/node.hpp"
-#include "runtime/topic.hpp"
-#include "runtime/worker.hpp"
+#include "runtime/worker_node.hpp"
 
 namespace km {
 
@@ -25,23 +20,20 @@ struct KeyframeFeaturesTopics {
 
 /// Adds to the keyframes of odometry their features and the covariance accumulated along the
 /// chain.
-class KeyframeFeaturesNode final : public Node {
+class KeyframeFeaturesNode final
+    : public WorkerNode<
+          std::variant<Topic<KeyframeOdometry>::Message, Topic<LocatedFrame>::Message>> {
  public:
   /// Without `keypoint_describer` keypoints have only the descriptor of ORB. Throws ConfigError if
   /// `config` is out of bounds, std::invalid_argument if the rig cannot be rectified.
   KeyframeFeaturesNode(const KeyframeFeaturesConfig& config, const StereoRig& rig,
                        const KeyframeFeaturesTopics& topics,
                        std::optional<KeypointDescriber> keypoint_describer = {});
+  ~KeyframeFeaturesNode() override { stop(); }
 
   /// Continues after the keyframe `last` of an earlier process. The odometry of keyframes up to
   /// `last` is ignored. Call before start().
   void continue_from(const OdometryPose& last);
-
-  std::string_view name() const override { return "keyframe_features"; }
-  void start() override { worker_.start(); }
-  void stop() noexcept override { worker_.stop(); }
-  std::exception_ptr error() const override { return worker_.error(); }
-  std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
 
   /// Handle one input synchronously. The thread calls only these functions; tests and replay can
   /// call them too. Throw std::invalid_argument for an index that does not follow the previous
@@ -50,7 +42,9 @@ class KeyframeFeaturesNode final : public Node {
   void step(const LocatedFrame& located);
 
  private:
-  using Input = std::variant<Topic<KeyframeOdometry>::Message, Topic<LocatedFrame>::Message>;
+  void handle(const Input& input) override {
+    std::visit([this](const auto& message) { step(*message); }, input);
+  }
 
   const Camera camera_;  // left
   KeyframeFeatureExtractor extractor_;
@@ -59,7 +53,6 @@ class KeyframeFeaturesNode final : public Node {
   UncertainPose chain_;  // from the first keyframe's odometry frame to the latest keyframe
   std::uint32_t next_index_ = 0;
   std::uint32_t known_ = 0;  // number of keyframes of the earlier process
-  Worker<Input> worker_;     // last member: stops first
 };
 
 }  // namespace km

@@ -21,7 +21,7 @@ namespace {
 
 // Robots that meet again after a while produce candidates in bursts.
 constexpr std::size_t kQueueCapacity = 16384;
-constexpr std::chrono::milliseconds kTickPeriod(100);
+constexpr double kTick_s = 0.1;
 
 constexpr double kRequestTimeout_s = 2.0;   // after which an unanswered request is repeated
 constexpr int kMaxOutstandingRequests = 8;  // to one peer; further ones wait
@@ -31,7 +31,8 @@ constexpr int kMaxOutstandingRequests = 8;  // to one peer; further ones wait
 LoopClosureNode::LoopClosureNode(const LoopClosureConfig& config, RobotId self,
                                  std::shared_ptr<const Vocabulary> vocabulary,
                                  const LoopClosureTopics& topics, ReadKeyframe read_keyframe)
-    : config_(config),
+    : WorkerNode({.name = "loop_closure", .queue = kQueueCapacity, .tick_s = kTick_s}),
+      config_(config),
       self_(self),
       vocabulary_(std::move(vocabulary)),
       topics_(topics),
@@ -41,27 +42,14 @@ LoopClosureNode::LoopClosureNode(const LoopClosureConfig& config, RobotId self,
       requests_(kRequestTimeout_s, kMaxOutstandingRequests),
       policy_(config),
       reply_keypoints_(static_cast<std::size_t>(config.reply_keypoints)),
-      full_keyframes_(static_cast<KeyframeIndex>(config.full_keyframes)),
-      worker_(
-          kQueueCapacity, Overflow::kBlock,
-          [this](const Input& input) {
-            std::visit([this](const auto& message) { step(message); }, input);
-          },
-          "loop_closure", kTickPeriod, [] { return LoopClosureTick{steady_now_s()}; }) {
-  const auto queue = [this](const auto& message) { worker_.post(message); };
-  topics_.keyframes.subscribe(queue);
-  topics_.candidates.subscribe(queue);
-  topics_.measured_closures.subscribe(queue);
-  topics_.peer_requests.subscribe(queue);
-  topics_.peer_replies.subscribe(queue);
-  topics_.peer_words.subscribe(queue);
-  topics_.peer_closures.subscribe(queue);
+      full_keyframes_(static_cast<KeyframeIndex>(config.full_keyframes)) {
+  follow(topics.keyframes, topics.candidates, topics.measured_closures, topics.peer_requests,
+         topics.peer_replies, topics.peer_words, topics.peer_closures, topics.restarts,
+         topics.restored);
   topics_.peer_events.subscribe([this](const auto& event) {
-    if (event->kind != PeerEventKind::kRestarted) worker_.post(event);
+    if (event->kind != PeerEventKind::kRestarted) post(event);
   });
-  topics_.restarts.subscribe(queue);
-  topics_.restored.subscribe(queue);
-  if (vocabulary_) topics_.peer_bows.subscribe(queue);
+  if (vocabulary_) follow(topics.peer_bows);
 }
 
 void LoopClosureNode::step(const std::shared_ptr<const Keyframe>& own_keyframe) {

@@ -1,14 +1,12 @@
 #pragma once
 
 #include <cstdint>
-#include <exception>
 #include <functional>
 #include <map>
 #include <memory>
 #include <optional>
 #include <set>
 #include <string>
-#include <string_view>
 #include <variant>
 #include <vector>
 
@@ -21,9 +19,7 @@
 #include "modules/place_recognition/bag_of_words.hpp"
 #include "modules/place_recognition/vocabulary.hpp"
 #include "runtime/dds/bridge.hpp"
-#include "runtime/node.hpp"
-#include "runtime/ticking_worker.hpp"
-#include "runtime/topic.hpp"
+#include "runtime/worker_node.hpp"
 
 namespace km {
 
@@ -54,8 +50,16 @@ struct LoopClosureTopics {
 
 /// Clock tick at which due requests are sent.
 struct LoopClosureTick {
-  double now_s = 0.0;  ///< Clock with any origin, not decreasing.
+  double now_s = steady_now_s();  ///< Clock with any origin, not decreasing.
 };
+
+using LoopClosureInput =
+    std::variant<LoopClosureTick, std::shared_ptr<const Keyframe>,
+                 std::shared_ptr<const LoopCandidate>, std::shared_ptr<const RelativePose>,
+                 std::shared_ptr<const KeyframeRequest>, std::shared_ptr<const KeyframeReply>,
+                 std::shared_ptr<const KeyframeWords>, std::shared_ptr<const Closure>,
+                 std::shared_ptr<const PeerEvent>, std::shared_ptr<const KeyframeBow>,
+                 std::shared_ptr<const ClosureOutcome>>;
 
 /// Turns candidates into verified closures (Chang et al., "Kimera-Multi", Sec. III-A). The node
 /// requests the keyframes of peers from their owners, verifies the candidates, and publishes the
@@ -72,7 +76,7 @@ struct LoopClosureTick {
 ///
 /// When a robot has restarted, its keyframe indices mean other keyframes. The node then drops all
 /// candidates and measured closures with this robot, and begins again.
-class LoopClosureNode final : public Node {
+class LoopClosureNode final : public WorkerNode<LoopClosureInput> {
  public:
   /// Reads an own keyframe from the disk; null if it is not there. Called on any thread.
   using ReadKeyframe = std::function<std::shared_ptr<const Keyframe>(KeyframeIndex)>;
@@ -87,13 +91,7 @@ class LoopClosureNode final : public Node {
   LoopClosureNode(const LoopClosureConfig& config, RobotId self,
                   std::shared_ptr<const Vocabulary> vocabulary, const LoopClosureTopics& topics,
                   ReadKeyframe read_keyframe = {});
-
-  std::string_view name() const override { return "loop_closure"; }
-  void start() override { worker_.start(); }
-  void stop() noexcept override { worker_.stop(); }
-  std::exception_ptr error() const override { return worker_.error(); }
-  std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
-  DurationHistogram timing() const override { return worker_.timing(); }
+  ~LoopClosureNode() override { stop(); }
 
   /// Handle one input synchronously. The thread calls only these functions; tests and replay can
   /// call them too.
@@ -110,13 +108,6 @@ class LoopClosureNode final : public Node {
   void step(const LoopClosureTick& tick);
 
  private:
-  using Input =
-      std::variant<std::shared_ptr<const Keyframe>, std::shared_ptr<const LoopCandidate>,
-                   std::shared_ptr<const RelativePose>, std::shared_ptr<const KeyframeRequest>,
-                   std::shared_ptr<const KeyframeReply>, std::shared_ptr<const KeyframeWords>,
-                   std::shared_ptr<const Closure>, std::shared_ptr<const PeerEvent>,
-                   std::shared_ptr<const KeyframeBow>, std::shared_ptr<const ClosureOutcome>,
-                   LoopClosureTick>;
   using KeyframePtr = std::shared_ptr<const Keyframe>;
 
   /// A candidate or a measured closure that is not finished.
@@ -128,6 +119,9 @@ class LoopClosureNode final : public Node {
     bool requested = false;                     ///< The keyframe of the peer has been requested.
   };
 
+  void handle(const Input& input) override {
+    std::visit([this](const auto& message) { step(message); }, input);
+  }
   void evict_before(KeyframeIndex newest);
   [[nodiscard]] KeyframePtr own(const KeyframeId& id) const;
   void forget(RobotId peer);
@@ -163,7 +157,6 @@ class LoopClosureNode final : public Node {
   std::set<ClosureId> known_;                        // candidates and measured closures seen
   double now_s_ = 0.0;
   std::uint32_t next_request_ = 0;
-  TickingWorker<Input> worker_;
 };
 
 }  // namespace km

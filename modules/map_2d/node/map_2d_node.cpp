@@ -7,7 +7,6 @@
 #include "modules/core/text_table.hpp"
 #include "runtime/clock.hpp"
 #include "runtime/log.hpp"
-#include "runtime/thread.hpp"
 
 namespace km {
 namespace {
@@ -24,33 +23,30 @@ constexpr double kShare = 0.2;
 
 Map2dNode::Map2dNode(const Map2dConfig& config, const LabelPalette& palette, RayThinner thinner,
                      const Map2dTopics& topics)
-    : config_(checked(config)),
+    // The time of a map is proportional to the size of the mesh.
+    : WorkerNode({.name = Map2dConfig::kSection,
+                  .queue = kQueue,
+                  .in_background = true,
+                  .step_limit_s = 120.0}),
+      config_(checked(config)),
       palette_(palette),
       maps_(topics.maps),
-      thinner_(std::move(thinner)),
-      worker_(
-          kQueue, Overflow::kBlock,
-          [this](const auto& input) {
-            work_in_background();
-            if (const auto* views = std::get_if<Views>(&input)) step(*views);
-            if (steady_now_s() >= next_s_ && take_surface()) make_map();
-          },
-          Map2dConfig::kSection) {
+      thinner_(std::move(thinner)) {
   // Thinning takes less than 0.1 ms, so that no image has to wait for a map.
   topics.frames.subscribe([this](const auto& frame) {
     if (auto views = thinner_.add(*frame))
-      worker_.post(Views(std::make_shared<const ViewRays>(*std::move(views))));
+      post(Views(std::make_shared<const ViewRays>(*std::move(views))));
   });
 }
 
 void Map2dNode::offer(CorrectedSurface surface) {
   newest_surface_.put(std::make_shared<const CorrectedSurface>(std::move(surface)));
-  worker_.post(News());
+  post(Tick());
 }
 
-void Map2dNode::stop() noexcept {
-  worker_.stop();
-  if (!std::exchange(stopped_, true) && !error() && (take_surface() || has_new_views_)) make_map();
+void Map2dNode::handle(const Input& input) {
+  if (const auto* views = std::get_if<Views>(&input)) step(*views);
+  if (steady_now_s() >= next_s_ && take_surface()) make_map();
 }
 
 void Map2dNode::step(const Views& views) {

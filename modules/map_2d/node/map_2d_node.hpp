@@ -1,8 +1,6 @@
 #pragma once
 
-#include <exception>
 #include <memory>
-#include <string_view>
 #include <variant>
 #include <vector>
 
@@ -15,9 +13,7 @@
 #include "modules/mesh/labelled_mesh.hpp"
 #include "runtime/latest.hpp"
 #include "runtime/metrics.hpp"
-#include "runtime/node.hpp"
-#include "runtime/topic.hpp"
-#include "runtime/worker.hpp"
+#include "runtime/worker_node.hpp"
 
 namespace km {
 
@@ -39,7 +35,7 @@ struct Map2dTopics {
 /// The mesh and the rays are kept in 3D, and each map is made from scratch. So a map agrees with
 /// the poses of its mesh, also after loop closures. At most kViews images are kept:
 /// at that number every second one is dropped.
-class Map2dNode final : public Node {
+class Map2dNode final : public WorkerNode<std::variant<Tick, std::shared_ptr<const ViewRays>>> {
  public:
   static constexpr std::size_t kViews = 4096;
 
@@ -49,15 +45,6 @@ class Map2dNode final : public Node {
             const Map2dTopics& topics);
   ~Map2dNode() override { stop(); }
 
-  std::string_view name() const override { return Map2dConfig::kSection; }
-  void start() override { worker_.start(); }
-  /// Publishes the map of the last mesh and all images.
-  void stop() noexcept override;
-  std::exception_ptr error() const override { return worker_.error(); }
-  std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
-  /// Large, because the time of a map is proportional to the size of the mesh.
-  double step_limit_s() const override { return 120.0; }
-
   /// Durations of making maps.
   DurationHistogram timing() const override { return timing_.histogram(); }
 
@@ -65,9 +52,13 @@ class Map2dNode final : public Node {
   void offer(CorrectedSurface surface);
 
  private:
-  using News = std::shared_ptr<const struct Map2dNewsTag>;  // the mesh has changed; always null
   using Views = std::shared_ptr<const ViewRays>;
 
+  void handle(const Input& input) override;
+  /// Publishes the map of the last mesh and all images.
+  void conclude() override {
+    if (take_surface() || has_new_views_) make_map();
+  }
   void step(const Views& views);
   bool take_surface();
   void make_map();
@@ -79,11 +70,9 @@ class Map2dNode final : public Node {
   std::vector<ViewRays> views_;
   double next_s_ = 0.0;         // time of the next map, by the steady clock
   bool has_new_views_ = false;  // since the last map
-  bool stopped_ = false;
   Timing timing_;
   std::shared_ptr<const CorrectedSurface> surface_;
   Latest<CorrectedSurface> newest_surface_;
-  Worker<std::variant<News, Views>> worker_;  // last member: stops first
 };
 
 }  // namespace km

@@ -39,24 +39,22 @@ TokenBucket full_budget(double bytes_per_s) {
 
 MeshChunksNode::MeshChunksNode(const MapSharingConfig& config, RobotId self,
                                const MeshChunksTopics& topics, Reduction reduction)
-    : config_(checked(config)),
+    : WorkerNode({.name = "mesh_chunks", .queue = kQueue, .tick_s = kTick_s}),
+      config_(checked(config)),
       self_(self),
       topics_(topics),
       reduction_(std::move(reduction)),
       schedule_(kMinChunkMove_m),
       sent_poses_{.robot = self},
-      budget_bytes_(full_budget(config.max_bytes_per_s)),
-      worker_(
-          kQueue, Overflow::kBlock, [this](const Offer& offer) { step(offer, steady_now_s()); },
-          "mesh_chunks", steady_duration(kTick_s), [] { return Offer(); }) {}
+      budget_bytes_(full_budget(config.max_bytes_per_s)) {}
 
 void MeshChunksNode::offer(RobotId anchor, std::shared_ptr<const LabelledMesh> mesh,
                            std::shared_ptr<const MeshOrigin> origin) {
   ++offers_;
-  worker_.post({anchor, std::move(mesh), std::move(origin)});
+  post({anchor, std::move(mesh), std::move(origin)});
 }
 
-void MeshChunksNode::step(const Offer& offer, double now_s) {
+void MeshChunksNode::step(const MeshOffer& offer, double now_s) {
   if (offer.mesh != nullptr) {
     if (newest_.mesh != nullptr) --offers_;
     newest_ = offer;
@@ -73,7 +71,7 @@ void MeshChunksNode::step(const Offer& offer, double now_s) {
   if (is_due) --offers_;
 }
 
-void MeshChunksNode::take(const Offer& offer) {
+void MeshChunksNode::take(const MeshOffer& offer) {
   SplitMesh pieces = split(offer);
   if (pieces.oversized_faces > 0)
     log::limited(log::Level::kWarn, name(), "oversized")
@@ -87,7 +85,7 @@ void MeshChunksNode::take(const Offer& offer) {
   if (has_moved(sent_poses_, poses, kPosesMove * kMinChunkMove_m)) waiting_poses_ = poses;
 }
 
-SplitMesh MeshChunksNode::split(const Offer& offer) const {
+SplitMesh MeshChunksNode::split(const MeshOffer& offer) const {
   if (reduction_) return split_mesh(reduction_(*offer.mesh), self_, offer.anchor, {});
   return split_mesh(*offer.mesh, self_, offer.anchor, {}, offer.origin.get());
 }

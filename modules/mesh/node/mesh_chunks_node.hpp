@@ -1,12 +1,9 @@
 #pragma once
 
 #include <atomic>
-#include <exception>
 #include <functional>
 #include <memory>
 #include <optional>
-#include <string_view>
-#include <vector>
 
 #include "modules/mesh/chunk_schedule.hpp"
 #include "modules/mesh/labelled_mesh.hpp"
@@ -14,10 +11,8 @@
 #include "modules/mesh/mesh_chunks.hpp"
 #include "modules/mesh/mesh_origin.hpp"
 #include "modules/mesh/mesh_poses.hpp"
-#include "runtime/node.hpp"
-#include "runtime/ticking_worker.hpp"
 #include "runtime/token_bucket.hpp"
-#include "runtime/topic.hpp"
+#include "runtime/worker_node.hpp"
 
 namespace km {
 
@@ -27,6 +22,14 @@ struct MeshChunksTopics {
   Out<MeshPoses> poses;
 };
 
+/// A mesh in the frame `world` of the robot `anchor`, with the keyframes that saw it, if known. A
+/// null mesh is a tick of the clock.
+struct MeshOffer {
+  RobotId anchor = 0;
+  std::shared_ptr<const LabelledMesh> mesh;
+  std::shared_ptr<const MeshOrigin> origin = {};
+};
+
 /// Publishes the robot's mesh in chunks, at most max_bytes_per_s on average. Only chunks that have
 /// changed since they were last sent are sent, each in its newest version. The module that has the
 /// robot's best mesh passes it to offer().
@@ -34,16 +37,8 @@ struct MeshChunksTopics {
 /// A correction of the trajectory moves chunks by the poses of their keyframes, which take at most
 /// a tenth of the bytes. They are sent when they move some surface by more than half of
 /// kMinChunkMove_m, and when keyframes were added.
-class MeshChunksNode final : public Node {
+class MeshChunksNode final : public WorkerNode<MeshOffer> {
  public:
-  /// A mesh in the frame `world` of the robot `anchor`, with the keyframes that saw it, if known. A
-  /// null mesh is a tick of the clock.
-  struct Offer {
-    RobotId anchor = 0;
-    std::shared_ptr<const LabelledMesh> mesh;
-    std::shared_ptr<const MeshOrigin> origin = {};
-  };
-
   /// Reduces a mesh before it is sent.
   using Reduction = std::function<LabelledMesh(const LabelledMesh&)>;
 
@@ -57,13 +52,6 @@ class MeshChunksNode final : public Node {
   void offer(RobotId anchor, std::shared_ptr<const LabelledMesh> mesh,
              std::shared_ptr<const MeshOrigin> origin = {});
 
-  std::string_view name() const override { return "mesh_chunks"; }
-  void start() override { worker_.start(); }
-  void stop() noexcept override { worker_.stop(); }  ///< Drops the chunks that have not been sent.
-  std::exception_ptr error() const override { return worker_.error(); }
-  std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
-  DurationHistogram timing() const override { return worker_.timing(); }
-
   /// Number of waiting chunks, and one for waiting poses. Thread-safe.
   [[nodiscard]] std::size_t waiting() const { return waiting_; }
   /// True once all chunks of the offered meshes and their poses are sent. Thread-safe.
@@ -71,11 +59,12 @@ class MeshChunksNode final : public Node {
 
   /// Handles one offer synchronously at time `now_s`. The thread calls only this function; tests
   /// can call it too.
-  void step(const Offer& offer, double now_s);
+  void step(const MeshOffer& offer, double now_s);
 
  private:
-  void take(const Offer& offer);
-  [[nodiscard]] SplitMesh split(const Offer& offer) const;
+  void handle(const MeshOffer& offer) override { step(offer, steady_now_s()); }
+  void take(const MeshOffer& offer);
+  [[nodiscard]] SplitMesh split(const MeshOffer& offer) const;
   void send(double now_s);
   void send_poses(double now_s);
 
@@ -90,9 +79,8 @@ class MeshChunksNode final : public Node {
   TokenBucket budget_bytes_;
   std::atomic<std::size_t> waiting_ = 0;  // chunks and poses
   std::atomic<int> offers_ = 0;           // meshes that are neither split nor replaced
-  Offer newest_;                          // the mesh to be split next, if any
+  MeshOffer newest_;                      // the mesh to be split next, if any
   double next_take_s_ = 0.0;
-  TickingWorker<Offer> worker_;
 };
 
 }  // namespace km

@@ -9,7 +9,6 @@
 
 #include "runtime/clock.hpp"
 #include "runtime/log.hpp"
-#include "runtime/thread.hpp"
 
 namespace km {
 namespace {
@@ -32,22 +31,18 @@ std::size_t keyframes_of(const MapMesh& map) {
 
 MeshDeformationNode::MeshDeformationNode(const MeshDeformationConfig& config, RobotId self,
                                          const MeshDeformationTopics& topics)
-    : config_(checked(config)),
+    // The time of a correction is proportional to the size of the mesh.
+    : WorkerNode({.name = MeshDeformationConfig::kSection,
+                  .queue = kQueue,
+                  .tick_s = checked(config).period_s / kTicksPerPeriod,
+                  .in_background = true,
+                  .step_limit_s = 120.0}),
+      config_(config),
       self_(self),
       optimized_(topics.optimized),
       superseded_(topics.superseded),
-      corrector_(config),
-      worker_(
-          kQueue, Overflow::kBlock,
-          [this](const Input& input) {
-            work_in_background();
-            const double now_s = steady_now_s();
-            take_latest(now_s);
-            step(input, now_s);
-          },
-          MeshDeformationConfig::kSection, steady_duration(config.period_s / kTicksPerPeriod),
-          [] { return Tick(); }) {
-  topics.keyframes.subscribe([this](const auto& keyframe) { worker_.post(keyframe); });
+      corrector_(config) {
+  follow(topics.keyframes);
   topics.maps.subscribe([this](const auto& map) {
     latest_map_.put(map);
     ++arrived_;
@@ -61,12 +56,13 @@ MeshDeformationNode::MeshDeformationNode(const MeshDeformationConfig& config, Ro
 void MeshDeformationNode::finish() {
   latest_map_.close();
   latest_trajectory_.close();
-  worker_.post(End());  // the worker refuses it after stop()
+  post(MeshEnd());  // the worker refuses it after stop()
 }
 
-void MeshDeformationNode::stop() noexcept {
-  finish();
-  worker_.stop();
+void MeshDeformationNode::handle(const Input& input) {
+  const double now_s = steady_now_s();
+  take_latest(now_s);
+  step(input, now_s);
 }
 
 void MeshDeformationNode::take_latest(double now_s) {
@@ -85,7 +81,7 @@ void MeshDeformationNode::step(const Input& input, double now_s) {
     if (!trajectory_->covariances.empty()) solved_ = trajectory_;
     return;
   }
-  ended_ = std::holds_alternative<End>(input);
+  ended_ = std::holds_alternative<MeshEnd>(input);
   if (ended_ || now_s >= next_s_) correct();
 }
 

@@ -2,9 +2,7 @@
 
 #include <atomic>
 #include <cstdint>
-#include <exception>
 #include <memory>
-#include <string_view>
 #include <variant>
 #include <vector>
 
@@ -13,9 +11,7 @@
 #include "modules/mesh_deformation/mesh_corrector.hpp"
 #include "runtime/latest.hpp"
 #include "runtime/metrics.hpp"
-#include "runtime/node.hpp"
-#include "runtime/ticking_worker.hpp"
-#include "runtime/topic.hpp"
+#include "runtime/worker_node.hpp"
 
 namespace km {
 
@@ -28,24 +24,22 @@ struct MeshDeformationTopics {
   Out<SupersededSurface> superseded;  ///< Superseded surface of the maps, for the mapper.
 };
 
+/// The call of MeshDeformationNode::finish(), a pointer that is always null, as Tick.
+using MeshEnd = std::shared_ptr<const struct MeshEndTag>;
+using MeshDeformationInput =
+    std::variant<Tick, MeshEnd, Topic<MapMesh>::Message, Topic<KeyframeOdometry>::Message,
+                 Topic<Trajectory>::Message>;
+
 /// Corrects the robot's mesh when its map or its trajectory has changed: runs a MeshCorrector on a
 /// thread of its own. A correction starts at least mesh_deformation.period_s after the end of the
 /// last one. Messages that arrive meanwhile are only stored, so that this node delays no other
 /// node.
-class MeshDeformationNode final : public Node {
+class MeshDeformationNode final : public WorkerNode<MeshDeformationInput> {
  public:
   /// Throws ConfigError if `config` is out of bounds.
   MeshDeformationNode(const MeshDeformationConfig& config, RobotId self,
                       const MeshDeformationTopics& topics);
   ~MeshDeformationNode() override { stop(); }
-
-  std::string_view name() const override { return MeshDeformationConfig::kSection; }
-  void start() override { worker_.start(); }
-  void stop() noexcept override;  ///< Call after finish().
-  std::exception_ptr error() const override { return worker_.error(); }
-  std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
-  /// Large, because the time of a correction is proportional to the size of the mesh.
-  double step_limit_s() const override { return 120.0; }
 
   /// Durations of the corrections.
   DurationHistogram timing() const override { return timing_.histogram(); }
@@ -59,19 +53,14 @@ class MeshDeformationNode final : public Node {
   /// Thread-safe.
   [[nodiscard]] bool is_current() const { return corrected_ == arrived_; }
 
-  /// Inputs without content: a tick of the clock, and the call of finish(). They are null pointers
-  /// and not structs, because GCC 12 reports a false warning for a variant of structs and pointers.
-  using Tick = std::shared_ptr<const struct MeshTickTag>;
-  using End = std::shared_ptr<const struct MeshEndTag>;
-  using Input = std::variant<Tick, End, Topic<MapMesh>::Message, Topic<KeyframeOdometry>::Message,
-                             Topic<Trajectory>::Message>;
-
   /// Handles one input synchronously at time `now_s`. The thread calls only this function; tests
   /// can call it too. Throws std::invalid_argument for keyframes that are not consecutive and for
   /// input that LocalMeshOptimizer::optimize() refuses.
   void step(const Input& input, double now_s);
 
  private:
+  void handle(const Input& input) override;
+  void stop_sources() noexcept override { finish(); }
   void take_latest(double now_s);
   void take(const KeyframeOdometry& keyframe);
   void take(Topic<MapMesh>::Message map);
@@ -100,7 +89,6 @@ class MeshDeformationNode final : public Node {
   Timing timing_;
   Latest<MapMesh> latest_map_;  // newest map, until it is handled
   Latest<Trajectory> latest_trajectory_;
-  TickingWorker<Input> worker_;
 };
 
 }  // namespace km

@@ -1,13 +1,11 @@
 #include "modules/objects/node/objects_node.hpp"
 
-#include <chrono>
 #include <string>
 #include <utility>
 
 #include "modules/objects/object_merging.hpp"
 #include "runtime/clock.hpp"
 #include "runtime/log.hpp"
-#include "runtime/thread.hpp"
 
 namespace km {
 namespace {
@@ -26,23 +24,22 @@ constexpr double kMinChange_m = 0.05;
 
 ObjectsNode::ObjectsNode(const ObjectsConfig& config, RobotId self, const LabelPalette& palette,
                          const ObjectsTopics& topics)
-    : config_(checked(config)),
+    // Subscribers of the joint objects write them to a disk, which may stall.
+    : WorkerNode({.name = ObjectsConfig::kSection,
+                  .queue = kQueue,
+                  .tick_s = 1.0,
+                  .in_background = true,
+                  .step_limit_s = 300.0}),
+      config_(checked(config)),
       self_(self),
       palette_(palette),
       labels_(object_labels(palette, config_.background)),
       own_(topics.own),
       joint_(topics.joint),
-      team_(self, config_),
-      worker_(
-          kQueue, Overflow::kBlock,
-          [this](const Input& input) {
-            work_in_background();
-            step(input, steady_now_s());
-          },
-          ObjectsConfig::kSection, std::chrono::seconds(1), [] { return Tick(); }) {
+      team_(self, config_) {
   topics.meshes.subscribe([this](const auto& mesh) { latest_mesh_.put(mesh); });
   topics.trajectory.subscribe([this](const auto& newest) { latest_trajectory_.put(newest); });
-  topics.received.subscribe([this](const auto& objects) { worker_.post(objects); });
+  follow(topics.received);
 }
 
 void ObjectsNode::step(const Input& input, double now_s) {

@@ -1,23 +1,17 @@
 #pragma once
 
 #include <cstddef>
-#include <exception>
 #include <functional>
 #include <map>
-#include <memory>
 #include <optional>
-#include <string_view>
 #include <variant>
-#include <vector>
 
 #include "modules/core/pose_graph.hpp"
 #include "modules/mesh_deformation/mesh_corrector.hpp"
 #include "modules/objects/object_extraction.hpp"
 #include "modules/objects/team_objects.hpp"
 #include "runtime/latest.hpp"
-#include "runtime/node.hpp"
-#include "runtime/ticking_worker.hpp"
-#include "runtime/topic.hpp"
+#include "runtime/worker_node.hpp"
 
 namespace km {
 
@@ -33,30 +27,18 @@ struct ObjectsTopics {
 /// Extracts the objects of the robot's mesh, sends them to the other robots, and merges them with
 /// those that it receives. A message is sent if objects have changed, at most every
 /// ObjectsConfig::period_s.
-class ObjectsNode final : public Node {
+class ObjectsNode final
+    : public WorkerNode<std::variant<Tick, Topic<RobotObjects>::Message, OdometryPose>> {
  public:
   /// Throws ConfigError if `config` is out of bounds.
   ObjectsNode(const ObjectsConfig& config, RobotId self, const LabelPalette& palette,
               const ObjectsTopics& topics);
   ~ObjectsNode() override { stop(); }
 
-  std::string_view name() const override { return ObjectsConfig::kSection; }
-  void start() override { worker_.start(); }
-  void stop() noexcept override { worker_.stop(); }
-  std::exception_ptr error() const override { return worker_.error(); }
-  std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
-  /// Large, because subscribers of the joint objects write them to a disk, which may stall.
-  double step_limit_s() const override { return 300.0; }
-  DurationHistogram timing() const override { return worker_.timing(); }
-
   [[nodiscard]] const LabelPalette& palette() const { return palette_; }
 
   /// Odometry of a keyframe of this robot, so that messages state it. Thread-safe.
-  void learn(const OdometryPose& keyframe) { worker_.post(keyframe); }
-
-  /// Inputs: a tick of the clock, the objects of another robot, or a keyframe of this robot.
-  struct Tick {};
-  using Input = std::variant<Tick, Topic<RobotObjects>::Message, OdometryPose>;
+  void learn(const OdometryPose& keyframe) { post(keyframe); }
 
   /// Handles one input, and the newest mesh and trajectory, at time `now_s`. The thread calls only
   /// this function; tests can call it too.
@@ -67,6 +49,7 @@ class ObjectsNode final : public Node {
   [[nodiscard]] std::optional<ObjectList> finish(const std::optional<Trajectory>& trajectory);
 
  private:
+  void handle(const Input& input) override { step(input, steady_now_s()); }
   void take(const OptimizedMesh& mesh);
   void take(const RobotObjects& received);
   void send(double now_s);
@@ -86,7 +69,6 @@ class ObjectsNode final : public Node {
   double next_s_ = 0.0;  // earliest time of the next message
   Latest<OptimizedMesh> latest_mesh_;
   Latest<Trajectory> latest_trajectory_;
-  TickingWorker<Input> worker_;
 };
 
 }  // namespace km

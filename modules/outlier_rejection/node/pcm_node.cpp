@@ -1,7 +1,6 @@
 #include "modules/outlier_rejection/node/pcm_node.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <string>
 #include <utility>
 
@@ -11,8 +10,7 @@ namespace km {
 namespace {
 
 constexpr std::size_t kQueue = 256;
-// Changed sets are published at this period.
-constexpr std::chrono::milliseconds kPublishPeriod(500);
+constexpr double kPublishPeriod_s = 0.5;  // period at which changed sets are published
 
 std::string text_of(RobotId a, RobotId b) {
   return "robots " + std::to_string(a) + ' ' + std::to_string(b) + ": ";
@@ -22,22 +20,12 @@ std::string text_of(RobotId a, RobotId b) {
 
 PcmNode::PcmNode(const PcmConfig& config, RobotId self, const PcmTopics& topics,
                  std::uint32_t first_version)
-    : config_(checked(config)),
+    : WorkerNode({.name = PcmConfig::kSection, .queue = kQueue, .tick_s = kPublishPeriod_s}),
+      config_(checked(config)),
       self_(self),
       first_version_(first_version),
-      inlier_sets_(topics.inlier_sets),
-      worker_(
-          kQueue, Overflow::kBlock, [this](const Input& input) { handle(input); },
-          PcmConfig::kSection, kPublishPeriod, [] { return Tick(); }) {
-  topics.closures.subscribe([this](const auto& message) { worker_.post(message); });
-  topics.keyframes.subscribe([this](const auto& message) { worker_.post(message); });
-  topics.restarts.subscribe([this](const auto& message) { worker_.post(message); });
-  topics.restored.subscribe([this](const auto& message) { worker_.post(message); });
-}
-
-void PcmNode::stop() noexcept {
-  worker_.stop();
-  if (worker_.error() == nullptr) publish_changes();
+      inlier_sets_(topics.inlier_sets) {
+  follow(topics.closures, topics.keyframes, topics.restarts, topics.restored);
 }
 
 void PcmNode::handle(const Input& input) {

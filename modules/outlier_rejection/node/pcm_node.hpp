@@ -2,11 +2,9 @@
 
 #include <atomic>
 #include <cstdint>
-#include <exception>
 #include <map>
 #include <optional>
 #include <set>
-#include <string_view>
 #include <variant>
 #include <vector>
 
@@ -15,9 +13,7 @@
 #include "modules/outlier_rejection/pcm.hpp"
 #include "modules/outlier_rejection/witnessed_pair.hpp"
 #include "runtime/dds/peer_table.hpp"
-#include "runtime/node.hpp"
-#include "runtime/ticking_worker.hpp"
-#include "runtime/topic.hpp"
+#include "runtime/worker_node.hpp"
 
 namespace km {
 
@@ -40,21 +36,16 @@ struct PcmTopics {
 /// A join without witnesses is logged, and needs PcmConfig::min_lone_support. The
 /// wait is in sensor time, by the stamps of the robot's keyframes, so results do not depend on the
 /// speed of a replay. Closures inside the robot join nothing and are published at once.
-class PcmNode final : public Node {
+class PcmNode final
+    : public WorkerNode<
+          std::variant<Tick, Topic<Closure>::Message, Topic<KeyframeOdometry>::Message,
+                       Topic<PeerEvent>::Message, Topic<InlierSet>::Message>> {
  public:
   /// The versions of the published sets follow `first_version`, because a resumed robot must
   /// publish newer versions than before. Throws ConfigError if `config` is out of bounds.
   PcmNode(const PcmConfig& config, RobotId self, const PcmTopics& topics,
           std::uint32_t first_version = 0);
   ~PcmNode() override { stop(); }
-
-  std::string_view name() const override { return PcmConfig::kSection; }
-  void start() override { worker_.start(); }
-  /// Publishes the remaining changes.
-  void stop() noexcept override;
-  std::exception_ptr error() const override { return worker_.error(); }
-  std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
-  DurationHistogram timing() const override { return worker_.timing(); }
 
   /// Handle one message synchronously. The thread calls only these functions and
   /// publish_changes().
@@ -72,10 +63,6 @@ class PcmNode final : public Node {
   void expect_no_more() { no_more_ = true; }
 
  private:
-  struct Tick {};
-  using Input = std::variant<Tick, Topic<Closure>::Message, Topic<KeyframeOdometry>::Message,
-                             Topic<PeerEvent>::Message, Topic<InlierSet>::Message>;
-
   // Closures between this robot and another robot, or inside this robot.
   struct Pair {
     std::variant<WitnessedPair, Pcm> closures;
@@ -84,7 +71,8 @@ class PcmNode final : public Node {
     bool waited = false;
   };
 
-  void handle(const Input& input);
+  void handle(const Input& input) override;
+  void conclude() override { publish_changes(); }
   Pair& pair_with(RobotId other);
   [[nodiscard]] std::vector<ClosureId> selected(RobotId other, Pair& pair) const;
   [[nodiscard]] bool is_joined(RobotId other, Pair& pair) const;
@@ -97,7 +85,6 @@ class PcmNode final : public Node {
   std::map<RobotId, std::uint32_t> version_of_;
   std::optional<Stamp> newest_;  // stamp of this robot's newest keyframe
   std::atomic<bool> no_more_ = false;
-  TickingWorker<Input> worker_;
 };
 
 }  // namespace km

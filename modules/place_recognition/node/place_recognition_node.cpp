@@ -37,16 +37,13 @@ bool breaks_odometry(const UncertainPose& before, const UncertainPose& now) {
 PlaceRecognitionNode::PlaceRecognitionNode(const PlaceRecognitionConfig& config, RobotId self,
                                            std::shared_ptr<const Vocabulary> vocabulary,
                                            const PlaceRecognitionTopics& topics)
-    : config_(checked(config)),
+    : WorkerNode({.name = "place_recognition", .queue = kQueueCapacity}),
+      config_(checked(config)),
       self_(self),
       vocabulary_(std::move(vocabulary)),
       topics_(topics),
-      own_(config_, vocabulary_->size()),
-      worker_(kQueueCapacity, Overflow::kBlock, [this](const Input& input) { handle(input); }) {
-  topics_.keyframes.subscribe([this](const auto& message) { worker_.post(message); });
-  topics_.peer_bows.subscribe([this](const auto& message) { worker_.post(message); });
-  topics_.closures.subscribe([this](const auto& message) { worker_.post(message); });
-  topics_.peer_events.subscribe([this](const auto& message) { worker_.post(message); });
+      own_(config_, vocabulary_->size()) {
+  follow(topics.keyframes, topics.peer_bows, topics.closures, topics.peer_events);
 }
 
 void PlaceRecognitionNode::handle(const Input& input) {

@@ -1,11 +1,9 @@
 #pragma once
 
-#include <exception>
 #include <map>
 #include <memory>
 #include <optional>
 #include <set>
-#include <string_view>
 #include <variant>
 #include <vector>
 
@@ -17,9 +15,7 @@
 #include "modules/place_recognition/place_database.hpp"
 #include "modules/place_recognition/vocabulary.hpp"
 #include "runtime/dds/peer_table.hpp"
-#include "runtime/node.hpp"
-#include "runtime/topic.hpp"
-#include "runtime/worker.hpp"
+#include "runtime/worker_node.hpp"
 
 namespace km {
 
@@ -56,19 +52,15 @@ struct PlaceRecognitionTopics {
 ///
 /// A keyframe index means one keyframe during an incarnation of its robot. After a restart the
 /// history of the robot begins again.
-class PlaceRecognitionNode final : public Node {
+class PlaceRecognitionNode final
+    : public WorkerNode<std::variant<Topic<Keyframe>::Message, Topic<KeyframeBow>::Message,
+                                     Topic<Closure>::Message, Topic<PeerEvent>::Message>> {
  public:
   /// Throws ConfigError if `config` is out of bounds.
   PlaceRecognitionNode(const PlaceRecognitionConfig& config, RobotId self,
                        std::shared_ptr<const Vocabulary> vocabulary,
                        const PlaceRecognitionTopics& topics);
-
-  std::string_view name() const override { return "place_recognition"; }
-  void start() override { worker_.start(); }
-  void stop() noexcept override { worker_.stop(); }
-  std::exception_ptr error() const override { return worker_.error(); }
-  std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
-  DurationHistogram timing() const override { return worker_.timing(); }
+  ~PlaceRecognitionNode() override { stop(); }
 
   /// Handle one input synchronously. The thread calls only these functions; tests and replay can
   /// call them too.
@@ -78,10 +70,7 @@ class PlaceRecognitionNode final : public Node {
   void step(const Topic<PeerEvent>::Message& event);
 
  private:
-  using Input = std::variant<Topic<Keyframe>::Message, Topic<KeyframeBow>::Message,
-                             Topic<Closure>::Message, Topic<PeerEvent>::Message>;
-
-  void handle(const Input& input);
+  void handle(const Input& input) override;
 
   [[nodiscard]] BagOfWords words_of(const KeyframeFeatures& features) const;
   [[nodiscard]] PlaceNovelty novelty_of(const OdometryPose& keyframe,
@@ -97,7 +86,6 @@ class PlaceRecognitionNode final : public Node {
   std::optional<UncertainPose> chain_;  // odometry of the newest own keyframe
   std::vector<KeyframeId> own_ids_;     // ids of the keyframes in own_, in the same order
   std::map<RobotId, std::set<KeyframeIndex>> searched_;  // keyframes of peers
-  Worker<Input> worker_;                                 // last member: stops first
 };
 
 }  // namespace km

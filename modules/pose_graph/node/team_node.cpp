@@ -1,6 +1,5 @@
 #include "modules/pose_graph/node/team_node.hpp"
 
-#include <chrono>
 #include <utility>
 
 #include "runtime/clock.hpp"
@@ -10,7 +9,7 @@ namespace km {
 namespace {
 
 constexpr std::size_t kQueue = 1024;
-constexpr std::chrono::milliseconds kTick{50};
+constexpr double kTick_s = 0.05;
 
 template <typename... Handlers>
 struct Overloaded : Handlers... {
@@ -23,34 +22,29 @@ Overloaded(Handlers...) -> Overloaded<Handlers...>;  // Clang before 17 does not
 
 TeamNode::TeamNode(const PoseGraphConfig& config, TeamPeer self, MemberSolverFactory solvers,
                    std::function<std::uint64_t()> sent_bytes, const TeamTopics& topics)
-    : self_(self),
+    // The time of a round grows with the graph.
+    : WorkerNode({.name = PoseGraphConfig::kSection,
+                  .queue = kQueue,
+                  .tick_s = kTick_s,
+                  .step_limit_s = 120.0}),
+      self_(self),
       topics_(topics),
       sent_bytes_(std::move(sent_bytes)),
-      agent_(config, self, std::move(solvers)),
-      worker_(
-          kQueue, Overflow::kBlock, [this](const Input& input) { step(input, steady_now_s()); },
-          PoseGraphConfig::kSection, kTick, [] { return Tick(); }) {
-  const auto post = [this](const auto& message) { worker_.post(message); };
-  topics.odometry.subscribe(post);
-  topics.closures.subscribe(post);
-  topics.fixes.subscribe(post);
-  topics.inlier_sets.subscribe(post);
-  topics.peer_inlier_sets.subscribe(post);
-  topics.restored_inlier_sets.subscribe(post);
-  topics.peer_events.subscribe(post);
+      agent_(config, self, std::move(solvers)) {
+  follow(topics.odometry, topics.closures, topics.fixes, topics.inlier_sets,
+         topics.peer_inlier_sets, topics.restored_inlier_sets, topics.peer_events, topics.links,
+         topics.peer_messages);
   topics.restarts.subscribe([this](const auto& event) {
-    worker_.post(NewIncarnation{{event->identity.robot, event->identity.boot}});
+    post(NewIncarnation{{event->identity.robot, event->identity.boot}});
   });
-  topics.links.subscribe(post);
-  topics.peer_messages.subscribe(post);
 }
 
 void TeamNode::step(const Input& input, double now_s) {
   take(input);
   const bool is_tick = std::holds_alternative<Tick>(input);
-  for (bool more = is_tick || worker_.load().size == 0; more;) {
+  for (bool more = is_tick || load().size == 0; more;) {
     TeamOutput output = agent_.step(now_s, sent_bytes_());
-    more = output.more && worker_.load().size == 0;
+    more = output.more && load().size == 0;
     publish(std::move(output));
   }
 }

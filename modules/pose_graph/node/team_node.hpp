@@ -1,18 +1,13 @@
 #pragma once
 
 #include <cstdint>
-#include <exception>
 #include <functional>
 #include <memory>
-#include <string_view>
 #include <variant>
-#include <vector>
 
 #include "modules/pose_graph/team_agent.hpp"
 #include "runtime/dds/peers.hpp"
-#include "runtime/node.hpp"
-#include "runtime/ticking_worker.hpp"
-#include "runtime/topic.hpp"
+#include "runtime/worker_node.hpp"
 
 namespace km {
 
@@ -34,12 +29,21 @@ struct TeamTopics {
   Out<ClosureVerdicts> verdicts;  ///< After sessions that weigh closures.
 };
 
+/// A restarted robot: its keyframe indices have a new meaning.
+struct NewIncarnation {
+  TeamPeer peer;
+};
+using TeamInput =
+    std::variant<Tick, Topic<KeyframeOdometry>::Message, Topic<Closure>::Message,
+                 Topic<PositionFix>::Message, Topic<InlierSet>::Message, Topic<PeerEvent>::Message,
+                 NewIncarnation, Topic<LinksReport>::Message, Topic<TeamMessage>::Message>;
+
 /// The part of one robot in the pose graph optimisation of the team: a TeamAgent on its thread.
 ///
 /// Inputs are processed as they arrive. Optimisation continues piece by piece while no input is
 /// waiting, so that a large graph delays a message by at most one piece. Notices of the agent are
 /// logged at a limited rate.
-class TeamNode final : public Node {
+class TeamNode final : public WorkerNode<TeamInput> {
  public:
   /// `self`: as announced by the participant. `solvers`: creates the solver of each session. Throws
   /// ConfigError if `config` is out of bounds. `sent_bytes`: see TeamAgent::step().
@@ -51,31 +55,11 @@ class TeamNode final : public Node {
   void begin_in_map(std::uint64_t map_id) { agent_.begin_in_map(map_id); }
   void restore(const TeamSolution& solution) { agent_.restore(solution); }
 
-  std::string_view name() const override { return PoseGraphConfig::kSection; }
-  void start() override { worker_.start(); }
-  void stop() noexcept override { worker_.stop(); }
-  std::exception_ptr error() const override { return worker_.error(); }
-  std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
-  /// Large, because the time of a round grows with the graph.
-  double step_limit_s() const override { return 120.0; }
-  DurationHistogram timing() const override { return worker_.timing(); }
-
-  /// Input for the passage of time. Always null: a plain struct among pointers causes a false
-  /// warning of GCC 12.
-  using Tick = std::shared_ptr<const struct TickTag>;
-  /// A restarted robot: its keyframe indices have a new meaning.
-  struct NewIncarnation {
-    TeamPeer peer;
-  };
-  using Input = std::variant<Tick, Topic<KeyframeOdometry>::Message, Topic<Closure>::Message,
-                             Topic<PositionFix>::Message, Topic<InlierSet>::Message,
-                             Topic<PeerEvent>::Message, NewIncarnation, Topic<LinksReport>::Message,
-                             Topic<TeamMessage>::Message>;
-
   /// Handles one input synchronously at time `now_s`. The thread calls only this; so can tests.
   void step(const Input& input, double now_s);
 
  private:
+  void handle(const Input& input) override { step(input, steady_now_s()); }
   void take(const Input& input);
   void take_peer_event(const PeerEvent& event);
   void publish(TeamOutput output);
@@ -85,7 +69,6 @@ class TeamNode final : public Node {
   const std::function<std::uint64_t()> sent_bytes_;
   TeamAgent agent_;
   std::size_t rejected_ = 0;  // closures of this robot that the last verdicts reject
-  TickingWorker<Input> worker_;
 };
 
 }  // namespace km

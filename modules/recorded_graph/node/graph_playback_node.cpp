@@ -39,32 +39,23 @@ SE3 orthonormal(const SE3& T) {
 
 GraphPlaybackNode::GraphPlaybackNode(const GraphPlaybackConfig& config, double rate,
                                      RecordedGraph graph, const GraphPlaybackTopics& topics)
-    : poses_per_second_(checked(config).poses_per_second),
+    : WorkerNode({.name = GraphPlaybackConfig::kSection}),
+      poses_per_second_(checked(config).poses_per_second),
       rate_(checked_rate(rate)),
       graph_(std::move(graph)),
       topics_(topics),
-      closures_of_(closures_by_keyframe(graph_)),
-      worker_(
-          1, Overflow::kBlock, [this](std::size_t index) { play(index); },
-          GraphPlaybackConfig::kSection) {}
+      closures_of_(closures_by_keyframe(graph_)) {}
 
-void GraphPlaybackNode::start() {
+void GraphPlaybackNode::start_sources() {
   begin_ = Clock::now();
-  worker_.post(0);
-  worker_.start();
+  post(0);
 }
 
-void GraphPlaybackNode::stop() noexcept {
-  stop_.request_stop();
-  worker_.stop();
-}
-
-void GraphPlaybackNode::play(std::size_t index) {
+void GraphPlaybackNode::handle(const std::size_t& index) {
   wait_until_due(index);
   if (stop_.stop_requested()) return;
   step(index);
-  if (index + 1 < graph_.poses())
-    worker_.post(index + 1);  // the queue is empty and has room for one
+  if (index + 1 < graph_.poses()) post(index + 1);  // the queue is empty and has room for one
 }
 
 void GraphPlaybackNode::wait_until_due(std::size_t index) {

@@ -3,10 +3,8 @@
 #include <algorithm>
 #include <chrono>
 #include <cstddef>
-#include <exception>
 #include <functional>
 #include <stop_token>
-#include <string_view>
 #include <vector>
 
 #include "modules/core/covariance.hpp"
@@ -15,9 +13,7 @@
 #include "modules/core/pose_graph.hpp"
 #include "modules/recorded_graph/graph_playback_config.hpp"
 #include "modules/recorded_graph/recorded_graph.hpp"
-#include "runtime/node.hpp"
-#include "runtime/topic.hpp"
-#include "runtime/worker.hpp"
+#include "runtime/worker_node.hpp"
 
 namespace km {
 
@@ -43,7 +39,7 @@ struct GraphPlaybackTopics {
 /// the other robot has reached the other end. Verticals are published with their keyframes;
 /// odometry then starts upright, see RecordedGraph::T_odom_first(). Keyframes have the stamps of
 /// the graph. If the graph has none, keyframe i has the stamp i / poses_per_second.
-class GraphPlaybackNode final : public Node {
+class GraphPlaybackNode final : public WorkerNode<std::size_t> {
  public:
   /// `rate`: recorded seconds per second; infinity: as fast as the consumers accept messages.
   /// Throws ConfigError if `config` is out of bounds, std::invalid_argument for a bad rate.
@@ -55,12 +51,8 @@ class GraphPlaybackNode final : public Node {
   void continue_after(std::size_t keyframes) { known_ = std::min(keyframes, graph_.poses()); }
   ~GraphPlaybackNode() override { stop(); }
 
-  std::string_view name() const override { return GraphPlaybackConfig::kSection; }
-  void start() override;
-  /// Ends at once and publishes nothing that is not yet due.
-  void stop() noexcept override;
-  std::exception_ptr error() const override { return worker_.error(); }
-  std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
+  /// None, because steps wait until keyframes are due.
+  DurationHistogram timing() const override { return {}; }
 
   /// Publishes keyframe `index` and its closures, without waiting, and after the last keyframe the
   /// end. Call with 0, 1, ... in turn. The thread only calls this function and waits.
@@ -69,7 +61,10 @@ class GraphPlaybackNode final : public Node {
  private:
   using Clock = std::chrono::steady_clock;
 
-  void play(std::size_t index);
+  void handle(const std::size_t& index) override;
+  void start_sources() override;
+  /// The node ends at once and publishes nothing that is not yet due.
+  void stop_sources() noexcept override { stop_.request_stop(); }
   void wait_until_due(std::size_t index);
   [[nodiscard]] Stamp stamp_of(std::size_t index) const;
 
@@ -85,7 +80,6 @@ class GraphPlaybackNode final : public Node {
   std::size_t known_ = 0;  // number of known keyframes
   Clock::time_point begin_;
   std::stop_source stop_;
-  Worker<std::size_t> worker_;  // last member: stops first; posts the next keyframe to itself
 };
 
 }  // namespace km

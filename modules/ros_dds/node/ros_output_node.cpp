@@ -60,7 +60,12 @@ std::uint8_t level_of(log::Level level) {
 RosOutputNode::RosOutputNode(std::string_view name, std::unique_ptr<RosSink> sink,
                              RosOutputOptions options, Diagnose diagnose, Closures closures,
                              const RosOutputTopics& topics)
-    : node_name_(name),
+    // A disk may block for long, and no other node waits for this one.
+    : WorkerNode({.name = std::string(name),
+                  .queue = options.queue,
+                  .overflow = Overflow::kDropOldest,
+                  .tick_s = 1.0,
+                  .step_limit_s = 300.0}),
       sink_(std::move(sink)),
       options_(std::move(options)),
       name_(ros_name(options_.robot)),
@@ -70,24 +75,15 @@ RosOutputNode::RosOutputNode(std::string_view name, std::unique_ptr<RosSink> sin
       diagnose_(std::move(diagnose)),
       closures_of_(std::move(closures)),
       piece_bytes_(options_.mesh_bytes_per_s, kPiece_bytes, kPiece_bytes),
-      worker_(
-          options_.queue, Overflow::kDropOldest,
-          [this](const Input& input) {
-            std::visit([this](const auto& message) { step(message); }, input);
-          },
-          node_name_, std::chrono::seconds(1), [] { return std::make_shared<const Tick>(); }),
       encoder_(
           kImages, Overflow::kDropOldest,
           [this](const Encoded& input) {
             work_in_background();
             std::visit([this](const auto& message) { encode(message); }, input);
           },
-          node_name_ + "_enc") {
+          std::string(name) + "_enc") {
   open_topics(topics.images.has_value());
-  const auto post = [this](const auto& message) { worker_.post(message); };
-  topics.odometry.subscribe(post);
-  topics.keyframes.subscribe(post);
-  topics.trajectory.subscribe(post);
+  follow(topics.odometry, topics.keyframes, topics.trajectory);
   if (topics.images)
     topics.images->subscribe([this](const auto& packet) { encoder_.post(packet->frame); });
 }
@@ -124,28 +120,18 @@ void RosOutputNode::open_slices() {
   slice_ = sink_->open({'/' + name_ + "/distance_slice", RosPointCloud2::kType, true, 1});
 }
 
-void RosOutputNode::start() {
-  worker_.start();
+void RosOutputNode::start_sources() {
   encoder_.start();
   if (options_.logs) log::set_listener([this](const log::Entry& entry) { listen(entry); });
 }
 
-void RosOutputNode::stop() noexcept {
+void RosOutputNode::stop_sources() noexcept {
   if (options_.logs) log::set_listener({});
   encoder_.stop();
-  worker_.stop();
-}
-
-std::exception_ptr RosOutputNode::error() const {
-  return worker_.error() ? worker_.error() : encoder_.error();
-}
-
-std::vector<Heartbeat*> RosOutputNode::heartbeats() {
-  return {&worker_.heartbeat(), &encoder_.heartbeat()};
 }
 
 std::size_t RosOutputNode::dropped() const {
-  return worker_.load().dropped + encoder_.load().dropped;
+  return load().dropped + encoder_.load().dropped;
 }
 
 void RosOutputNode::listen(const log::Entry& entry) {
@@ -153,20 +139,20 @@ void RosOutputNode::listen(const log::Entry& entry) {
   line.level = level_of(entry.level);
   line.name = name_ + '.' + entry.tag;
   line.msg = entry.text;
-  worker_.post(std::make_shared<const RosLog>(std::move(line)));
+  post(std::make_shared<const RosLog>(std::move(line)));
 }
 
 void RosOutputNode::encode(const Image& image) {
   constexpr int kQuality = 80;
-  worker_.post(std::make_shared<const RosCompressedImage>(RosCompressedImage{
+  post(std::make_shared<const RosCompressedImage>(RosCompressedImage{
       {image->stamp, name_ + "/left_camera"}, "jpeg", encode_jpeg(view(image->left), kQuality)}));
 }
 
 void RosOutputNode::encode(const std::shared_ptr<const LabelledMesh>& mesh) {
   const auto most = static_cast<std::size_t>(options_.mesh_faces);
-  worker_.post(CoarseMesh{mesh->faces.size() <= most
-                              ? mesh
-                              : std::make_shared<const LabelledMesh>(coarsened(*mesh, most))});
+  post(RosCoarseMesh{mesh->faces.size() <= most
+                         ? mesh
+                         : std::make_shared<const LabelledMesh>(coarsened(*mesh, most))});
 }
 
 std::string RosOutputNode::map_of(RobotId anchor) const {
@@ -237,7 +223,7 @@ void RosOutputNode::step(const std::shared_ptr<const LabelledMesh>& mesh) {
   publish_latest(false);
 }
 
-void RosOutputNode::step(const CoarseMesh& coarse) {
+void RosOutputNode::step(const RosCoarseMesh& coarse) {
   pieces_.offer(coarse.mesh);
   publish_pieces();
 }
@@ -248,7 +234,7 @@ void RosOutputNode::step(const Topic<ObjectList>::Message& objects) {
   publish_latest(false);
 }
 
-void RosOutputNode::step(const Slice& slice) {
+void RosOutputNode::step(const RosSlice& slice) {
   if (!slice_) open_slices();
   const std::size_t most = std::max<std::size_t>(slice.points->vertices.size(), 1);
   publish(*slice_, cloud_of(*slice.points, most, {slice.stamp, odom_}));
@@ -360,7 +346,7 @@ void RosOutputNode::publish_diagnostics(std::vector<RosDiagnosticStatus> parts) 
   publish(diagnostics_, RosDiagnosticArray{{stamp_.value_or(0), ""}, std::move(parts)});
 }
 
-void RosOutputNode::step(const std::shared_ptr<const Tick>& /*tick*/) {
+void RosOutputNode::step(const Tick& /*tick*/) {
   auto parts = diagnose_();
   const bool is_silent = !parts;
   if (parts) publish_diagnostics(*std::move(parts));

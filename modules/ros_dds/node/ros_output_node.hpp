@@ -25,11 +25,8 @@
 #include "modules/ros_dds/ros_sink.hpp"
 #include "modules/ros_dds/surface_pieces.hpp"
 #include "runtime/log.hpp"
-#include "runtime/node.hpp"
-#include "runtime/ticking_worker.hpp"
 #include "runtime/token_bucket.hpp"
-#include "runtime/topic.hpp"
-#include "runtime/worker.hpp"
+#include "runtime/worker_node.hpp"
 
 namespace km {
 
@@ -67,6 +64,21 @@ struct RosOutputOptions {
   std::size_t queue = 1000;
 };
 
+/// A mesh to be published in pieces.
+struct RosCoarseMesh {
+  std::shared_ptr<const LabelledMesh> mesh;
+};
+/// A slice of the distance field.
+struct RosSlice {
+  std::shared_ptr<const LabelledMesh> points;
+  Stamp stamp = 0;
+};
+using RosOutputInput =
+    std::variant<Tick, Topic<OdometryState>::Message, Topic<KeyframeOdometry>::Message,
+                 Topic<Trajectory>::Message, std::shared_ptr<const LabelledMesh>, RosCoarseMesh,
+                 Topic<ObjectList>::Message, std::shared_ptr<const OccupancyGrid>, RosSlice,
+                 std::shared_ptr<const RosLog>, std::shared_ptr<const RosCompressedImage>>;
+
 /// Publishes the state of a robot NAME to ROS viewers and planners, or into a file that they read:
 ///   /NAME/odometry     nav_msgs/Odometry, NAME/odom -> NAME/base_link, for every image; no
 ///                      covariance
@@ -92,7 +104,7 @@ struct RosOutputOptions {
 /// later, every robot has a map frame of its own (see RosOutputOptions::name_of). Then /tf contains
 /// once a second the transform from the frame of the team to this map frame. base_link is the frame
 /// of the inertial sensor.
-class RosOutputNode final : public Node {
+class RosOutputNode final : public WorkerNode<RosOutputInput> {
  public:
   /// Returns the diagnostics of the other parts of the robot, by name. In a viewer, nullopt if the
   /// robot has left or no message of it has arrived for long. Then no diagnostics are published,
@@ -107,29 +119,27 @@ class RosOutputNode final : public Node {
                 Diagnose diagnose, Closures closures, const RosOutputTopics& topics);
   ~RosOutputNode() override { stop(); }
 
-  std::string_view name() const override { return node_name_; }
   /// Replaces the mesh by `mesh`, whose frame is `map`. Thread-safe; does not wait.
-  void offer(std::shared_ptr<const LabelledMesh> mesh) { worker_.post(std::move(mesh)); }
+  void offer(std::shared_ptr<const LabelledMesh> mesh) { post(std::move(mesh)); }
   /// Replaces the objects by `objects`, whose frame is `map`. Thread-safe; does not wait.
-  void offer(std::shared_ptr<const ObjectList> objects) { worker_.post(std::move(objects)); }
+  void offer(std::shared_ptr<const ObjectList> objects) { post(std::move(objects)); }
   /// Publishes a slice of the distance field: points in the frame NAME/odom. Thread-safe; does not
   /// wait.
   void offer_slice(std::shared_ptr<const LabelledMesh> points, Stamp stamp) {
-    worker_.post(Slice{std::move(points), stamp});
+    post(RosSlice{std::move(points), stamp});
   }
   /// Replaces the 2D map, whose frame is `map`. Thread-safe; does not wait.
-  void offer(std::shared_ptr<const OccupancyGrid> grid) { worker_.post(std::move(grid)); }
+  void offer(std::shared_ptr<const OccupancyGrid> grid) { post(std::move(grid)); }
 
-  void start() override;
   /// True if the topic of slices has readers, as of the last second. Thread-safe.
   [[nodiscard]] bool has_slice_readers() const { return has_slice_readers_; }
 
-  void stop() noexcept override;
-  std::exception_ptr error() const override;
-  std::vector<Heartbeat*> heartbeats() override;
-  /// Large, because a disk may block for long and no other node waits for this one.
-  double step_limit_s() const override { return 300.0; }
-  DurationHistogram timing() const override { return worker_.timing(); }
+  std::exception_ptr error() const override {
+    return first_of({WorkerNode::error(), encoder_.error()});
+  }
+  std::vector<Heartbeat*> heartbeats() override {
+    return {WorkerNode::heartbeats().front(), &encoder_.heartbeat()};
+  }
 
   /// Publishes the final path, mesh, closures and files. Call it after stop(), as the last call.
   /// `closures` is nullopt if they are unchanged. `poses`, in `map`, are the poses of all images
@@ -142,22 +152,6 @@ class RosOutputNode final : public Node {
   [[nodiscard]] std::size_t dropped() const;
 
  private:
-  struct Tick {};
-  // A mesh to be published in pieces.
-  struct CoarseMesh {
-    std::shared_ptr<const LabelledMesh> mesh;
-  };
-  // A slice of the distance field.
-  struct Slice {
-    std::shared_ptr<const LabelledMesh> points;
-    Stamp stamp = 0;
-  };
-  using Input =
-      std::variant<std::shared_ptr<const Tick>, Topic<OdometryState>::Message,
-                   Topic<KeyframeOdometry>::Message, Topic<Trajectory>::Message,
-                   std::shared_ptr<const LabelledMesh>, CoarseMesh, Topic<ObjectList>::Message,
-                   std::shared_ptr<const OccupancyGrid>, Slice, std::shared_ptr<const RosLog>,
-                   std::shared_ptr<const RosCompressedImage>>;
   using Image = std::shared_ptr<const StereoFrame>;
   using Encoded = std::variant<Image, std::shared_ptr<const LabelledMesh>>;
   // Topic whose message replaces the former one: path, mesh, 2D map, closures or objects. A changed
@@ -170,15 +164,20 @@ class RosOutputNode final : public Node {
 
   void open_topics(bool has_images);
   void open_slices();
-  void step(const std::shared_ptr<const Tick>& tick);
+  void handle(const Input& input) override {
+    std::visit([this](const auto& message) { step(message); }, input);
+  }
+  void start_sources() override;
+  void stop_sources() noexcept override;
+  void step(const Tick& tick);
   void publish_diagnostics(std::vector<RosDiagnosticStatus> parts);
   void step(const Topic<OdometryState>::Message& state);
   void step(const Topic<KeyframeOdometry>::Message& keyframe);
   void step(const Topic<Trajectory>::Message& trajectory);
   void step(const std::shared_ptr<const LabelledMesh>& mesh);
-  void step(const CoarseMesh& coarse);
+  void step(const RosCoarseMesh& coarse);
   void step(const Topic<ObjectList>::Message& objects);
-  void step(const Slice& slice);
+  void step(const RosSlice& slice);
   void step(const std::shared_ptr<const OccupancyGrid>& grid);
   void step(const std::shared_ptr<const RosLog>& line);
   void step(const std::shared_ptr<const RosCompressedImage>& image);
@@ -197,7 +196,6 @@ class RosOutputNode final : public Node {
   void publish_pieces();
   void publish_team_frame();
 
-  const std::string node_name_;
   const std::unique_ptr<RosSink> sink_;
   const RosOutputOptions options_;
   const std::string name_, odom_, base_link_, map_;
@@ -221,7 +219,6 @@ class RosOutputNode final : public Node {
   SurfacePieces pieces_;
   TokenBucket piece_bytes_;
   std::vector<PublishedClosure> newest_closures_;
-  TickingWorker<Input> worker_;
   Worker<Encoded> encoder_;  // last member: stops first
 };
 

@@ -3,7 +3,6 @@
 #include <utility>
 
 #include "runtime/log.hpp"
-#include "runtime/thread.hpp"
 
 namespace km {
 namespace {
@@ -15,26 +14,23 @@ constexpr std::size_t kQueuedFrames = 2;
 SemanticMappingNode::SemanticMappingNode(const SemanticMappingConfig& config, const Camera& camera,
                                          const LabelPalette& palette, double mesh_interval_s,
                                          Overflow overflow, const SemanticMappingTopics& topics)
-    : mapper_(config, camera, palette),
+    // A mesh of the whole map is made in one step, whose time is proportional to the map.
+    : WorkerNode({.name = SemanticMappingConfig::kSection,
+                  .queue = kQueuedFrames,
+                  .overflow = overflow,
+                  .in_background = true,
+                  .step_limit_s = 120.0}),
+      mapper_(config, camera, palette),
       palette_(palette),
       mesh_interval_s_(mesh_interval_s),
-      topics_(topics),
-      worker_(
-          kQueuedFrames, overflow,
-          [this](const auto& frame) {
-            work_in_background();
-            step(*frame);
-          },
-          SemanticMappingConfig::kSection) {
-  topics_.frames.subscribe([this](const auto& frame) { worker_.post(frame); });
+      topics_(topics) {
+  follow(topics.frames);
   topics_.superseded.subscribe([this](const auto& superseded) { superseded_.put(superseded); });
 }
 
-void SemanticMappingNode::stop() noexcept {
-  worker_.stop();
-  const bool nothing = progress_.integrated == 0 && !before_;
-  if (std::exchange(stopped_, true) || nothing || error()) return;
-  progress_.too_late = worker_.load().dropped;
+void SemanticMappingNode::conclude() {
+  if (progress_.integrated == 0 && !before_) return;
+  progress_.too_late = load().dropped;
   publish_mesh();
   progress_.size = mapper_.size();
   topics_.progress.publish(progress_);
@@ -84,7 +80,7 @@ void SemanticMappingNode::count(const DenseFrame& frame, const IntegrationReport
       integrated && (frame.labels == nullptr || report.label_size_differs) ? 1 : 0;
   progress_.off_palette_pixels += report.off_palette_pixels;
   progress_.blocks_refused += report.blocks_refused;
-  progress_.too_late = worker_.load().dropped;
+  progress_.too_late = load().dropped;
 }
 
 void SemanticMappingNode::publish_space(const DenseFrame& frame) {

@@ -1,19 +1,14 @@
 #pragma once
 
-#include <exception>
 #include <functional>
 #include <optional>
-#include <string_view>
 #include <utility>
-#include <vector>
 
 #include "modules/core/dense_frame.hpp"
 #include "modules/mesh/resumed_map.hpp"
 #include "modules/semantic_mapping/semantic_mapper.hpp"
 #include "runtime/latest.hpp"
-#include "runtime/node.hpp"
-#include "runtime/topic.hpp"
-#include "runtime/worker.hpp"
+#include "runtime/worker_node.hpp"
 
 namespace km {
 
@@ -29,7 +24,7 @@ struct SemanticMappingTopics {
 
 /// Builds a robot's map as a thread with one SemanticMapper. The mesh is published every few
 /// seconds and at the end.
-class SemanticMappingNode final : public Node {
+class SemanticMappingNode final : public WorkerNode<Topic<DenseFrame>::Message> {
  public:
   /// `camera` takes the frames. A mesh is published every `mesh_interval_s`, by stamps. `overflow`:
   /// whether a full queue delays the frames or drops the oldest. Throws under the conditions of
@@ -48,21 +43,13 @@ class SemanticMappingNode final : public Node {
   /// The mesh is appended to the map of an earlier process. Call before start().
   void continue_from(ResumedMap before) { before_.emplace(std::move(before)); }
 
-  std::string_view name() const override { return SemanticMappingConfig::kSection; }
-  void start() override { worker_.start(); }
-  /// Finishes queued frames and publishes the final mesh.
-  void stop() noexcept override;
-  std::exception_ptr error() const override { return worker_.error(); }
-  std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
-  /// A mesh of the whole map is made in one step, whose time is proportional to the map.
-  double step_limit_s() const override { return 120.0; }
-  DurationHistogram timing() const override { return worker_.timing(); }
-
   /// Drops superseded surface and then handles one frame, synchronously. The thread calls only this
   /// function; tests and replay can call it too.
   void step(const DenseFrame& frame);
 
  private:
+  void handle(const Topic<DenseFrame>::Message& frame) override { step(*frame); }
+  void conclude() override;
   void count(const DenseFrame& frame, const IntegrationReport& report);
   void drop_superseded();
   void publish_mesh();
@@ -78,11 +65,9 @@ class SemanticMappingNode final : public Node {
   MappingProgress progress_;
   std::optional<KeyframeIndex> meshed_;  // keyframe of the last update of the mesh
   std::optional<Stamp> published_;       // stamp at the last mesh, or of the first frame
-  bool stopped_ = false;
   // Superseded surface results from the node's own maps. It does not wait for room in the node's
   // queue, because this would be a deadlock.
   Latest<SupersededSurface> superseded_;
-  Worker<Topic<DenseFrame>::Message> worker_;  // last member: stops first
 };
 
 }  // namespace km

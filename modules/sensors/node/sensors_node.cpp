@@ -22,40 +22,33 @@ void log_lines(const std::string& text, std::string_view name) {
 
 SensorsNode::SensorsNode(const SensorsConfig& config, const PlaybackPace& pace,
                          std::unique_ptr<DatasetReader> reader, const SensorsTopics& topics)
-    : reader_(std::move(reader)),
+    : WorkerNode({.name = "sensors", .queue = kReadAhead}),
+      reader_(std::move(reader)),
       listed_(reader_->pair_count()),
       is_live_(reader_->is_live()),
       leaves_out_(is_live_ || !pace.waits),
       shedding_(checked(config).max_lag_s),
       clock_(pace.rate),
-      topics_(topics),
-      worker_(
-          kReadAhead, Overflow::kBlock,
-          [this](const Input& input) {
-            std::visit([this](const auto& message) { step(message); }, input);
-          },
-          "sensors") {
+      topics_(topics) {
   topics_.processed.subscribe([this](const auto& frame) {
     const std::lock_guard lock(shedding_mutex_);
     shedding_.finish(*frame);
   });
 }
 
-void SensorsNode::start() {
-  worker_.start();
+void SensorsNode::start_sources() {
   // A failure of the decoder reaches the worker behind the packets that were decoded before it.
   decoder_.start(
-      "decoder", [this] { decode(); }, [this] { worker_.post(std::current_exception()); });
+      "decoder", [this] { decode(); }, [this] { post(std::current_exception()); });
 }
 
-void SensorsNode::stop() noexcept {
+void SensorsNode::stop_sources() noexcept {
   stopped_ = true;
   reader_->stop();
   clock_.stop();
-  const bool is_running = decoder_.joinable();
+  if (!decoder_.joinable()) return;
   decoder_.join();
-  worker_.stop();
-  if (is_running) take_faults();
+  take_faults();
 }
 
 void SensorsNode::decode() {
@@ -71,10 +64,10 @@ void SensorsNode::decode() {
       for (const std::string& remark : reader_->remarks()) log::info(name()) << remark;
     count_faults();
     if (!packet) {
-      worker_.post(EndOfData{reader_->report()});
+      post(reader_->report());
       return;
     }
-    if (!worker_.post(std::make_shared<const SensorPacket>(std::move(*packet)))) return;
+    if (!post(std::make_shared<const SensorPacket>(std::move(*packet)))) return;
   }
 }
 
@@ -152,7 +145,7 @@ void SensorsNode::report_load(const ShedLoad& before, const ShedLoad& now) {
     line << (now.map ? "the map gets no new frames" : "the map gets new frames");
 }
 
-void SensorsNode::step(const Packet& packet) {
+void SensorsNode::step(const Topic<SensorPacket>::Message& packet) {
   const bool is_due = [&] {
     if (is_live_) return !stopped_;
     const Heartbeat::Waiting waiting;
@@ -163,11 +156,11 @@ void SensorsNode::step(const Packet& packet) {
   ++published_;
 }
 
-void SensorsNode::step(const EndOfData& data) {
+void SensorsNode::step(const ReaderReport& faults) {
   if (stopped_) return;
-  log_lines(to_string(data.faults), name());
+  log_lines(to_string(faults), name());
   log::info(name()) << "end of data: " << published_ << " frames, " << skipped_ << " skipped";
-  topics_.end({published_, skipped_, paused_s(), data.faults});
+  topics_.end({published_, skipped_, paused_s(), faults});
 }
 
 }  // namespace km

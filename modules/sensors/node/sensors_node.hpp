@@ -8,7 +8,6 @@
 #include <memory>
 #include <mutex>
 #include <string>
-#include <string_view>
 #include <variant>
 #include <vector>
 
@@ -19,9 +18,7 @@
 #include "runtime/clock.hpp"
 #include "runtime/guarded_thread.hpp"
 #include "runtime/metrics.hpp"
-#include "runtime/node.hpp"
-#include "runtime/topic.hpp"
-#include "runtime/worker.hpp"
+#include "runtime/worker_node.hpp"
 
 namespace km {
 
@@ -43,11 +40,14 @@ struct SensorsTopics {
   std::function<void(const SensorsEnd&)> end;
 };
 
+/// A packet, the end of the recording with its faults, or a failure of the decoder.
+using SensorsInput = std::variant<Topic<SensorPacket>::Message, ReaderReport, std::exception_ptr>;
+
 /// Plays a recording, or publishes live measurements. One thread decodes ahead. Another thread
 /// publishes each packet when it is due; a live packet is due at once. A consumer with a full queue
 /// (kBlock) delays publication. For live sensors, and at a PlaybackPace that does not wait,
 /// LoadShedding chooses which frames are decoded. The inertial samples of all frames are kept.
-class SensorsNode final : public Node {
+class SensorsNode final : public WorkerNode<SensorsInput> {
  public:
   /// Throws ConfigError if `config` is out of bounds, and std::invalid_argument unless the rate of
   /// `pace` is positive.
@@ -55,12 +55,9 @@ class SensorsNode final : public Node {
               std::unique_ptr<DatasetReader> reader, const SensorsTopics& topics);
   ~SensorsNode() override { stop(); }
 
-  std::string_view name() const override { return "sensors"; }
-  void start() override;
-  /// Ends at once and drops packets that are decoded but not yet due.
-  void stop() noexcept override;
-  std::exception_ptr error() const override { return worker_.error(); }
-  std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat(), &decoding_}; }
+  std::vector<Heartbeat*> heartbeats() override {
+    return {WorkerNode::heartbeats().front(), &decoding_};
+  }
   /// Durations of reading and decoding a packet.
   DurationHistogram timing() const override { return reading_.histogram(); }
 
@@ -82,12 +79,12 @@ class SensorsNode final : public Node {
   std::size_t listed() const { return std::max<std::size_t>(listed_, published_ + skipped_); }
 
  private:
-  struct EndOfData {
-    ReaderReport faults;
-  };
-  using Packet = std::shared_ptr<const SensorPacket>;
-  using Input = std::variant<Packet, EndOfData, std::exception_ptr>;
-
+  void handle(const Input& input) override {
+    std::visit([this](const auto& message) { step(message); }, input);
+  }
+  void start_sources() override;
+  /// Packets that are decoded but not yet due are dropped.
+  void stop_sources() noexcept override;
   void decode();
   void count_faults();
   void take_faults();
@@ -95,8 +92,8 @@ class SensorsNode final : public Node {
   [[nodiscard]] FrameUse choose_use(Stamp stamp, double due_s, double now_s);
   [[nodiscard]] double wait_for_odometry(double due_s, double now_s);
   void report_load(const ShedLoad& before, const ShedLoad& now);
-  void step(const Packet& packet);
-  void step(const EndOfData& end);
+  void step(const Topic<SensorPacket>::Message& packet);
+  void step(const ReaderReport& end_of_data);
   void step(const std::exception_ptr& failure) { std::rethrow_exception(failure); }
 
   std::unique_ptr<DatasetReader> reader_;
@@ -118,7 +115,6 @@ class SensorsNode final : public Node {
   Timing reading_;
   Heartbeat decoding_;  // heartbeat of the decoder thread, one step per packet
   GuardedThread decoder_;
-  Worker<Input> worker_;  // last member: stops first
 };
 
 }  // namespace km

@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "runtime/log.hpp"
-#include "runtime/thread.hpp"
 
 namespace km {
 namespace {
@@ -16,22 +15,13 @@ constexpr std::size_t kQueue = 4096;
 }  // namespace
 
 TeamMapNode::TeamMapNode(double voxel_m, LabelPalette palette, const TeamMapTopics& topics)
-    : voxel_m_(voxel_m),
-      palette_(std::move(palette)),
-      worker_(
-          kQueue, Overflow::kBlock,
-          [this](const Input& input) {
-            work_in_background();
-            take(input);
-          },
-          "team_map") {
-  for (const In<MeshChunk>& chunks : {topics.own_chunks, topics.received_chunks})
-    chunks.subscribe([this](const auto& chunk) { worker_.post(chunk); });
-  for (const In<MeshPoses>& poses : {topics.own_poses, topics.received_poses})
-    poses.subscribe([this](const auto& newest) { worker_.post(newest); });
+    : WorkerNode({.name = "team_map", .queue = kQueue, .in_background = true}),
+      voxel_m_(voxel_m),
+      palette_(std::move(palette)) {
+  follow(topics.own_chunks, topics.received_chunks, topics.own_poses, topics.received_poses);
 }
 
-void TeamMapNode::take(const Input& input) {
+void TeamMapNode::handle(const Input& input) {
   const std::lock_guard lock(mutex_);
   const auto* const chunk = std::get_if<Topic<MeshChunk>::Message>(&input);
   const auto* const poses = std::get_if<Topic<MeshPoses>::Message>(&input);

@@ -1,19 +1,14 @@
 #pragma once
 
-#include <exception>
 #include <mutex>
-#include <string_view>
 #include <variant>
-#include <vector>
 
 #include "modules/core/label_palette.hpp"
 #include "modules/mesh/mesh_chunks.hpp"
 #include "modules/mesh/mesh_poses.hpp"
 #include "modules/mesh/team_mesh.hpp"
 #include "modules/team_map/team_map.hpp"
-#include "runtime/node.hpp"
-#include "runtime/topic.hpp"
-#include "runtime/worker.hpp"
+#include "runtime/worker_node.hpp"
 
 namespace km {
 
@@ -25,18 +20,12 @@ struct TeamMapTopics {
 };
 
 /// Stores the chunks and poses of all robots, and fuses them into one mesh when it is asked for.
-class TeamMapNode final : public Node {
+class TeamMapNode final
+    : public WorkerNode<std::variant<Topic<MeshChunk>::Message, Topic<MeshPoses>::Message>> {
  public:
   /// `palette` colours the mesh, if it has classes.
   TeamMapNode(double voxel_m, LabelPalette palette, const TeamMapTopics& topics);
   ~TeamMapNode() override { stop(); }
-
-  std::string_view name() const override { return "team_map"; }
-  void start() override { worker_.start(); }
-  void stop() noexcept override { worker_.stop(); }  ///< Takes the messages that have arrived.
-  std::exception_ptr error() const override { return worker_.error(); }
-  std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
-  DurationHistogram timing() const override { return worker_.timing(); }
 
   [[nodiscard]] const LabelPalette& palette() const { return palette_; }
 
@@ -45,15 +34,12 @@ class TeamMapNode final : public Node {
   [[nodiscard]] TeamMap fuse() const;
 
  private:
-  using Input = std::variant<Topic<MeshChunk>::Message, Topic<MeshPoses>::Message>;
-
-  void take(const Input& input);
+  void handle(const Input& input) override;
 
   const double voxel_m_;
   const LabelPalette palette_;
   mutable std::mutex mutex_;  // guards chunks_
   TeamMesh chunks_;
-  Worker<Input> worker_;
 };
 
 }  // namespace km

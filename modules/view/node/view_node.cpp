@@ -41,7 +41,13 @@ constexpr double kUnlimited = std::numeric_limits<double>::infinity();
 ViewNode::ViewNode(const ViewConfig& config, const DdsParticipant& participant,
                    const ViewMesh& mesh, const std::optional<Camera>& camera,
                    const ViewTopics& topics)
-    : config_(checked(config)),
+    // A slow link may block the socket for long.
+    : WorkerNode({.name = ViewConfig::kSection,
+                  .queue = kQueue,
+                  .overflow = Overflow::kDropOldest,
+                  .tick_s = kTick_s,
+                  .step_limit_s = 120.0}),
+      config_(checked(config)),
       participant_(participant),
       self_(participant.identity().robot),
       mesh_settings_(mesh),
@@ -52,21 +58,11 @@ ViewNode::ViewNode(const ViewConfig& config, const DdsParticipant& participant,
       past_budget_(budget_of(config.past_bytes_per_s())),
       selector_(self_),
       schedule_(mesh.min_move_m),
-      layers_(self_, kLayerShare * config.mesh_bytes_per_s()),
-      worker_(
-          kQueue, Overflow::kDropOldest, [this](const Input& input) { step(input); },
-          ViewConfig::kSection, steady_duration(kTick_s), [] { return Tick(); }) {
-  const auto post = [this](const auto& message) { worker_.post(message); };
-  topics.odometry.subscribe(post);
-  topics.keyframes.subscribe(post);
-  topics.outcomes.subscribe(post);
-  topics.restored_outcomes.subscribe(post);
-  topics.closures.subscribe(post);
-  topics.restarts.subscribe(post);
-  topics.objects.subscribe(post);
-  topics.maps_2d.subscribe(post);
+      layers_(self_, kLayerShare * config.mesh_bytes_per_s()) {
+  follow(topics.odometry, topics.keyframes, topics.outcomes, topics.restored_outcomes,
+         topics.closures, topics.restarts, topics.objects, topics.maps_2d);
   if (!camera_ || config_.images_per_s <= 0.0) return;
-  topics.images.subscribe([this, post, due_s = 0.0](const auto& image) mutable {
+  topics.images.subscribe([this, due_s = 0.0](const auto& image) mutable {
     const double now_s = steady_now_s();
     if (!are_images_asked_ || now_s < due_s) return;
     due_s = now_s + 1.0 / config_.images_per_s;
@@ -75,13 +71,10 @@ ViewNode::ViewNode(const ViewConfig& config, const DdsParticipant& participant,
 }
 
 void ViewNode::offer(RobotId anchor, std::shared_ptr<const LabelledMesh> mesh) {
-  worker_.post(MeshOffer{anchor, std::move(mesh)});
+  post(ViewMeshOffer{anchor, std::move(mesh)});
 }
 
-void ViewNode::stop() noexcept try {
-  worker_.stop();
-  if (!std::exchange(stopped_, true) && error() == nullptr) send_rest();
-} catch (const std::exception& error) {
+void ViewNode::conclude() try { send_rest(); } catch (const std::exception& error) {
   log::warn(name()) << "the final state was not sent: " << error.what();
 }
 
@@ -107,7 +100,7 @@ void ViewNode::take(const Tick& /*tick*/) {
   send_due(steady_now_s());
 }
 
-void ViewNode::take(const MeshOffer& offer) {
+void ViewNode::take(const ViewMeshOffer& offer) {
   mesh_ = offer;
   is_cut_ = false;
 }

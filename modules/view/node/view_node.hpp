@@ -3,12 +3,9 @@
 #include <array>
 #include <atomic>
 #include <cstddef>
-#include <exception>
 #include <memory>
 #include <optional>
-#include <string_view>
 #include <variant>
-#include <vector>
 
 #include "modules/core/camera.hpp"
 #include "modules/core/closure_verdicts.hpp"
@@ -20,10 +17,8 @@
 #include "modules/view/view_selector.hpp"
 #include "runtime/dds/participant.hpp"
 #include "runtime/dds/peer_table.hpp"
-#include "runtime/node.hpp"
-#include "runtime/ticking_worker.hpp"
 #include "runtime/token_bucket.hpp"
-#include "runtime/topic.hpp"
+#include "runtime/worker_node.hpp"
 
 namespace km {
 
@@ -45,12 +40,24 @@ struct ViewMesh {
   double min_move_m = kMinChunkMove_m;  ///< See differ().
 };
 
+/// A mesh in the frame of the robot `anchor`.
+struct ViewMeshOffer {
+  RobotId anchor = 0;
+  std::shared_ptr<const LabelledMesh> mesh;
+};
+using ViewInput = std::variant<
+    Tick, ViewMeshOffer, Topic<OdometryState>::Message, Topic<KeyframeOdometry>::Message,
+    Topic<ClosureOutcome>::Message, Topic<Closure>::Message, Topic<ClosureJudgements>::Message,
+    Topic<PoseChanges>::Message, Topic<RobotSample>::Message, Topic<PeerEvent>::Message,
+    Topic<ObjectList>::Message, Topic<OccupancyGrid>::Message, std::shared_ptr<const LabelledMesh>,
+    Topic<TrackedImage>::Message>;
+
 /// Sends the state of the robot to viewers (see ViewUpdate), on topics of its own in the team's
 /// domain. It sends the updates of a ViewSelector, the mesh in chunks, the updates of ViewLayers,
 /// and camera images on request. Images have a rate, other topics a budget. While a topic has no
 /// reader, the node only keeps the newest inputs. No node waits for a viewer; updates that DDS
 /// cannot accept are lost.
-class ViewNode final : public Node {
+class ViewNode final : public WorkerNode<ViewInput> {
  public:
   /// `participant` outlives this. Throws ConfigError if `config` is out of bounds. `camera` belongs
   /// to the images; without it no images are sent.
@@ -62,7 +69,7 @@ class ViewNode final : public Node {
   void offer(RobotId anchor, std::shared_ptr<const LabelledMesh> mesh);
 
   /// Replaces the points of the slice (see DistanceSlice). Thread-safe; does not wait.
-  void offer_slice(std::shared_ptr<const LabelledMesh> points) { worker_.post(std::move(points)); }
+  void offer_slice(std::shared_ptr<const LabelledMesh> points) { post(std::move(points)); }
 
   /// True if a viewer reads the map. Thread-safe.
   [[nodiscard]] bool has_map_viewers() const { return sends_mesh_; }
@@ -70,32 +77,8 @@ class ViewNode final : public Node {
   /// does not wait.
   template <typename Event>
   void offer(const Event& event) {
-    worker_.post(std::make_shared<const Event>(event));
+    post(std::make_shared<const Event>(event));
   }
-
-  std::string_view name() const override { return ViewConfig::kSection; }
-  void start() override { worker_.start(); }
-  /// Sends the remaining updates: at most two seconds at ViewConfig::past_bytes_per_s, and ten
-  /// seconds at mesh_bytes_per_s for the map.
-  void stop() noexcept override;
-  std::exception_ptr error() const override { return worker_.error(); }
-  std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
-  DurationHistogram timing() const override { return worker_.timing(); }
-  /// Large, because a slow link may block the socket for as long.
-  double step_limit_s() const override { return 120.0; }
-
-  struct Tick {};
-  struct MeshOffer {
-    RobotId anchor = 0;
-    std::shared_ptr<const LabelledMesh> mesh;
-  };
-  using Input =
-      std::variant<Tick, MeshOffer, Topic<OdometryState>::Message, Topic<KeyframeOdometry>::Message,
-                   Topic<ClosureOutcome>::Message, Topic<Closure>::Message,
-                   Topic<ClosureJudgements>::Message, Topic<PoseChanges>::Message,
-                   Topic<RobotSample>::Message, Topic<PeerEvent>::Message,
-                   Topic<ObjectList>::Message, Topic<OccupancyGrid>::Message,
-                   std::shared_ptr<const LabelledMesh>, Topic<TrackedImage>::Message>;
 
   /// Stores an input; a Tick sends the updates that are due by the steady clock. The thread calls
   /// only this.
@@ -115,9 +98,13 @@ class ViewNode final : public Node {
     std::atomic<std::size_t> sent_bytes = 0;
   };
 
+  void handle(const Input& input) override { step(input); }
+  /// Sends the remaining updates: at most two seconds at ViewConfig::past_bytes_per_s, and ten
+  /// seconds at mesh_bytes_per_s for the map.
+  void conclude() override;
   // Each take() stores an input, except for a Tick, which sends.
   void take(const Tick& tick);
-  void take(const MeshOffer& offer);
+  void take(const ViewMeshOffer& offer);
   void take(const Topic<PeerEvent>::Message& event);
   void take(const Topic<ObjectList>::Message& objects) { layers_.add(objects); }
   void take(const Topic<OccupancyGrid>::Message& map) { layers_.add(map); }
@@ -149,15 +136,13 @@ class ViewNode final : public Node {
   std::uint64_t moves_ = 0;  // Moves of the participant to which the writers belong.
   TokenBucket past_budget_;  // Budget of kView while earlier data are sent.
   ViewSelector selector_;
-  MeshOffer mesh_;      // The newest mesh.
+  ViewMeshOffer mesh_;  // The newest mesh.
   bool is_cut_ = true;  // True if `mesh_` is in the schedule.
   double cut_due_s_ = 0.0;
   std::atomic<bool> sends_mesh_ = false;  // True if the mesh channel has a reader.
   ChunkSchedule schedule_;
   ViewLayers layers_;
   std::atomic<bool> are_images_asked_ = false;
-  bool stopped_ = false;
-  TickingWorker<Input> worker_;
 };
 
 }  // namespace km

@@ -13,17 +13,13 @@ constexpr std::size_t kQueued = 4;
 
 ExternalOdometryNode::ExternalOdometryNode(RobotId robot, DepthSource depth_source,
                                            const VioConfig& config, const VioTopics& topics)
-    : odometry_(robot, depth_source, config),
-      topics_(topics),
-      worker_(
-          kQueued, Overflow::kBlock, [this](const auto& packet) { step(*packet); }, "odometry") {
-  topics_.packets.subscribe([this](const auto& packet) { worker_.post(packet); });
+    : WorkerNode({.name = "odometry", .queue = kQueued}),
+      odometry_(robot, depth_source, config),
+      topics_(topics) {
+  follow(topics.packets);
 }
 
-void ExternalOdometryNode::stop() noexcept {
-  worker_.stop();
-  if (stopped_) return;
-  stopped_ = true;
+void ExternalOdometryNode::conclude() {
   log::info(name()) << images_ << " images, " << without_pose_ << " without a pose, " << jumps_
                     << " jumps";
 }

@@ -73,19 +73,14 @@ std::optional<double> tracked_share(const TrackerStatistics& s) {
 
 VioNode::VioNode(RobotId robot, const SensorRig& rig, const TrackerConfig& tracker,
                  const VioConfig& config, const VioTopics& topics)
-    : vio_(robot, rig, tracker, config),
+    : WorkerNode({.name = VioConfig::kSection, .queue = kQueuedPackets}),
+      vio_(robot, rig, tracker, config),
       has_imu_(rig.has_imu),
-      topics_(topics),
-      worker_(
-          kQueuedPackets, Overflow::kBlock, [this](const auto& packet) { step(*packet); },
-          VioConfig::kSection) {
-  topics_.packets.subscribe([this](const auto& packet) { worker_.post(packet); });
+      topics_(topics) {
+  follow(topics.packets);
 }
 
-void VioNode::stop() noexcept {
-  worker_.stop();
-  if (stopped_) return;
-  stopped_ = true;
+void VioNode::conclude() {
   const VioStatistics& s = vio_.statistics();
   log::info(name()) << s.images << " images, " << s.images_without_pose << " without a pose, "
                     << s.starts << " starts in " << s.start_attempts << " attempts, "

@@ -1,15 +1,9 @@
 #pragma once
 
-#include <exception>
-#include <string_view>
-#include <vector>
-
 #include "modules/core/processing_load.hpp"
 #include "modules/core/tracked_image.hpp"
 #include "modules/vio/vio.hpp"
-#include "runtime/node.hpp"
-#include "runtime/topic.hpp"
-#include "runtime/worker.hpp"
+#include "runtime/worker_node.hpp"
 
 namespace km {
 
@@ -25,7 +19,7 @@ struct VioTopics {
 };
 
 /// Runs one Vio in a thread. A full queue delays the sensors.
-class VioNode final : public Node {
+class VioNode final : public WorkerNode<Topic<SensorPacket>::Message> {
  public:
   /// Throws ConfigError if a config is out of bounds, std::invalid_argument for an unusable rig.
   VioNode(RobotId robot, const SensorRig& rig, const TrackerConfig& tracker,
@@ -35,19 +29,13 @@ class VioNode final : public Node {
   void continue_from(const VioCheckpoint& checkpoint) { vio_.continue_from(checkpoint); }
   ~VioNode() override { stop(); }
 
-  std::string_view name() const override { return VioConfig::kSection; }
-  void start() override { worker_.start(); }
-  /// Finishes queued packets and logs a summary.
-  void stop() noexcept override;
-  std::exception_ptr error() const override { return worker_.error(); }
-  std::vector<Heartbeat*> heartbeats() override { return {&worker_.heartbeat()}; }
-  DurationHistogram timing() const override { return worker_.timing(); }
-
   /// Handles one packet synchronously. The thread calls only this function; tests and replay can
   /// call it too.
   void step(const SensorPacket& packet);
 
  private:
+  void handle(const Topic<SensorPacket>::Message& packet) override { step(*packet); }
+  void conclude() override;
   void report(const VioResult& result, Stamp stamp) const;
   void log_event(const VisionEvent& event) const;
 
@@ -55,8 +43,6 @@ class VioNode final : public Node {
   const bool has_imu_;
   const VioTopics topics_;
   double blind_s_ = 0.0;
-  bool stopped_ = false;
-  Worker<Topic<SensorPacket>::Message> worker_;  // last member: stops first
 };
 
 }  // namespace km

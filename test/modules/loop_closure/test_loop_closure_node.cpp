@@ -352,18 +352,5 @@ TEST_CASE("a reply without a request changes nothing", "[loop_closure_node]") {
   CHECK(robot.closures.empty());
 }
 
-TEST_CASE("the node works through its thread", "[loop_closure_node]") {
-  const Scene scene(12);
-  Robot robot(kSelf);
-  robot.node.start();
-  robot.keyframes.publish(scene.own);
-  robot.candidates.publish(scene.candidate());
-  robot.node.stop();  // finishes what is queued
-  CHECK_FALSE(robot.node.error());
-  CHECK(robot.requests.size() >= 1);
-  REQUIRE_FALSE(robot.reports.empty());
-  CHECK(robot.reports.front().stage == kCandidate);
-}
-
 }  // namespace
 }  // namespace km

@@ -123,7 +123,7 @@ struct TwoViews {
       origin.seen_by.push_back(vertex.x() < 0.0F ? std::array<KeyframeIndex, 2>{0, 2}
                                                  : std::array<KeyframeIndex, 2>{12, 12});
   }
-  [[nodiscard]] MeshChunksNode::Offer offer() const {
+  [[nodiscard]] MeshOffer offer() const {
     return {kAnchor, mesh, std::make_shared<const MeshOrigin>(origin)};
   }
   std::shared_ptr<const LabelledMesh> mesh;

@@ -63,8 +63,8 @@ void show_map(const Robot& robot, MeshDeformationNode& node) {
   node.step(robot.map, 0.0);
 }
 
-const MeshDeformationNode::Input kTick = MeshDeformationNode::Tick();
-const MeshDeformationNode::Input kEnd = MeshDeformationNode::End();
+const MeshDeformationNode::Input kTick = Tick();
+const MeshDeformationNode::Input kEnd = MeshEnd();
 
 // Time in steps far longer than any correction.
 class Hours {

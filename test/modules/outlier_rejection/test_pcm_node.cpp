@@ -124,17 +124,6 @@ TEST_CASE("The PCM node survives closures that cannot be weighed", "[node]") {
   CHECK(team.publish() == Sizes{3});
 }
 
-TEST_CASE("The PCM node's thread handles what was published before it stops", "[node]") {
-  Team team(0, tolerant());
-  team.node.start();
-  for (const Closure& closure : team.agreeing(0, 1, 40)) team.closures.publish(closure);
-  team.node.stop();  // drains the queue, then publishes the last set
-  CHECK(team.node.error() == nullptr);
-  REQUIRE_FALSE(team.sets.empty());
-  CHECK(team.sets.back().closures.size() == 40);
-  CHECK(team.sets.size() == team.sets.back().version);
-}
-
 TEST_CASE("All closures of two robots are published once independent ones agree", "[node]") {
   Team team(2);
   auto closures = team.agreeing(2, 5, 20);

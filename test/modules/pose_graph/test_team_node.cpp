@@ -175,9 +175,9 @@ TEST_CASE("A node sends its status only when it has changed", "[pose_graph][node
   });
   KeyframeOdometry first;
   first.id = {2, 0};
-  two.node.step(TeamNode::Tick(), 100.0);
+  two.node.step(Tick(), 100.0);
   REQUIRE(statuses.size() == 1);
-  two.node.step(TeamNode::Tick(), 110.0);
+  two.node.step(Tick(), 110.0);
   CHECK(statuses.size() == 1);
   two.node.step(std::make_shared<const KeyframeOdometry>(first), 111.0);
   REQUIRE(statuses.size() == 2);

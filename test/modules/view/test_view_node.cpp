@@ -54,8 +54,7 @@ struct Watched {
     node.step(std::make_shared<const T>(std::move(message)));
   }
   void give_mesh(std::uint32_t side) {
-    node.step(
-        ViewNode::MeshOffer{kSelf, std::make_shared<const LabelledMesh>(wavy_sheet(side, 0.1))});
+    node.step(ViewMeshOffer{kSelf, std::make_shared<const LabelledMesh>(wavy_sheet(side, 0.1))});
   }
   void give_keyframes(std::size_t count) {
     for (std::size_t k = 0; k < count; ++k) {
