@@ -29,12 +29,9 @@ using MessageKey = std::uint64_t;
 /// `<module>_codec.hpp`:
 ///
 ///     template <>
-///     struct Codec<InlierSet> {
-///       using Wire = km_wire_InlierSet;                      // generated from idl/
+///     struct Codec<InlierSet> : WireFormat<km_wire_InlierSet, km_wire_InlierSet_desc> {
 ///       static constexpr const char* kTopic = "inlier_sets"; // DDS topic name
-///       static constexpr std::uint16_t kVersion = 1;         // of the wire type, idl/README.md
 ///       static constexpr std::size_t kMaxBytes = 800000;     // longer ones are refused
-///       static const dds_topic_descriptor_t& descriptor() { return km_wire_InlierSet_desc; }
 ///
 ///       struct Encoded {                         // owns what `wire` points to; movable
 ///         Wire wire{};
@@ -46,6 +43,18 @@ using MessageKey = std::uint64_t;
 ///     };
 template <typename T>
 struct Codec;
+
+/// The type of a codec that is generated from idl/, and its version (idl/README.md).
+template <typename WireType, const dds_topic_descriptor_t& kDescriptor, std::uint16_t kNumber = 1>
+struct WireFormat {
+  using Wire = WireType;
+  static constexpr std::uint16_t kVersion = kNumber;
+  static const dds_topic_descriptor_t& descriptor() { return kDescriptor; }
+  /// Hidden by codecs of types with sequences.
+  struct Encoded {
+    Wire wire{};
+  };
+};
 
 // Sequences of generated types, for all codecs.
 

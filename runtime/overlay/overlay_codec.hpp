@@ -45,13 +45,10 @@ struct LanePacket : OverlayPacket {};
 /// Uses TopicKind::kRequest: an Overlay sends a message again if a link is down for longer than
 /// dds.lease_s.
 template <OverlayLane kLane>
-struct Codec<LanePacket<kLane>> {
-  using Wire = km_wire_OverlayPacket;
+struct Codec<LanePacket<kLane>> : WireFormat<km_wire_OverlayPacket, km_wire_OverlayPacket_desc> {
   static constexpr const char* kTopic =
       kLane == OverlayLane::kTeam ? "overlay_team" : "overlay_places";
-  static constexpr std::uint16_t kVersion = 1;
   static constexpr std::size_t kMaxBytes = max_content(kLane) + 64;
-  static const dds_topic_descriptor_t& descriptor() { return km_wire_OverlayPacket_desc; }
 
   struct Encoded {
     Wire wire{};

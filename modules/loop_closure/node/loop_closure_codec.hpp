@@ -16,16 +16,11 @@ namespace km {
 
 /// Written by the requester.
 template <>
-struct Codec<KeyframeRequest> {
-  using Wire = km_wire_KeyframeRequest;
+struct Codec<KeyframeRequest>
+    : WireFormat<km_wire_KeyframeRequest, km_wire_KeyframeRequest_desc, 3> {
   static constexpr const char* kTopic = "keyframe_requests";
-  static constexpr std::uint16_t kVersion = 3;
   static constexpr std::size_t kMaxBytes = 64;
-  static const dds_topic_descriptor_t& descriptor() { return km_wire_KeyframeRequest_desc; }
 
-  struct Encoded {
-    Wire wire{};
-  };
   static MessageKey key_of(const KeyframeRequest& request);
   static Encoded encode(const KeyframeRequest& request);
   static Decoded<KeyframeRequest> decode(const Wire& wire, const TeamPeer& writer);
@@ -33,12 +28,9 @@ struct Codec<KeyframeRequest> {
 
 /// Written by the owner of the keyframe.
 template <>
-struct Codec<KeyframeReply> {
-  using Wire = km_wire_KeyframeReply;
+struct Codec<KeyframeReply> : WireFormat<km_wire_KeyframeReply, km_wire_KeyframeReply_desc, 2> {
   static constexpr const char* kTopic = "keyframe_replies";
-  static constexpr std::uint16_t kVersion = 2;
   static constexpr std::size_t kMaxBytes = 1024 + (17 + kMatchedBytes) * kMaxKeypoints;
-  static const dds_topic_descriptor_t& descriptor() { return km_wire_KeyframeReply_desc; }
 
   struct Encoded {
     Wire wire{};
@@ -52,12 +44,9 @@ struct Codec<KeyframeReply> {
 
 /// Written by the owner of the keyframe.
 template <>
-struct Codec<KeyframeWords> {
-  using Wire = km_wire_KeyframeWords;
+struct Codec<KeyframeWords> : WireFormat<km_wire_KeyframeWords, km_wire_KeyframeWords_desc> {
   static constexpr const char* kTopic = "keyframe_words";
-  static constexpr std::uint16_t kVersion = 1;
   static constexpr std::size_t kMaxBytes = 256 + 16 * kMaxKeypoints;
-  static const dds_topic_descriptor_t& descriptor() { return km_wire_KeyframeWords_desc; }
 
   struct Encoded {
     Wire wire{};
@@ -70,16 +59,10 @@ struct Codec<KeyframeWords> {
 
 /// Written by the robot that verified the closure, which owns the keyframe Closure::from.
 template <>
-struct Codec<Closure> {
-  using Wire = km_wire_Closure;
+struct Codec<Closure> : WireFormat<km_wire_Closure, km_wire_Closure_desc> {
   static constexpr const char* kTopic = "closures";
-  static constexpr std::uint16_t kVersion = 1;
   static constexpr std::size_t kMaxBytes = 1024;
-  static const dds_topic_descriptor_t& descriptor() { return km_wire_Closure_desc; }
 
-  struct Encoded {
-    Wire wire{};
-  };
   static MessageKey key_of(const Closure& closure);
   static Encoded encode(const Closure& closure);
   static Decoded<Closure> decode(const Wire& wire, const TeamPeer& writer);

@@ -15,12 +15,9 @@ namespace km {
 /// than kMaxChunkBytes, or if a face names a missing vertex. It is also refused if positions are
 /// not finite or too far away, and for keyframes that fault_of() refuses.
 template <>
-struct Codec<MeshChunk> {
-  using Wire = km_wire_PackedMeshChunk;
+struct Codec<MeshChunk> : WireFormat<km_wire_PackedMeshChunk, km_wire_PackedMeshChunk_desc> {
   static constexpr const char* kTopic = "packed_mesh_chunks";
-  static constexpr std::uint16_t kVersion = 1;
   static constexpr std::size_t kMaxBytes = kMaxChunkBytes + 256;  // incompressible
-  static const dds_topic_descriptor_t& descriptor() { return km_wire_PackedMeshChunk_desc; }
 
   struct Encoded {
     Wire wire{};
@@ -35,12 +32,9 @@ struct Codec<MeshChunk> {
 /// A robot states only its own poses. A message is refused if it has more than kMaxMeshKeyframes
 /// poses, if their indices do not ascend, or if a rotation is none.
 template <>
-struct Codec<MeshPoses> {
-  using Wire = km_wire_MeshPoses;
+struct Codec<MeshPoses> : WireFormat<km_wire_MeshPoses, km_wire_MeshPoses_desc> {
   static constexpr const char* kTopic = "mesh_poses";
-  static constexpr std::uint16_t kVersion = 1;
   static constexpr std::size_t kMaxBytes = 128 + kMeshKeyframeBytes * kMaxMeshKeyframes;
-  static const dds_topic_descriptor_t& descriptor() { return km_wire_MeshPoses_desc; }
 
   struct Encoded {
     Wire wire{};

@@ -15,13 +15,10 @@ namespace km {
 /// for more than kMaxObjectKeyframes keyframes, or one that is not of its robot. Entries of unknown
 /// layers are left out.
 template <>
-struct Codec<RobotObjects> {
-  using Wire = km_wire_RobotObjects;
+struct Codec<RobotObjects> : WireFormat<km_wire_RobotObjects, km_wire_RobotObjects_desc, 2> {
   static constexpr const char* kTopic = "objects";
-  static constexpr std::uint16_t kVersion = 2;
   static constexpr std::size_t kMaxBytes =
       160 * kMaxObjects + kSurfaceKeyframeBytes * kMaxObjectKeyframes;
-  static const dds_topic_descriptor_t& descriptor() { return km_wire_RobotObjects_desc; }
 
   struct Encoded {
     Wire wire{};

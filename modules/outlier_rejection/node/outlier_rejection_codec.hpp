@@ -16,12 +16,9 @@ inline constexpr std::size_t kMaxInliers = 1U << 16U;
 
 /// Only robot `a` may write the set of a pair. The closures are between `a` and `b` and ascend.
 template <>
-struct Codec<InlierSet> {
-  using Wire = km_wire_InlierSet;
+struct Codec<InlierSet> : WireFormat<km_wire_InlierSet, km_wire_InlierSet_desc> {
   static constexpr const char* kTopic = "inlier_sets";
-  static constexpr std::uint16_t kVersion = 1;
   static constexpr std::size_t kMaxBytes = 64 + 12 * kMaxInliers;
-  static const dds_topic_descriptor_t& descriptor() { return km_wire_InlierSet_desc; }
 
   struct Encoded {
     Wire wire{};

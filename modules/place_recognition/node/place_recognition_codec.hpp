@@ -11,12 +11,9 @@
 namespace km {
 
 template <>
-struct Codec<KeyframeBow> {
-  using Wire = km_wire_BagOfWords;
+struct Codec<KeyframeBow> : WireFormat<km_wire_BagOfWords, km_wire_BagOfWords_desc> {
   static constexpr const char* kTopic = "bags_of_words";
-  static constexpr std::uint16_t kVersion = 1;
   static constexpr std::size_t kMaxBytes = 1U << 18U;
-  static const dds_topic_descriptor_t& descriptor() { return km_wire_BagOfWords_desc; }
 
   struct Encoded {
     Wire wire{};

@@ -31,12 +31,9 @@ struct Ping {
 };
 
 template <>
-struct Codec<Ping> {
-  using Wire = km_wire_Ping;
+struct Codec<Ping> : WireFormat<km_wire_Ping, km_wire_Ping_desc> {
   static constexpr const char* kTopic = "pings";
-  static constexpr std::uint16_t kVersion = 1;
   static constexpr std::size_t kMaxBytes = 100000;
-  static const dds_topic_descriptor_t& descriptor() { return km_wire_Ping_desc; }
 
   struct Encoded {
     Wire wire{};
