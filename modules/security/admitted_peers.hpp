@@ -48,8 +48,6 @@ class AdmittedPeers {
   /// Notes that a message of the process has been decrypted. Does nothing for an unknown process.
   void received(const TeamPeer& peer);
 
-  void erase(const TeamPeer& peer) { peers_.erase(peer); }
-
   /// Erases processes for whose certificate `lapsed` returns true; returns them in ascending order.
   template <typename Lapsed>
   [[nodiscard]] std::vector<TeamPeer> erase_if(const Lapsed& lapsed) {

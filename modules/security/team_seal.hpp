@@ -28,7 +28,7 @@ inline constexpr std::size_t kTeamSealBytes = 4 + 24 + 16 + 64;
 /// Unencrypted fields of a message. All of them are authenticated: a message opens only with the
 /// context with which it was sealed.
 struct SealContext {
-  std::string_view topic;
+  std::string topic;
   TeamPeer sender;
   std::uint64_t number = 0;            ///< Number of the message, counted by its sender.
   std::array<std::uint8_t, 16> key{};  ///< Key of the envelope.
@@ -124,9 +124,6 @@ class TeamSeal {
   [[nodiscard]] bool is_admitted(const TeamPeer& peer) const {
     return peers_.find(peer) != nullptr;
   }
-
-  /// Removes the keys of a process that has gone. Does nothing for an unknown process.
-  void forget(const TeamPeer& peer) { peers_.erase(peer); }
 
   /// Applies a list of revocations and the time. Pass the list in use again to apply only the time.
   /// Removes processes whose certificate is revoked or not valid at `now_s`. Draws a new key for

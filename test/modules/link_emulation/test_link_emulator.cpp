@@ -197,15 +197,6 @@ TEST_CASE("A recorded link carries a packet at each of its instants", "[link_emu
   for (std::size_t i = 0; i < due_s.size(); ++i) CHECK(due_s[i] == Approx(expected_s[i]));
 }
 
-TEST_CASE("A frame that a trace never sends stays on its way", "[link_emulation]") {
-  LinkPlan link = limited(0.0);
-  LinkEmulator emulator(script_of(2, link));
-  emulator.send(0, 0.0, frame_to(1));
-  CHECK_FALSE(emulator.next_s());
-  CHECK(emulator.due(1e9).empty());
-  CHECK(emulator.counts(0, 1).in == FrameTally{1, kFrame_bytes});
-}
-
 TEST_CASE("An outage begins and ends as planned for its direction", "[link_emulation]") {
   LinkScript script = script_of(2);
   script.link(0, 1).outages = {{1.0, 2.0}, {5.0, 6.0}};

@@ -56,13 +56,6 @@ TEST_CASE("The time of a capacity is the first time at which it is reached", "[l
   CHECK(LinkTrace({{0.0, 10.0, 0.0}, {2.0, 0.0, 0.0}}).time_of(10.5) == kInfinite);
 }
 
-TEST_CASE("A link without a limit has no other rows", "[link_emulation]") {
-  CHECK_FALSE(LinkTrace({{0.0, kInfinite, 0.2}}).has_limit());
-  CHECK(LinkTrace({{0.0, kInfinite, 0.2}}).delay_s(7.0) == 0.2);
-  CHECK_THROWS_AS(LinkTrace({{0.0, kInfinite, 0.2}, {1.0, 5.0, 0.2}}), std::invalid_argument);
-  CHECK_THROWS_AS(LinkTrace(std::vector<LinkTraceRow>()), std::invalid_argument);
-}
-
 TEST_CASE("An error in a link trace is reported with its line", "[link_emulation]") {
   CHECK(refusal("") == "trace.csv: has no row");
   CHECK(refusal("time_s,bytes_per_s,delay_s\n") == "trace.csv: has no row");

@@ -6,7 +6,6 @@
 
 #include "modules/link_emulation/link_trace.hpp"
 #include "test/support/corrupted_input.hpp"
-#include "test/support/shared_data.hpp"
 
 namespace km {
 namespace {
@@ -43,15 +42,6 @@ TEST_CASE("A packet schedule carries 1500 bytes at each instant and repeats", "[
     const double time_s = schedule.time_of(PacketSchedule::kPacket_bytes * packet);
     CHECK(schedule.capacity_until(time_s) >= PacketSchedule::kPacket_bytes * packet);
   }
-}
-
-TEST_CASE("A recorded radio link has the capacity of its file", "[link_emulation]") {
-  const auto recordings = shared_data("radio_links");
-  if (!recordings) return;
-  const auto lte = read_packet_schedule(*recordings / "ATT-LTE-driving-2016.up");
-  CHECK(lte.capacity_until(120.0019) == 1500.0 * (19101 - 1));
-  CHECK(lte.capacity_until(240.004) == 1500.0 * (2 * 19101 + 1));
-  CHECK(lte.time_of(1500.0 * 2) == 0.048);
 }
 
 TEST_CASE("An error in a packet schedule is reported with its line", "[link_emulation]") {

@@ -12,24 +12,6 @@
 namespace km {
 namespace {
 
-TEST_CASE("Credentials are unchanged by writing and reading", "[security]") {
-  const ToyTeam team;
-  const RobotKeys keys = team.keys_of(3, "alpha");
-  const RobotIdentity identity = toy_identity(3, "alpha");
-  const ExchangeKey exchange = {9, 8, 7};
-  const std::string text =
-      to_text(make_credentials(keys.certificate, keys.authority, keys.secret, identity, exchange));
-  CHECK(text.size() == kCredentialsLength);
-  CHECK(text.find_first_not_of("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz"
-                               "0123456789-_") == std::string::npos);
-  const auto parsed = parse_credentials(text);
-  REQUIRE(parsed.value);
-  CHECK(to_text(*parsed.value) == text);
-  CHECK(parsed.value->exchange == exchange);
-  CHECK(is_signed_by_robot(*parsed.value, identity));
-  CHECK(is_signed_by(team.authority(), claimed_certificate(*parsed.value, identity, "survey")));
-}
-
 TEST_CASE("Certificates and credentials have the bytes of the test vectors in SECURITY",
           "[security]") {
   Secret<32> authority_seed, robot_seed;

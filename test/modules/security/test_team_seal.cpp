@@ -48,19 +48,6 @@ TEST_CASE("A message to all opens at every member", "[security]") {
   CHECK(c.seal.open(context, *sealed).content == content);
 }
 
-TEST_CASE("Both directions of a pair have keys of their own", "[security]") {
-  const ToyTeam team;
-  ToyMember a(team, 0, "alpha"), b(team, 1, "beta");
-  introduce(a, b);
-  const auto sealed = a.seal.seal(toy_context(a, b.peer()), toy_content());
-  REQUIRE(sealed);
-  const Opened reflected = a.seal.open(toy_context(b, a.peer()), *sealed);
-  CHECK(reflected.status == Status::kRefused);
-  const auto answer = b.seal.seal(toy_context(b, a.peer()), toy_content());
-  REQUIRE(answer);
-  CHECK(a.seal.open(toy_context(b, a.peer()), *answer).content == toy_content());
-}
-
 TEST_CASE("Sealed content is unreadable and equal messages look different", "[security]") {
   const ToyTeam team;
   ToyMember a(team, 0, "alpha"), b(team, 1, "beta");
@@ -125,34 +112,6 @@ TEST_CASE("Messages in another robot's name, to itself, or to an unknown robot a
   CHECK_THROWS_AS(a.seal.seal(toy_context(a, a.peer()), toy_content()), std::invalid_argument);
   CHECK_FALSE(a.seal.seal(toy_context(a, b.peer()), toy_content()));
   CHECK_FALSE(a.seal.key_message_for(b.peer()));
-}
-
-TEST_CASE("Another start of a robot has other keys", "[security]") {
-  const ToyTeam team;
-  ToyMember a(team, 0, "alpha"), b(team, 1, "beta");
-  ToyMember restarted(b, 5000);
-  introduce(a, b);
-  introduce(a, restarted);
-  const auto sealed = a.seal.seal(toy_context(a, b.peer()), toy_content());
-  REQUIRE(sealed);
-  CHECK(restarted.seal.open(toy_context(a, b.peer()), *sealed).status == Status::kRefused);
-  CHECK(restarted.seal.open(toy_context(a, restarted.peer()), *sealed).status == Status::kRefused);
-  const auto former = b.seal.seal(toy_context(b, a.peer()), toy_content());
-  REQUIRE(former);
-  CHECK(a.seal.open(toy_context(restarted, a.peer()), *former).status == Status::kRefused);
-  CHECK(a.seal.open(toy_context(b, a.peer()), *former).status == Status::kOpened);
-}
-
-TEST_CASE("Keys of a process that has gone are removed", "[security]") {
-  const ToyTeam team;
-  ToyMember a(team, 0, "alpha"), b(team, 1, "beta");
-  introduce(a, b);
-  const auto sealed = b.seal.seal(toy_context(b, a.peer()), toy_content());
-  REQUIRE(a.seal.is_admitted(b.peer()));
-  a.seal.forget(b.peer());
-  CHECK_FALSE(a.seal.is_admitted(b.peer()));
-  CHECK(a.seal.open(toy_context(b, a.peer()), *sealed).status == Status::kNotYet);
-  CHECK_FALSE(a.seal.seal(toy_context(a, b.peer()), toy_content()));
 }
 
 }  // namespace
