@@ -17,11 +17,11 @@
 #include "modules/core/input_file.hpp"
 #include "modules/core/text_rows.hpp"
 #include "runtime/clock.hpp"
+#include "runtime/dds/entity.hpp"
 #include "runtime/dds/participant.hpp"
 #include "runtime/dds/qos.hpp"
 #include "runtime/dds/robot_status.hpp"
 #include "runtime/dds/ros_discovery.hpp"
-#include "runtime/dds/user_data.hpp"
 
 namespace km {
 namespace {

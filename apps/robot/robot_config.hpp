@@ -29,7 +29,6 @@
 #include "modules/view/view_config.hpp"
 #include "modules/vio/tracker_config.hpp"
 #include "modules/vio/vio_config.hpp"
-#include "runtime/dds/budget_config.hpp"
 #include "runtime/dds/dds_config.hpp"
 #include "runtime/dds/ros_config.hpp"
 

@@ -142,7 +142,8 @@ void Robot::add_restore() {
   if (!restored_) return;
   restored_images_ = restored_->final_states();
   for (const auto& [robot, peer] : restored_->peers) {
-    bridge_->peers().recall({.robot = robot, .name = peer.name, .boot = peer.boot});
+    bridge_->peers().tell(&PeerTable::recall,
+                          {.robot = robot, .name = peer.name, .boot = peer.boot});
     incarnations_.meet({robot, peer.boot});
   }
   restore_ = &add<RestoreNode>(
@@ -340,7 +341,7 @@ void Robot::add_overlay() {
                     .links = t.links,
                     .renew = [this](RobotId robot) { bridge_->renew(robot); }});
   join_team(*overlay_, t.team_messages, t.peer_team_messages);
-  overlay_->join_bags<KeyframeBow>(t.bows.from_peers(), t.peer_bows);
+  overlay_->join<KeyframeBow>(OverlayStream::kBag, t.bows.from_peers(), t.peer_bows);
   overlay_->join_calls(
       OverlayStream::kRequest, t.requests.ends(),
       [](const KeyframeRequest& request) { return std::optional(request.keyframe); });

@@ -117,7 +117,7 @@ void DdsBridge::send_keys() {
 }
 
 void DdsBridge::apply(const MembershipChange& change) {
-  peers_.expel(change.forgotten);
+  peers_.tell(&PeerTable::expel, change.forgotten);
   if (change.new_key) send_keys();
 }
 

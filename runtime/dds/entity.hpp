@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <stdexcept>
@@ -58,6 +59,16 @@ class DdsEntity {
  private:
   dds_entity_t handle_ = 0;
 };
+
+/// The USER_DATA that a participant announces, untrusted bytes; empty: none.
+[[nodiscard]] inline std::string user_data_of(const dds_qos_t* qos) {
+  void* data = nullptr;
+  std::size_t size = 0;
+  if (!dds_qget_userdata(qos, &data, &size) || data == nullptr) return {};
+  std::string result(static_cast<const char*>(data), size);
+  dds_free(data);
+  return result;
+}
 
 struct DdsQosDeleter {
   void operator()(dds_qos_t* qos) const { dds_delete_qos(qos); }

@@ -12,7 +12,6 @@
 #include "runtime/dds/envelope.hpp"
 #include "runtime/dds/qos.hpp"
 #include "runtime/dds/robot_status.hpp"
-#include "runtime/dds/sealed_envelope.hpp"
 #include "runtime/log.hpp"
 
 namespace km {
@@ -188,9 +187,10 @@ void IncomingTopic::receive_claim(const km_wire_Envelope& envelope, const Guid& 
   if (TeamPeer{envelope.robot, envelope.boot} != claim.sender) return;
   if (open(envelope, writer).how.status != Opened::Status::kOpened) return;
   if (claim.standing == Standing::kTwin) {
-    peers_.twin_received(writer, kStatusPeriod_s * envelope.number, now_s - started_s_);
+    peers_.tell(&PeerTable::twin_received, writer, kStatusPeriod_s * envelope.number,
+                now_s - started_s_);
   } else {
-    peers_.prove(writer);
+    peers_.tell(&PeerTable::prove, writer);
   }
 }
 
@@ -203,8 +203,8 @@ IncomingTopic::Readable IncomingTopic::open(const km_wire_Envelope& envelope,
     return {{Opened::Status::kOpened, {}, nullptr}, *bytes};
   const RobotIdentity& self = participant_.identity();
   const auto addressee = addressed_ ? std::optional(TeamPeer{self.robot, self.boot}) : std::nullopt;
-  const SealedEnvelope way(spec_.name, writer, envelope, addressee);
-  Readable result{seal->with([&](TeamSeal& team) { return team.open(way.context(), *bytes); }), {}};
+  const SealContext context = seal_context(spec_.name, writer, envelope, addressee);
+  Readable result{seal->with([&](TeamSeal& team) { return team.open(context, *bytes); }), {}};
   result.content = result.how.content;  // moving a vector keeps its elements in place
   return result;
 }
@@ -281,7 +281,7 @@ const char* IncomingTopic::pass_to_handler(const Filed& filed,
   const km_wire_Envelope& envelope = *filed.envelope;
   std::shared_ptr<void> token = in_flight_->enter();  // before is_current(), because it may wait
   if (TeamPeer{envelope.robot, envelope.boot} != filed.sender) return "claims another robot's id";
-  if (!spec_.carries_keys && !peers_.is_current(filed.sender))
+  if (!spec_.carries_keys && !peers_.ask(&PeerTable::is_current, filed.sender))
     return "from a former process of its robot";
   if (envelope.version == 0) return "unknown version of the topic";
   if (content.size() > spec_.max_bytes) return "larger than its topic allows";
@@ -304,8 +304,7 @@ const char* IncomingTopic::pass_to_handler(const Filed& filed,
 
 bool IncomingTopic::is_new(const TeamPeer& sender, std::uint32_t number) {
   if (streams_.size() >= kMaxStreams && !streams_.contains(sender)) streams_.clear();
-  const auto entry = streams_.try_emplace(sender, has_full_history(spec_.kind)).first;
-  return entry->second.is_new(number);
+  return streams_[sender].is_new(number);
 }
 
 void IncomingTopic::refuse(const char* reason) {
@@ -318,22 +317,16 @@ void IncomingTopic::refuse(const char* reason) {
 }
 
 void IncomingTopic::add_to(TrafficSnapshot& snapshot) const {
-  TopicTraffic total{.topic = spec_.name,
-                     .category = spec_.category,
-                     .direction = Direction::kIn,
-                     .count = {},
-                     .refused = {}};
+  TopicTraffic total{.topic = spec_.name, .category = spec_.category, .direction = Direction::kIn};
   const std::lock_guard lock(mutex_);
   for (const auto& [robot, count] : from_) {
-    total.count.messages += count.messages;
-    total.count.bytes += count.bytes;
+    total.count.add(count);
     snapshot.peers.push_back({.topic = spec_.name,
                               .category = spec_.category,
                               .direction = Direction::kIn,
                               .peer = robot,
                               .count = count});
   }
-  for (const auto& [sender, tracker] : streams_) total.missing += tracker.missing();
   total.duplicates = duplicates_;
   total.refused = refused_;
   snapshot.topics.push_back(std::move(total));

@@ -5,7 +5,6 @@
 
 #include "runtime/dds/envelope.hpp"
 #include "runtime/dds/qos.hpp"
-#include "runtime/dds/sealed_envelope.hpp"
 #include "runtime/log.hpp"
 
 namespace km {
@@ -96,7 +95,7 @@ bool OutgoingTopic::is_kept() const {
 // nullopt if the addressee is unknown, or if its incarnation has ended.
 std::optional<TeamPeer> OutgoingTopic::receiver_of(const Addressee& addressee) const {
   if (spec_.carries_keys) return TeamPeer{addressee.robot, 0};
-  const auto current = peers_.current(addressee.robot);
+  const auto current = peers_.ask(&PeerTable::current, addressee.robot);
   const bool is_over =
       current && addressee.boot != 0 && !is_same_incarnation(addressee.boot, current->boot);
   return is_over ? std::nullopt : current;
@@ -210,7 +209,7 @@ void OutgoingTopic::send(Writer& writer, MessageKey key, Octets content) {
         << " bytes not written: " << problem;
   const std::lock_guard lock(mutex_);
   if (problem != nullptr) {
-    ++writer.failures;
+    ++not_written_[problem];
     return;
   }
   ++number;
@@ -246,7 +245,8 @@ std::vector<RobotId> OutgoingTopic::readers_of(std::optional<Addressee> addresse
   refresh_readers(writer);
   std::vector<RobotId> robots;
   for (const Guid& reader : writer.readers)
-    if (const auto identity = peers_.identity_of(reader)) robots.push_back(identity->robot);
+    if (const auto identity = peers_.ask(&PeerTable::identity_of, reader))
+      robots.push_back(identity->robot);
   return robots;
 }
 
@@ -254,9 +254,9 @@ std::vector<RobotId> OutgoingTopic::readers_of(std::optional<Addressee> addresse
 const char* OutgoingTopic::seal(const Writer& writer, const km_wire_Envelope& head,
                                 Octets& content) const {
   if (!is_sealed()) return nullptr;
-  const SealedEnvelope envelope(spec_.name, participant_.guid(), head, writer.receiver);
-  auto sealed = participant_.seal()->with(
-      [&](const TeamSeal& team) { return team.seal(envelope.context(), content); });
+  const SealContext context = seal_context(spec_.name, participant_.guid(), head, writer.receiver);
+  auto sealed =
+      participant_.seal()->with([&](const TeamSeal& team) { return team.seal(context, content); });
   if (!sealed) return "the keys of its addressee are unknown";
   content = std::move(*sealed);
   return nullptr;
@@ -315,11 +315,7 @@ std::uint64_t OutgoingTopic::sent_bytes() const {
 }
 
 void OutgoingTopic::add_to(TrafficSnapshot& snapshot) const {
-  TopicTraffic total{.topic = spec_.name,
-                     .category = spec_.category,
-                     .direction = Direction::kOut,
-                     .count = {},
-                     .refused = {}};
+  TopicTraffic total{.topic = spec_.name, .category = spec_.category, .direction = Direction::kOut};
   std::map<std::optional<RobotId>, PeerTraffic> rows;
   const auto row_of = [&](std::optional<RobotId> peer) -> PeerTraffic& {
     return rows
@@ -332,17 +328,14 @@ void OutgoingTopic::add_to(TrafficSnapshot& snapshot) const {
   };
   const std::lock_guard lock(mutex_);
   for (const auto& [to, writer] : writers_) {
-    total.count.messages += writer.written.messages;
-    total.count.bytes += writer.written.bytes;
-    total.failures += writer.failures;
+    total.count.add(writer.written);
     row_of(to).retransmitted_bytes += retransmitted_bytes(writer);
     for (const auto& [guid, count] : writer.sent_to) {
-      const auto identity = peers_.identity_of(guid);
-      PeerTraffic& row = row_of(identity ? std::optional(identity->robot) : std::nullopt);
-      row.count.messages += count.messages;
-      row.count.bytes += count.bytes;
+      const auto identity = peers_.ask(&PeerTable::identity_of, guid);
+      row_of(identity ? std::optional(identity->robot) : std::nullopt).count.add(count);
     }
   }
+  total.refused = not_written_;
   snapshot.topics.push_back(std::move(total));
   for (auto& [peer, row] : rows) snapshot.peers.push_back(std::move(row));
 }

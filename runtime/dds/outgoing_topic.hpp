@@ -125,7 +125,6 @@ class OutgoingTopic {
     TrafficCount written;
     TrafficCount history;                        // messages that DDS sends to a new reader
     std::map<MessageKey, std::uint64_t> newest;  // bytes of each state in `history`
-    std::uint64_t failures = 0;
     std::map<Guid, TrafficCount> sent_to;
   };
 
@@ -151,6 +150,7 @@ class OutgoingTopic {
   bool newcomers_ = false;
   mutable std::mutex mutex_;  // guards the map and all counts; never held while writing
   std::map<std::optional<RobotId>, Writer> writers_;
+  std::map<std::string, std::uint64_t> not_written_;  // messages by reason
 };
 
 }  // namespace km

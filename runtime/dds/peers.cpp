@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "runtime/clock.hpp"
-#include "runtime/dds/user_data.hpp"
 #include "runtime/log.hpp"
 
 namespace km {
@@ -143,81 +142,19 @@ const char* Peers::admit(const RobotIdentity& identity, std::string_view credent
   return nullptr;
 }
 
-void Peers::expel(const std::vector<TeamPeer>& processes) {
-  {
-    const std::lock_guard lock(mutex_);
-    table_.expel(processes);
-  }
-  publish_events();
-}
-
-void Peers::prove(const Guid& guid) {
-  {
-    const std::lock_guard lock(mutex_);
-    table_.prove(guid);
-  }
-  publish_events();
-}
-
 std::vector<TeamPeer> Peers::take_admitted() {
   const std::lock_guard lock(mutex_);
   return std::exchange(admitted_, {});
-}
-
-std::optional<TeamPeer> Peers::current(RobotId robot) const {
-  const std::lock_guard lock(mutex_);
-  return table_.current(robot);
 }
 
 void Peers::listen(dds_listener_t* listener) {
   dds_lset_liveliness_changed_arg(listener, &Peers::on_liveliness_changed, this, true);
 }
 
-void Peers::recall(const RobotIdentity& identity) {
-  const std::lock_guard lock(mutex_);
-  table_.recall(identity);
-}
-
-void Peers::reported(const RobotIdentity& identity) {
-  {
-    const std::lock_guard lock(mutex_);
-    table_.reported(identity);
-  }
-  publish_events();
-}
-
-bool Peers::is_arriving(RobotId robot) const {
-  const std::lock_guard lock(mutex_);
-  return table_.is_arriving(robot);
-}
-
-std::vector<Peer> Peers::list() const {
-  const std::lock_guard lock(mutex_);
-  return table_.peers();
-}
-
-std::optional<RobotIdentity> Peers::identity_of(const Guid& guid) const {
-  const std::lock_guard lock(mutex_);
-  return table_.identity_of(guid);
-}
-
 Peers::Claim Peers::claim_of(const Guid& guid) const {
   const std::lock_guard lock(mutex_);
   const auto identity = table_.identity_of(guid);
   return {table_.standing(guid), identity ? TeamPeer{identity->robot, identity->boot} : TeamPeer{}};
-}
-
-bool Peers::is_current(const TeamPeer& sender) const {
-  const std::lock_guard lock(mutex_);
-  return table_.is_current(sender);
-}
-
-void Peers::twin_received(const Guid& guid, double its_uptime_s, double own_uptime_s) {
-  {
-    const std::lock_guard lock(mutex_);
-    table_.twin_received(guid, its_uptime_s, own_uptime_s);
-  }
-  publish_events();
 }
 
 // Runs on a thread of DDS, once per change: only notes it.

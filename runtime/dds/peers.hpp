@@ -6,6 +6,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <type_traits>
 #include <vector>
 
 #include "runtime/dds/entity.hpp"
@@ -64,18 +65,25 @@ class Peers {
   /// kRestarted exists, messages of its process wait.
   [[nodiscard]] In<PeerEvent> events() { return events_; }
 
-  /// A robot that this robot met in a former process: it is lost until it is received. Call before
-  /// start().
-  void recall(const RobotIdentity& identity);
-
-  /// See PeerTable. Thread-safe.
-  void reported(const RobotIdentity& identity);
-  [[nodiscard]] bool is_arriving(RobotId robot) const;
-
+  /// Returns the result of a member function of PeerTable. Thread-safe.
+  template <typename Result, typename... Parameters>
+  [[nodiscard]] Result ask(Result (PeerTable::*question)(Parameters...) const,
+                           const std::type_identity_t<Parameters>&... arguments) const {
+    const std::lock_guard lock(mutex_);
+    return (table_.*question)(arguments...);
+  }
+  /// Calls a member function of PeerTable, and publishes the resulting events. Thread-safe.
+  template <typename... Parameters>
+  void tell(void (PeerTable::*report)(Parameters...),
+            const std::type_identity_t<Parameters>&... arguments) {
+    {
+      const std::lock_guard lock(mutex_);
+      (table_.*report)(arguments...);
+    }
+    publish_events();
+  }
   /// Robots of the team ever met by this one, ascending by id.
-  [[nodiscard]] std::vector<Peer> list() const;
-
-  [[nodiscard]] std::optional<RobotIdentity> identity_of(const Guid& guid) const;
+  [[nodiscard]] std::vector<Peer> list() const { return ask(&PeerTable::peers); }
 
   /// Handling of the messages of a participant, and its claimed identity.
   struct Claim {
@@ -83,17 +91,10 @@ class Peers {
     TeamPeer sender;  ///< Set for a robot: neither kUnknown nor kOutsider.
   };
   [[nodiscard]] Claim claim_of(const Guid& guid) const;
-  [[nodiscard]] bool is_current(const TeamPeer& sender) const;
-  [[nodiscard]] std::optional<TeamPeer> current(RobotId robot) const;
 
   /// Processes whose credentials were admitted since the last call: they need the key of this
   /// process.
   [[nodiscard]] std::vector<TeamPeer> take_admitted();
-
-  /// See PeerTable.
-  void expel(const std::vector<TeamPeer>& processes);
-  void prove(const Guid& guid);
-  void twin_received(const Guid& guid, double its_uptime_s, double own_uptime_s);
 
   // For the bridge.
 

@@ -1,5 +1,6 @@
 #include "runtime/dds/qos.hpp"
 
+#include <array>
 #include <cmath>
 
 namespace km {
@@ -12,19 +13,9 @@ dds_duration_t nanoseconds_of(double seconds) {
 }  // namespace
 
 const char* to_string(TrafficCategory category) {
-  switch (category) {
-    case TrafficCategory::kPlaceRecognition:
-      return "place_recognition";
-    case TrafficCategory::kGeometricVerification:
-      return "geometric_verification";
-    case TrafficCategory::kPoseGraphOptimization:
-      return "pgo";
-    case TrafficCategory::kMap:
-      return "map";
-    case TrafficCategory::kOther:
-      break;
-  }
-  return "other";
+  constexpr std::array kNames = {"place_recognition", "geometric_verification", "pgo", "map",
+                                 "other"};
+  return kNames.at(static_cast<std::size_t>(category));
 }
 
 DdsQos make_writer_qos(TopicKind kind, const DdsConfig& config) {

@@ -40,9 +40,4 @@ const char* to_string(TrafficCategory category);
   return kind != TopicKind::kStatus;
 }
 
-/// True for the kinds whose readers get everything from the writer's first sample on.
-[[nodiscard]] constexpr bool has_full_history(TopicKind kind) {
-  return kind == TopicKind::kEvent;
-}
-
 }  // namespace km

@@ -1,6 +1,7 @@
 #include "runtime/dds/robot_identity.hpp"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cstdio>
 #include <optional>
@@ -26,26 +27,21 @@ std::optional<T> number(std::string_view text, int base) {
   return value;
 }
 
-struct Fields {
-  std::optional<std::string_view> robot, name, proto, boot, keys;
-};
+constexpr std::array<std::string_view, 5> kKeys = {"robot", "name", "proto", "boot", "keys"};
+using Fields = std::array<std::optional<std::string_view>, kKeys.size()>;
 
-// nullopt if a known key appears twice.
+// The values by key; nullopt if a known key appears twice.
 std::optional<Fields> split(std::string_view bytes) {
   Fields fields;
   while (!bytes.empty()) {
     const std::string_view entry = bytes.substr(0, bytes.find(';'));
     bytes.remove_prefix(std::min(bytes.size(), entry.size() + 1));
     const std::string_view key = entry.substr(0, entry.find('='));
-    std::optional<std::string_view>* field = key == "robot"   ? &fields.robot
-                                             : key == "name"  ? &fields.name
-                                             : key == "proto" ? &fields.proto
-                                             : key == "boot"  ? &fields.boot
-                                             : key == "keys"  ? &fields.keys
-                                                              : nullptr;
-    if (field == nullptr) continue;
-    if (field->has_value()) return std::nullopt;
-    *field = entry.substr(std::min(entry.size(), key.size() + 1));
+    const auto known = std::ranges::find(kKeys, key);
+    if (known == kKeys.end()) continue;
+    auto& field = fields[static_cast<std::size_t>(known - kKeys.begin())];
+    if (field) return std::nullopt;
+    field = entry.substr(std::min(entry.size(), key.size() + 1));
   }
   return fields;
 }
@@ -86,18 +82,19 @@ Decoded<Announcement> parse_user_data(std::string_view bytes) {
   if (bytes.size() > kMaxUserData) return Result::refuse("user data too long");
   const auto fields = split(bytes);
   if (!fields) return Result::refuse("user data names a field twice");
-  if (!fields->robot || !fields->name || !fields->proto || !fields->boot)
+  const auto& [robot_text, name, protocol_text, boot_text, keys] = *fields;
+  if (!robot_text || !name || !protocol_text || !boot_text)
     return Result::refuse("user data lacks a field");
 
-  const auto robot = number<RobotId>(*fields->robot, 10);
-  const auto protocol = number<std::uint16_t>(*fields->proto, 10);
-  const auto boot = number<std::uint64_t>(*fields->boot, 16);
+  const auto robot = number<RobotId>(*robot_text, 10);
+  const auto protocol = number<std::uint16_t>(*protocol_text, 10);
+  const auto boot = number<std::uint64_t>(*boot_text, 16);
   if (!robot) return Result::refuse("robot id is not a 16-bit number");
-  if (!is_name(*fields->name)) return Result::refuse("robot name is not printable");
+  if (!is_name(*name)) return Result::refuse("robot name is not printable");
   if (!protocol) return Result::refuse("protocol version is not a 16-bit number");
   if (!boot || *boot == 0) return Result::refuse("boot id is not a nonzero 64-bit number");
-  return Result::accept({{*robot, std::string(*fields->name), *protocol, *boot},
-                         std::string(fields->keys.value_or(std::string_view()))});
+  return Result::accept({{*robot, std::string(*name), *protocol, *boot},
+                         std::string(keys.value_or(std::string_view()))});
 }
 
 }  // namespace km

@@ -1,6 +1,7 @@
 #include "runtime/dds/robot_status.hpp"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstring>
@@ -17,17 +18,8 @@ std::uint32_t awaited_of(const RobotStatus& status) {
 }  // namespace
 
 const char* to_string(RobotPhase phase) {
-  switch (phase) {
-    case RobotPhase::kRunning:
-      return "running";
-    case RobotPhase::kFinished:
-      return "finished";
-    case RobotPhase::kSettled:
-      return "settled";
-    case RobotPhase::kLeaving:
-      break;
-  }
-  return "leaving";
+  constexpr std::array kNames = {"running", "finished", "settled", "leaving"};
+  return kNames.at(static_cast<std::size_t>(phase));
 }
 
 MessageKey Codec<RobotStatus>::key_of(const RobotStatus& /*status*/) {

@@ -14,12 +14,46 @@
 #include <vector>
 
 #include "modules/core/ids.hpp"
-#include "runtime/dds/budget_config.hpp"
-#include "runtime/dds/send_priority.hpp"
+#include "runtime/dds/dds_config.hpp"
 #include "runtime/dds/traffic.hpp"
 #include "runtime/token_bucket.hpp"
 
 namespace km {
+
+/// Order of sending when the budget is short, most important first.
+enum class SendPriority {
+  kPresence,      ///< Statuses: small, and always sent.
+  kClosures,      ///< Closures: sent once, and needed to join robots.
+  kVerification,  ///< Requests for keyframes, and replies.
+  kPoses,         ///< All messages of the pose graph.
+  kWords,         ///< Bags of words.
+  kBacklog,       ///< Bags of words that are not new any more.
+  kMesh           ///< Chunks of the mesh, and all other messages.
+};
+inline constexpr std::size_t kSendPriorities = 7;
+
+/// Priority of a topic, never kBacklog. A topic of geometric verification has the priority
+/// kClosures if its kind is kEvent, otherwise kVerification.
+[[nodiscard]] constexpr SendPriority priority_of(TopicKind kind, TrafficCategory category) {
+  if (kind == TopicKind::kStatus) return SendPriority::kPresence;
+  switch (category) {
+    case TrafficCategory::kPlaceRecognition:
+      return SendPriority::kWords;
+    case TrafficCategory::kGeometricVerification:
+      return kind == TopicKind::kEvent ? SendPriority::kClosures : SendPriority::kVerification;
+    case TrafficCategory::kPoseGraphOptimization:
+      return SendPriority::kPoses;
+    case TrafficCategory::kMap:
+    case TrafficCategory::kOther:
+      break;
+  }
+  return SendPriority::kMesh;
+}
+
+/// Messages of each priority are sent while all sent bytes are below this share of
+/// budget.bytes_per_run.
+inline constexpr std::array<double, kSendPriorities> kShareOfRun = {1.0, 1.0, 0.9, 0.95,
+                                                                    0.8, 0.8, 0.6};
 
 /// Messages to be sent, the most important first, each as soon as the budget permits it. Messages
 /// of one priority keep their order, except for bags of words: those that have waited for kNew_s
@@ -198,7 +232,8 @@ class SendSchedule {
     constexpr double kNoDebt_bytes = -1e-3;
     if (priority == SendPriority::kPresence) return 0.0;
     const auto total = static_cast<double>(spent_bytes_ + bytes);
-    if (budget_.bytes_per_run > 0.0 && total > share_of_run(priority) * budget_.bytes_per_run)
+    if (budget_.bytes_per_run > 0.0 &&
+        total > kShareOfRun[static_cast<std::size_t>(priority)] * budget_.bytes_per_run)
       return std::nullopt;
     return bucket_ ? bucket_->wait_s(kNoDebt_bytes, now_s) : 0.0;
   }

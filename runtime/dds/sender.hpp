@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "runtime/bounded_queue.hpp"
-#include "runtime/dds/budget_config.hpp"
+#include "runtime/dds/dds_config.hpp"
 #include "runtime/dds/outgoing_topic.hpp"
 #include "runtime/dds/send_schedule.hpp"
 #include "runtime/guarded_thread.hpp"

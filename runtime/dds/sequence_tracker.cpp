@@ -25,21 +25,10 @@ bool SequenceTracker::is_new(std::uint32_t number) {
   if (end_of_run_.size() > kMaxIntervals) {
     const auto first = end_of_run_.begin();
     const auto second = std::next(first);
-    lost_ += second->first - first->second;
     first->second = second->second;
     end_of_run_.erase(second);
   }
   return true;
-}
-
-std::uint64_t SequenceTracker::missing() const {
-  std::uint64_t count = lost_;
-  std::uint64_t expected = from_zero_ || end_of_run_.empty() ? 0 : end_of_run_.begin()->first;
-  for (const auto& [begin, end] : end_of_run_) {
-    count += begin - expected;
-    expected = end;
-  }
-  return count;
 }
 
 }  // namespace km

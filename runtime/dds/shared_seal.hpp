@@ -1,11 +1,17 @@
 #pragma once
 
+#include <envelope.h>
+
+#include <algorithm>
 #include <cstdint>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <utility>
 
+#include "modules/core/bytes.hpp"
 #include "modules/security/team_seal.hpp"
+#include "runtime/dds/entity.hpp"
 
 namespace km {
 
@@ -32,5 +38,22 @@ class SharedSeal {
   TeamSeal seal_;
   const std::string credentials_;
 };
+
+/// The seal of an envelope's content also covers the topic, the participant that writes it, the
+/// envelope's head, and the addressee. So a replayed envelope cannot be opened on another topic or
+/// from another participant. `addressee`: none for a message to all.
+[[nodiscard]] inline SealContext seal_context(const std::string& topic, const Guid& writer,
+                                              const km_wire_Envelope& head,
+                                              const std::optional<TeamPeer>& addressee) {
+  SealContext context{.topic = topic + '/' + std::string(writer.begin(), writer.end()),
+                      .sender = {head.robot, head.boot},
+                      .number = head.number,
+                      .addressee = addressee};
+  ByteWriter key;
+  key.u64(head.key);
+  key.u16(head.version);
+  std::ranges::copy(key.release(), context.key.begin());
+  return context;
+}
 
 }  // namespace km

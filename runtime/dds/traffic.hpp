@@ -61,12 +61,11 @@ struct TopicTraffic {
   std::string topic;
   TrafficCategory category = TrafficCategory::kOther;
   Direction direction = Direction::kOut;
-  TrafficCount count;            ///< Out: once per message. In: new messages from known robots.
+  TrafficCount count = {};       ///< Out: once per message. In: new messages from known robots.
   std::uint64_t duplicates = 0;  ///< In: messages that had arrived before.
-  std::uint64_t missing = 0;     ///< In: numbers that have not arrived, also of replaced states.
-  std::uint64_t failures = 0;    ///< Out: messages that could not be written.
   HeldBack held = {};            ///< Out: effect of the budget.
-  std::map<std::string, std::uint64_t> refused;  ///< In: number of refused messages by reason.
+  /// Number of messages that were refused or could not be written, by reason.
+  std::map<std::string, std::uint64_t> refused = {};
 };
 
 struct TrafficSnapshot {

@@ -12,7 +12,6 @@
 #include "modules/core/team_links.hpp"
 #include "runtime/overlay/endorsement.hpp"
 #include "runtime/overlay/overlay_message.hpp"
-#include "runtime/overlay/overlay_summary.hpp"
 
 namespace km {
 

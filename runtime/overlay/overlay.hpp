@@ -10,7 +10,6 @@
 #include "runtime/overlay/known_robots.hpp"
 #include "runtime/overlay/message_store.hpp"
 #include "runtime/overlay/overlay_message.hpp"
-#include "runtime/overlay/overlay_summary.hpp"
 #include "runtime/overlay/spread_states.hpp"
 
 namespace km {

@@ -160,7 +160,7 @@ std::vector<std::uint8_t> OverlayNode::signature_of(OverlayStream stream, std::u
 }
 
 void OverlayNode::carry_out(const OverlayOutput& output, std::uint64_t given_up) {
-  for (const RobotIdentity& robot : output.met) peers_.reported(robot);
+  for (const RobotIdentity& robot : output.met) peers_.tell(&PeerTable::reported, robot);
   for (const RobotId robot : output.renewed) {
     log::limited(log::Level::kWarn, kTag, "renewed " + std::to_string(robot))
         << "packets do not arrive at robot " << robot << ": the DDS writers to it are renewed";
@@ -195,7 +195,7 @@ void OverlayNode::deliver(const OverlayMessage& message) const {
   const auto reader = readers_.find(message.stream);
   if (reader == readers_.end()) return;
   const bool waits = message.stream > OverlayStream::kSolver;
-  if (waits && peers_.is_arriving(message.origin.robot)) return;
+  if (waits && peers_.ask(&PeerTable::is_arriving, message.origin.robot)) return;
   const char* refusal = nullptr;
   try {
     refusal = reader->second(message);
@@ -225,8 +225,9 @@ OverlaySummary OverlayNode::summary() const {
     const std::lock_guard lock(mutex_);
     summary = overlay_.summary();
   }
-  std::erase_if(summary.holds,
-                [this](const OverlayHeld& held) { return peers_.is_arriving(held.origin.robot); });
+  std::erase_if(summary.holds, [this](const OverlayHeld& held) {
+    return peers_.ask(&PeerTable::is_arriving, held.origin.robot);
+  });
   return summary;
 }
 

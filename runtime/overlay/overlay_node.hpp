@@ -79,10 +79,10 @@ class OverlayNode final : public Node {
   using Reader = std::function<const char*(const OverlayMessage& message)>;
   void read(OverlayStream stream, Reader reader) { readers_[stream] = std::move(reader); }
 
-  /// Connects the topics of bags of words, which each robot sends to all others: see
-  /// OverlayStream::kBag.
+  /// Publishes the messages of the bridge and those of a stream on one topic: alone for bags of
+  /// words, which each robot sends to all others.
   template <typename T>
-  void join_bags(In<T> received, Out<T> to);
+  void join(OverlayStream stream, In<T> received, Out<T> to);
   /// Connects the topics of closures or of inlier sets. Messages with equal Codec<T>::key_of()
   /// replace each other.
   template <typename T>
@@ -123,12 +123,6 @@ class OverlayNode final : public Node {
     const auto encoded = Codec<T>::encode(message);
     return serialize(Codec<T>::descriptor(), &encoded.wire);
   }
-  template <typename T>
-  void deliver_as(OverlayStream stream, Out<T> to) {
-    read(stream, [to](const OverlayMessage& message) {
-      return detail::publish_decoded(to, message.origin, message.content, nullptr);
-    });
-  }
   // Runs `work` on the overlay and then carries out its output.
   template <typename Work>
   void act(const Work& work) {
@@ -168,8 +162,10 @@ class OverlayNode final : public Node {
 };
 
 template <typename T>
-void OverlayNode::join_bags(In<T> received, Out<T> to) {
-  deliver_as<T>(OverlayStream::kBag, to);
+void OverlayNode::join(OverlayStream stream, In<T> received, Out<T> to) {
+  read(stream, [to](const OverlayMessage& message) {
+    return detail::publish_decoded(to, message.origin, message.content, nullptr);
+  });
   received.subscribe([to](const auto& message) { to.publish(message); });
 }
 
@@ -190,8 +186,7 @@ ContentGuard<T> OverlayNode::guard(OverlayStream stream, const NumberOf& number_
 
 template <typename T>
 void OverlayNode::join_reliable(OverlayStream stream, const RelayedTopics<T>& topics) {
-  deliver_as<T>(stream, topics.all);
-  topics.received.subscribe([to = topics.all](const auto& message) { to.publish(message); });
+  join(stream, topics.received, topics.all);
   topics.own.subscribe([this, stream, direct = topics.direct](const auto& addressed) {
     direct.publish(addressed);
     const T& message = *addressed->message;
@@ -205,8 +200,7 @@ void OverlayNode::join_reliable(OverlayStream stream, const RelayedTopics<T>& to
 template <typename T, typename NumberOf>
 void OverlayNode::join_calls(OverlayStream stream, const RelayedTopics<T>& topics,
                              const NumberOf& number_of) {
-  deliver_as<T>(stream, topics.all);
-  topics.received.subscribe([to = topics.all](const auto& message) { to.publish(message); });
+  join(stream, topics.received, topics.all);
   topics.own.subscribe([this, stream, direct = topics.direct, number_of](const auto& addressed) {
     const std::optional<KeyframeId> keyframe = number_of(*addressed->message);
     const OverlayWays ways = ways_to(addressed->to);

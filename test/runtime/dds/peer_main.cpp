@@ -4,7 +4,7 @@
 //   one ROBOT INDEX    to one robot
 //   quit
 // It prints what happens: "joined 7", "lost 7", ..., "ping 7 INDEX", "one 7 INDEX", and at the end
-// "summary RECEIVED DUPLICATES MISSING".
+// "summary RECEIVED DUPLICATES".
 #include <iostream>
 #include <mutex>
 #include <sstream>
@@ -98,7 +98,7 @@ int run(int argc, char** argv) {
   robot.stop();
   const TopicTraffic traffic = robot.traffic(Direction::kIn);
   print_line("summary " + std::to_string(traffic.count.messages) + ' ' +
-             std::to_string(traffic.duplicates) + ' ' + std::to_string(traffic.missing));
+             std::to_string(traffic.duplicates));
   return 0;
 }
 

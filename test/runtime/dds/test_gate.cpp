@@ -48,7 +48,7 @@ TEST_CASE("A message larger than its topic allows is not even read", "[gate]") {
   writer.write(header(a.participant.identity(), 0), {3, 0, std::vector<std::uint8_t>(200000)});
   CHECK(eventually([&] { return refusals(b, "larger than its topic allows") == 1; }));
   a.ping(1, std::vector<std::uint8_t>(200000));  // nor is it sent by a program that is sound
-  CHECK(eventually([&] { return a.traffic(Direction::kOut).failures == 1; }));
+  CHECK(eventually([&] { return a.traffic(Direction::kOut).refused["too large"] == 1; }));
   a.ping(2);
   CHECK(b.received.wait_for(1)[0].index == 2);
 }

@@ -506,17 +506,5 @@ TEST_CASE("Another protocol version and unreadable user data are refused, once",
   CHECK(table.standing(guid(2)) == Standing::kOutsider);
 }
 
-TEST_CASE("Programs that are no robots are not our business", "[peers]") {
-  PeerTable table(kSelf);
-  table.participant(guid(2), "", "");
-  table.participant(guid(3), "some tool", "");
-  table.alive(guid(3));
-  table.silent(guid(3));
-  table.participant_gone(guid(3));
-  table.participant_gone(guid(4));
-  CHECK(kinds(table).empty());
-  CHECK(table.peers().empty());
-}
-
 }  // namespace
 }  // namespace km

@@ -1,5 +1,4 @@
 #include <catch2/catch.hpp>
-#include <random>
 #include <set>
 #include <string>
 
@@ -47,24 +46,6 @@ TEST_CASE("User data that is not an identity is refused with the reason", "[iden
         "boot id is not a nonzero 64-bit number");
   CHECK(refusal("robot=1;name=a;proto=1;boot=1;x=" + std::string(2000, 'x')) ==
         "user data too long");
-}
-
-TEST_CASE("Random bytes are never accepted as a robot's user data", "[identity]") {
-  const auto seed = GENERATE(range(0U, 20U));
-  CAPTURE(seed);
-  std::mt19937 rng(seed);
-  std::uniform_int_distribution<int> byte(0, 255), length(0, 100);
-  std::uniform_int_distribution<std::size_t> position(0, 40);
-  for (int i = 0; i < 500; ++i) {
-    std::string data(static_cast<std::size_t>(length(rng)), '\0');
-    for (char& c : data) c = static_cast<char>(byte(rng));
-    CHECK_FALSE(parse_user_data(data).value.has_value());
-
-    std::string damaged = to_user_data({7, "alpha", 1, 99});
-    damaged[position(rng)] = static_cast<char>(byte(rng));
-    const auto parsed = parse_user_data(damaged);
-    CHECK((parsed.value.has_value() || parsed.refusal != nullptr));
-  }
 }
 
 TEST_CASE("A name that cannot be sent is refused at home", "[identity]") {

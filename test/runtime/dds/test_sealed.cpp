@@ -371,7 +371,7 @@ TEST_CASE("Messages for a robot reach its resumed process and not its next incar
   const auto newest = std::ranges::find(pings, 1U, &Ping::index);
   CHECK((newest == pings.end() || newest->payload == Octets{2}));
   CHECK(second->refused() == 0);
-  CHECK(a->traffic(Direction::kOut, true).failures == 0);
+  CHECK(a->traffic(Direction::kOut, true).refused.empty());
 }
 
 TEST_CASE("Messages for a robot of an earlier process wait until its keys are known", "[sealed]") {
@@ -380,7 +380,7 @@ TEST_CASE("Messages for a robot of an earlier process wait until its keys are kn
   const RobotIdentity met{4, robot_name(4), kProtocolVersion, random_boot_id()};
   TestRobot a(domain, {3, robot_name(3), kProtocolVersion, random_boot_id()}, member_of(team),
               TopicKind::kEvent, TopicKind::kEvent);
-  a.bridge.peers().recall(met);
+  a.bridge.peers().tell(&PeerTable::recall, met);
   a.start();
   for (std::uint32_t i = 0; i < 3; ++i) a.ping_one(4, i);
   const std::uint64_t before = a.status_count();  // behind them in the queue
@@ -388,7 +388,7 @@ TEST_CASE("Messages for a robot of an earlier process wait until its keys are kn
   TestRobot b(domain, met, member_of(team), TopicKind::kEvent, TopicKind::kEvent);
   b.start();
   CHECK(indices(b.received_addressed.wait_for(3)) == up_to(3));
-  CHECK(a.traffic(Direction::kOut, true).failures == 0);
+  CHECK(a.traffic(Direction::kOut, true).refused.empty());
 }
 
 }  // namespace

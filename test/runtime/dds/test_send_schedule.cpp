@@ -76,16 +76,6 @@ TEST_CASE("After a silence little more than the budget is sent at once", "[budge
   CHECK(*schedule.wait_s() == Approx(0.01).margin(1e-6));
 }
 
-TEST_CASE("A closure overtakes all messages that wait for the budget", "[budget]") {
-  Schedule schedule({.bytes_per_s = 1000.0});
-  for (int k = 0; k < 100; ++k) schedule.push(entry(kMesh, k), 0.0);
-  CHECK(sent(schedule, 0.0) == std::vector<int>{0});
-  schedule.push(entry(kClosures, -1), 0.05);
-  CHECK(sent(schedule, 0.05).empty());
-  CHECK(sent(schedule, 0.11) == std::vector<int>{-1});
-  CHECK(sent(schedule, 0.21) == std::vector<int>{1});
-}
-
 TEST_CASE("Statuses never wait, and are counted", "[budget]") {
   Schedule schedule({.bytes_per_s = 1000.0});
   for (int k = 0; k < 10; ++k) schedule.push(entry(kPresence, k), 0.0);

@@ -1,6 +1,6 @@
 #include <catch2/catch.hpp>
 
-#include "runtime/dds/status_pace.hpp"
+#include "runtime/dds/robot_status.hpp"
 
 namespace km {
 namespace {

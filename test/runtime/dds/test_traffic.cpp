@@ -57,11 +57,10 @@ TEST_CASE("Traffic of a resumed run is added to the former traffic", "[traffic]"
         "6,out,bow,place_recognition,*,0,0,35\n");
 
   snapshot = {};
-  snapshot.topics = {{.topic = "bow",
-                      .category = TrafficCategory::kPlaceRecognition,
-                      .count = {},
-                      .held = {.delayed = {}, .waiting = {1, 10}, .superseded = {}, .dropped = {}},
-                      .refused = {}}};
+  snapshot.topics = {
+      {.topic = "bow",
+       .category = TrafficCategory::kPlaceRecognition,
+       .held = {.delayed = {}, .waiting = {1, 10}, .superseded = {}, .dropped = {}}}};
   csv.str({});
   writer.append(7.0, snapshot);
   CHECK(csv.str() == "7,waiting,bow,place_recognition,*,1,10,0\n");
@@ -74,13 +73,8 @@ TEST_CASE("Messages that a budget delays or drops are in the table beside those 
   const HeldBack held{
       .delayed = {1, 10}, .waiting = {2, 20}, .superseded = {3, 30}, .dropped = {4, 40}};
   TrafficSnapshot snapshot;
-  snapshot.topics = {
-      {.topic = "bow",
-       .category = TrafficCategory::kPlaceRecognition,
-       .count = {},
-       .held = held,
-       .refused = {}},
-      {.topic = "bow", .direction = Direction::kIn, .count = {}, .held = held, .refused = {}}};
+  snapshot.topics = {{.topic = "bow", .category = TrafficCategory::kPlaceRecognition, .held = held},
+                     {.topic = "bow", .direction = Direction::kIn, .held = held}};
   writer.append(1.0, snapshot);
   snapshot.topics[0].held.waiting = {};
   writer.append(2.0, snapshot);

@@ -49,7 +49,7 @@ struct Relaying {
              [&now_s] { return now_s; }),
         bow_guard(node.guard<KeyframeBow>(
             OverlayStream::kBag, [](const KeyframeBow& bow) { return std::optional(bow.id); })) {
-    node.join_bags<KeyframeBow>(received_bows, bows);
+    node.join<KeyframeBow>(OverlayStream::kBag, received_bows, bows);
     node.join_calls(
         OverlayStream::kRequest,
         RelayedTopics<KeyframeRequest>{own_requests, direct_requests, received_requests, requests},
@@ -165,7 +165,8 @@ TEST_CASE("Relayed messages arrive on the topics of directly received ones", "[o
   CAPTURE(has_keys);
   Chain chain(has_keys);
   Relaying &a = *chain.robots[0], &b = *chain.robots[1], &c = *chain.robots[2];
-  c.peers.reported(identity_of(0));  // Stands for the discovery of robot 0 by DDS.
+  c.peers.tell(&PeerTable::reported,
+               identity_of(0));  // Stands for the discovery of robot 0 by DDS.
   const Octets bow = a.content_of({.id = {0, 0}, .words = {{3, 1}}});
   REQUIRE(c.receive(process_of(0), bow).empty());
   chain.run(20.0);
@@ -173,7 +174,7 @@ TEST_CASE("Relayed messages arrive on the topics of directly received ones", "[o
   REQUIRE(b.got_bows.messages().size() == 1);
   CHECK(b.got_bows.messages()[0].id == KeyframeId{0, 0});
   CHECK(b.got_bows.messages()[0].words == BagOfWords{{3, 1}});
-  CHECK(b.peers.current(0) == process_of(0));
+  CHECK(b.peers.ask(&PeerTable::current, RobotId{0}) == process_of(0));
   REQUIRE(b.got_ways.messages().size() == 1);
   CHECK(b.got_ways.messages()[0].identity.robot == 0);
   CHECK_FALSE(b.got_ways.messages()[0].direct);
