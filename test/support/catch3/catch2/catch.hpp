@@ -9,7 +9,6 @@ using Catch::Approx;
 
 namespace Catch {
 
-using TestEventListenerBase = EventListenerBase;
 using Matchers::EndsWith;
 using Matchers::Equals;
 using Matchers::Matches;
