@@ -37,6 +37,21 @@ inline int random_domain() {
     }
 }
 
+/// Command line of a robot with the configuration of EuRoC.
+inline std::string euroc_robot(int robot, const std::string& options,
+                               int domain = random_domain()) {
+  return KM_BIN_DIR "/kimera_multi_robot --config config/datasets/euroc.yaml --robot " +
+         std::to_string(robot) + " --domain " + std::to_string(domain) + ' ' + options;
+}
+
+/// Makes a team's folder of keys for `robots`, such as "robot0:0,robot1:1".
+inline void make_keys(const std::filesystem::path& folder, const std::string& robots) {
+  const CommandResult made =
+      run_command(KM_BIN_DIR "/kimera_multi_keys make " + folder.string() + " --robots " + robots);
+  CAPTURE(made.output);
+  REQUIRE(made.exit_code == 0);
+}
+
 /// Lines of a file; 0 if there is none.
 inline std::size_t line_count(const std::filesystem::path& file) {
   std::ifstream in(file);

@@ -31,15 +31,6 @@ EurocCopy excerpt(const fs::path& recording) {
 constexpr std::size_t kImage = 24, kSample = 1199;  // items to corrupt, in the middle
 constexpr Stamp kDay = 86'400'000'000'000;
 
-CommandResult run_robot(const TemporaryFolder& folder) {
-  return run_command(KM_BIN_DIR
-                     "/kimera_multi_robot --config config/datasets/euroc.yaml --robot 0"
-                     " --rate max --serve-limit 0 --interface lo --domain " +
-                     std::to_string(random_domain()) + " --dataset " +
-                     (folder.path() / "recording").string() + " --output " +
-                     (folder.path() / "results").string());
-}
-
 struct Fault {
   std::string name;
   std::function<void(EurocCopy&)> corrupt;     // lists
@@ -103,7 +94,10 @@ TEST_CASE("A robot skips broken parts of its recording, reports them, and contin
     fault.corrupt(copy);
     copy.write(folder.path() / "recording");
     fault.spoil(folder.path() / "recording/mav0/cam0/data" / name);
-    const CommandResult result = run_robot(folder);
+    const CommandResult result =
+        run_command(euroc_robot(0, "--rate max --serve-limit 0 --interface lo --dataset " +
+                                       (folder.path() / "recording").string() + " --output " +
+                                       (folder.path() / "results").string()));
     CAPTURE(result.output);
     CHECK(result.exit_code == 0);
     CHECK_THAT(result.output, Catch::Contains(fault.message));
@@ -142,11 +136,8 @@ TEST_CASE("A folder that results cannot go to is refused before any other output
   if (!recording) return;
   const TemporaryFolder folder;
   const auto refusal = [&](const fs::path& output) {
-    const CommandResult result =
-        run_command(KM_BIN_DIR
-                    "/kimera_multi_robot --config config/datasets/euroc.yaml --robot 0 "
-                    "--interface lo --dataset " +
-                    recording->string() + " --output " + output.string());
+    const CommandResult result = run_command(euroc_robot(
+        0, "--interface lo --dataset " + recording->string() + " --output " + output.string()));
     CHECK(result.exit_code == 1);
     return result.output;
   };

@@ -139,8 +139,7 @@ TEST_CASE(
                                     "  - {id: 2, name: c, dataset: \"${DATASET}\", from: 4.0, "
                                     "to: 11.0}\n");
   const std::string keys = (folder.path() / "keys").string();
-  REQUIRE(run_command(KM_BIN_DIR "/kimera_multi_keys make " + keys + " --robots a:0,b:1,c:2")
-              .exit_code == 0);
+  make_keys(keys, "a:0,b:1,c:2");
   const TeamRun run = run_team(team, *dataset, folder, "--links " + links + " --security " + keys);
   CAPTURE(run.result.output);
   if (!had_own_networks(run.result.output)) return;

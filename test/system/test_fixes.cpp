@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <csignal>
-#include <cstdio>
 #include <fstream>
 #include <random>
 
@@ -12,6 +11,7 @@
 #include "modules/evaluation/trajectory_file.hpp"
 #include "test/support/process.hpp"
 #include "test/support/shared_data.hpp"
+#include "test/system/live_run.hpp"
 #include "test/system/team_run.hpp"
 
 // Robots with positions of GNSS or of a motion capture, on a recording and on live topics.
@@ -102,13 +102,14 @@ std::vector<StampedPose> truth_of(const fs::path& dataset) {
 std::vector<std::string> command_of(const fs::path& dataset, int robot, const std::string& part,
                                     int domain, const TemporaryFolder& folder,
                                     const std::string& settings = {}) {
-  return words_of(KM_BIN_DIR "/kimera_multi_robot --config config/datasets/euroc.yaml --robot " +
-                  std::to_string(robot) + " --dataset " + dataset.string() + ' ' + part +
-                  " --rate max --domain " + std::to_string(domain) + " --output " +
-                  (folder.path() / robot_name(robot)).string() +
-                  " --set absolute_fixes.source=motion_capture absolute_fixes.sigma_m=" +
-                  std::to_string(kSigma_m) + " absolute_fixes.file=" +
-                  (folder.path() / "fixes.csv").string() + ' ' + settings);
+  return words_of(euroc_robot(
+      robot,
+      "--dataset " + dataset.string() + ' ' + part + " --rate max --output " +
+          (folder.path() / robot_name(robot)).string() +
+          " --set absolute_fixes.source=motion_capture absolute_fixes.sigma_m=" +
+          std::to_string(kSigma_m) +
+          " absolute_fixes.file=" + (folder.path() / "fixes.csv").string() + ' ' + settings,
+      domain));
 }
 
 // Root mean square distance of the poses that two robots have at the same images of one recording.
@@ -167,26 +168,18 @@ TEST_CASE("two robots with fixes are in one frame with and without closures betw
 std::vector<std::string> live_command(const fs::path& dataset, const TemporaryFolder& folder,
                                       int ros_domain, const std::string& output,
                                       const std::string& settings) {
-  const fs::path rig = folder.write(
-      "rig.yaml",
-      "left: {topic: /cam0/image_raw}\nright: {topic: /cam1/image_raw}\nimu: {topic: /imu0}\n"
-      "calibration: " +
-          fs::absolute(dataset).string() + "\n");
-  return logged(words_of(
-      KM_BIN_DIR "/kimera_multi_robot --config config/datasets/euroc.yaml --robot 0 --live " +
-      rig.string() + " --serve-limit 0 --domain " + std::to_string(random_domain()) + ' ' + output +
-      ' ' + (folder.path() / "live").string() +
-      " --set ros.interface=lo sensors.max_lag_s=30 ros.domain=" + std::to_string(ros_domain) +
-      " absolute_fixes.topic=/fix absolute_fixes.sigma_m=" + std::to_string(kSigma_m) + ' ' +
-      settings));
+  const fs::path rig = folder.write("rig.yaml", euroc_rig(dataset));
+  return logged(words_of(euroc_robot(
+      0, "--live " + rig.string() + " --serve-limit 0 " + output + ' ' +
+             (folder.path() / "live").string() +
+             " --set ros.interface=lo sensors.max_lag_s=30 ros.domain=" +
+             std::to_string(ros_domain) + " absolute_fixes.topic=/fix absolute_fixes.sigma_m=" +
+             std::to_string(kSigma_m) + ' ' + settings)));
 }
 
-// Plays seconds of the recording more slowly than they were recorded: `rate` times as fast.
-std::vector<std::string> driver_command(const fs::path& dataset, int ros_domain, double rate,
-                                        const std::string& options) {
-  return words_of(KM_BIN_DIR "/kimera_multi_publish " + dataset.string() +
-                  " --interface lo --wait 1 --reliable --rate " + std::to_string(rate) +
-                  " --domain " + std::to_string(ros_domain) + ' ' + options);
+// Options of a driver that plays the recording `rate` times as fast as it was recorded.
+std::string at_rate(double rate) {
+  return "--reliable --rate " + std::to_string(rate) + ' ';
 }
 
 // A busy host loses messages, and the result then depends on which ones: a test repeats the run
@@ -197,12 +190,7 @@ bool has_lost_messages(const RunSummary& summary) {
   return summary.sensor_faults.contains("messages lost on the way");
 }
 
-bool is_near_the_end(const std::string& line) {
-  constexpr double kMost_s = 11.0;
-  double seconds = 0.0;
-  int images = 0;
-  return std::sscanf(line.c_str(), "%lf s, %d images", &seconds, &images) == 2 && seconds > kMost_s;
-}
+constexpr double kNearTheEnd_s = 11.0;
 
 TEST_CASE("fixes on live topics place a run in their frame", "[system][fixes][live]") {
   const auto dataset = shared_data("euroc/MH_01_easy");
@@ -223,11 +211,11 @@ TEST_CASE("fixes on live topics place a run in their frame", "[system][fixes][li
                                    : "absolute_fixes.source=motion_capture "
                                      "absolute_fixes.live_type=geometry_msgs/msg/PoseStamped"));
     Process driver(
-        driver_command(*dataset, ros_domain, rate,
-                       "--to 12.5 --fixes " + fixes.string() +
+        driver_command(*dataset, ros_domain,
+                       at_rate(rate) + "--to 12.5 --fixes " + fixes.string() +
                            (is_gnss ? "" : " --fix-type geometry_msgs/msg/PoseStamped")));
     CHECK(driver.wait() == 0);
-    REQUIRE(robot.wait_until(is_near_the_end));
+    REQUIRE(robot.wait_until(is_beyond(kNearTheEnd_s)));
     robot.kill(SIGINT);
     REQUIRE(robot.wait() == 0);
     summary = read_summary(folder.path() / "live/summary.json");
@@ -261,8 +249,8 @@ TEST_CASE("a killed and resumed robot remains located by its live fixes", "[syst
     const int ros_domain = random_domain();
     {
       Process robot(live_command(*dataset, folder, ros_domain, "--output", settings));
-      Process driver(
-          driver_command(*dataset, ros_domain, rate, "--to 13 --fixes " + fixes.string()));
+      Process driver(driver_command(*dataset, ros_domain,
+                                    at_rate(rate) + "--to 13 --fixes " + fixes.string()));
       REQUIRE(robot.wait_until(is_located));
       robot.kill(SIGKILL);
       robot.wait();
@@ -270,11 +258,11 @@ TEST_CASE("a killed and resumed robot remains located by its live fixes", "[syst
       CHECK(driver.wait() == 0);
     }
     Process robot(live_command(*dataset, folder, ros_domain, "--resume", settings));
-    Process driver(
-        driver_command(*dataset, ros_domain, rate,
-                       "--to 13" + (has_more_fixes ? " --fixes " + fixes.string() : "")));
+    Process driver(driver_command(
+        *dataset, ros_domain,
+        at_rate(rate) + "--to 13" + (has_more_fixes ? " --fixes " + fixes.string() : "")));
     CHECK(driver.wait() == 0);
-    REQUIRE(robot.wait_until(is_near_the_end));
+    REQUIRE(robot.wait_until(is_beyond(kNearTheEnd_s)));
     robot.kill(SIGINT);
     REQUIRE(robot.wait() == 0);
     summary = read_summary(folder.path() / "live/summary.json");

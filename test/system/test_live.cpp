@@ -1,7 +1,6 @@
 #include <catch2/catch.hpp>
 
 #include <csignal>
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
@@ -12,6 +11,7 @@
 #include "test/modules/sensors/euroc_folder.hpp"
 #include "test/support/process.hpp"
 #include "test/support/shared_data.hpp"
+#include "test/system/live_run.hpp"
 #include "test/system/team_run.hpp"
 
 namespace km {
@@ -29,10 +29,7 @@ std::string first_lines(const fs::path& file, int count) {
 }
 
 std::vector<std::string> robot_command(const fs::path& output, const std::string& input) {
-  return words_of(KM_BIN_DIR
-                  "/kimera_multi_robot --config config/datasets/euroc.yaml --robot 0 --serve-limit "
-                  "0 --domain " +
-                  std::to_string(random_domain()) + " --output " + output.string() + ' ' + input);
+  return words_of(euroc_robot(0, "--serve-limit 0 --output " + output.string() + ' ' + input));
 }
 
 // A robot on the live topics that a rig file names, from a driver in this domain.
@@ -41,29 +38,6 @@ std::vector<std::string> live_command(const TemporaryFolder& folder, const std::
   return robot_command(folder.path() / "live", "--live " + folder.write("rig.yaml", rig).string() +
                                                    " --set ros.domain=" + std::to_string(domain) +
                                                    " --set ros.interface=lo " + options);
-}
-
-// Plays a recording on live topics.
-std::vector<std::string> driver_command(const fs::path& recording, int domain,
-                                        const std::string& options) {
-  return words_of(KM_BIN_DIR "/kimera_multi_publish " + recording.string() + " --domain " +
-                  std::to_string(domain) + " --interface lo --wait 1 " + options);
-}
-
-// Topics with EuRoC's names, with the calibration of `dataset`.
-std::string rig_of(const fs::path& dataset) {
-  return "left: {topic: /cam0/image_raw}\nright: {topic: /cam1/image_raw}\n"
-         "imu: {topic: /imu0}\ncalibration: " +
-         fs::absolute(dataset).string() + "\n";
-}
-
-// Accepts the status lines of a robot that has more images: "5.6 s, 112 images, ...".
-auto has_more_images_than(int count) {
-  return [count](const std::string& line) {
-    double seconds = 0.0;
-    int images = 0;
-    return std::sscanf(line.c_str(), "%lf s, %d images", &seconds, &images) == 2 && images > count;
-  };
 }
 
 constexpr int kPoses = 100;
@@ -82,9 +56,9 @@ std::vector<std::string> stamps_of(const std::string& poses) {
 std::optional<std::string> live_poses(const fs::path& dataset, double rate) {
   const TemporaryFolder folder;
   const int domain = random_domain();
-  Process robot(live_command(folder, rig_of(dataset), domain, "--set sensors.max_lag_s=30"));
+  Process robot(live_command(folder, euroc_rig(dataset), domain, "--set sensors.max_lag_s=30"));
   Process driver(driver_command(dataset, domain, "--rate " + std::to_string(rate)));
-  REQUIRE(robot.wait_until(has_more_images_than(kPoses)).has_value());
+  REQUIRE(robot.wait_until(is_beyond(0.0, kPoses)).has_value());
   driver.kill(SIGINT);
   CHECK(driver.wait() == 0);
   robot.kill(SIGINT);
@@ -122,9 +96,9 @@ TEST_CASE("Messages that a live robot has lost are counted in its summary", "[sy
   if (!dataset) return;
   const TemporaryFolder folder;
   const int domain = random_domain();
-  Process robot(live_command(folder, rig_of(*dataset), domain));
+  Process robot(live_command(folder, euroc_rig(*dataset), domain));
   Process driver(driver_command(*dataset, domain, "--reliable --drop 0.1"));
-  REQUIRE(robot.wait_until(has_more_images_than(60)).has_value());
+  REQUIRE(robot.wait_until(is_beyond(0.0, 60)).has_value());
   robot.kill(SIGINT);
   CHECK(robot.wait() == 0);
   driver.kill(SIGINT);
@@ -229,7 +203,7 @@ TEST_CASE("A live robot whose topics are silent reports where it listens, and en
   if (!dataset) return;
   const TemporaryFolder folder;
   const int domain = random_domain();
-  Process robot(logged(live_command(folder, rig_of(*dataset), domain)));
+  Process robot(logged(live_command(folder, euroc_rig(*dataset), domain)));
   const std::string place = "0 publish it on ROS domain " + std::to_string(domain);
   const auto states_place = [&place](const std::string& line) {
     return line.find("nothing on /cam0/image_raw") != line.npos &&

@@ -4,12 +4,10 @@
 #include <string>
 #include <vector>
 
-#include "apps/robot/run_summary.hpp"
 #include "modules/core/stamp.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
-#include "test/support/command.hpp"
 #include "test/support/shared_data.hpp"
-#include "test/support/temporary_folder.hpp"
+#include "test/system/team_run.hpp"
 
 // Processor time and memory of a robot, and the frames it skips if the computer is too slow.
 
@@ -18,13 +16,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-CommandResult run_robot(const fs::path& dataset, const fs::path& output,
+CommandResult run_alone(const fs::path& dataset, const fs::path& output,
                         const std::string& options) {
-  return run_command(KM_BIN_DIR
-                     "/kimera_multi_robot --config config/datasets/euroc.yaml --robot 0"
-                     " --serve-limit 0 --interface lo --domain 98 --set dds.team=" +
-                     output.parent_path().filename().string() + " --dataset " + dataset.string() +
-                     " --output " + output.string() + ' ' + options);
+  return run_command(euroc_robot(0, "--serve-limit 0 --interface lo --dataset " + dataset.string() +
+                                        " --output " + output.string() + ' ' + options));
 }
 
 }  // namespace
@@ -37,7 +32,7 @@ TEST_CASE("A robot keeps the memory of a frame for the next one", "[load]") {
   if (!dataset) return;
   const TemporaryFolder folder;
   const fs::path output = folder.path() / "a";
-  const CommandResult run = run_robot(*dataset, output, "--to 15 --rate max");
+  const CommandResult run = run_alone(*dataset, output, "--to 15 --rate max");
   CAPTURE(run.output);
   REQUIRE(run.exit_code == 0);
   const RunSummary summary = read_summary(output / "summary.json");
@@ -55,7 +50,7 @@ TEST_CASE("By default a recording waits, and every image is in odometry and map"
   if (!dataset) return;
   const TemporaryFolder folder;
   const fs::path output = folder.path() / "a";
-  const CommandResult run = run_robot(*dataset, output,
+  const CommandResult run = run_alone(*dataset, output,
                                       "--to 4 --set mapping.mode=metric mapping.rate_hz=20 "
                                       "semantic_mapping.voxel_size_m=0.015");
   CAPTURE(run.output);
@@ -74,7 +69,7 @@ TEST_CASE("On an overloaded computer the map skips frames first, then images are
   const TemporaryFolder folder;
   const fs::path output = folder.path() / "a";
   // An image every 2.5 ms: odometry alone takes two to three times as long.
-  const CommandResult run = run_robot(
+  const CommandResult run = run_alone(
       *dataset, output, "--to 15 --rate 20 --set mapping.mode=metric sensors.max_lag_s=0.05");
   CAPTURE(run.output);
   REQUIRE(run.exit_code == 0);

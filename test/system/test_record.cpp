@@ -25,10 +25,8 @@ namespace {
 namespace fs = std::filesystem;
 
 std::string record_command(const fs::path& dataset, const std::string& options) {
-  return KM_BIN_DIR
-         "/kimera_multi_robot --config config/datasets/euroc.yaml --robot 0 --name alice --to 12 "
-         "--serve-limit 100 --record --domain " +
-         std::to_string(random_domain()) + " --dataset " + dataset.string() + ' ' + options;
+  return euroc_robot(0, "--name alice --to 12 --serve-limit 100 --record --dataset " +
+                            dataset.string() + ' ' + options);
 }
 
 struct Record {

@@ -27,21 +27,21 @@ namespace {
 namespace fs = std::filesystem;
 
 struct Part {
-  std::string robot;
+  int robot = 0;
   std::string from_s;
   std::string to_s;
 };
 
 // Two parts of the recording that see the same places.
-const Part kFirst{"0", "0", "12"};
-const Part kSecond{"1", "5", "17"};
+const Part kFirst{0, "0", "12"};
+const Part kSecond{1, "5", "17"};
 
 // As fast as it can: at any other rate images are skipped on a busy machine.
 std::vector<std::string> command_of(const Part& part, const fs::path& dataset, int domain) {
-  return words_of(KM_BIN_DIR "/kimera_multi_robot --config config/datasets/euroc.yaml --robot " +
-                  part.robot + " --dataset " + dataset.string() + " --from " + part.from_s +
-                  " --to " + part.to_s + " --rate max --serve-limit 100 --domain " +
-                  std::to_string(domain));
+  return words_of(euroc_robot(part.robot,
+                              "--dataset " + dataset.string() + " --from " + part.from_s +
+                                  " --to " + part.to_s + " --rate max --serve-limit 100",
+                              domain));
 }
 
 std::vector<std::string> with(std::vector<std::string> command, const std::string& option,
@@ -138,9 +138,8 @@ TEST_CASE("A run localises itself in a finished map, and another one extends it"
   const fs::path map = folder.path() / "map", localized = folder.path() / "localized",
                  extended = folder.path() / "extended";
   const int domain = random_domain();
-  const auto later = command_of({"0", "7", "13"}, *dataset, domain);
-  REQUIRE(Process(with(command_of({"0", "0", "6"}, *dataset, domain), "--output", map)).wait() ==
-          0);
+  const auto later = command_of({0, "7", "13"}, *dataset, domain);
+  REQUIRE(Process(with(command_of({0, "0", "6"}, *dataset, domain), "--output", map)).wait() == 0);
   const std::uintmax_t before = size_of(map / "run.journal");
   REQUIRE(Process(with(with(later, "--localize", map), "--output", localized)).wait() == 0);
   const RunSummary summary = read_summary(localized / "summary.json");
@@ -207,11 +206,7 @@ class SealedTeam {
  public:
   static constexpr std::size_t kClosures = kLap / 6;
 
-  SealedTeam() {
-    const CommandResult made = run_command(KM_BIN_DIR "/kimera_multi_keys make " + keys().string() +
-                                           " --robots robot0:0,robot1:1");
-    REQUIRE(made.exit_code == 0);
-  }
+  SealedTeam() { make_keys(keys(), "robot0:0,robot1:1"); }
 
   [[nodiscard]] fs::path output(RobotId robot) const { return folder_.path() / robot_name(robot); }
 
@@ -385,7 +380,7 @@ TEST_CASE("A robot joins the robot of a finished run", "[system][resume]") {
   const fs::path yesterday = folder.path() / "yesterday", today = folder.path() / "today";
   {
     Part first = kFirst;
-    first.robot = "7";
+    first.robot = 7;
     Process mapping(with(command_of(first, *dataset, random_domain()), "--output", yesterday));
     REQUIRE(mapping.wait() == 0);
   }
@@ -409,7 +404,7 @@ TEST_CASE("Journals that cannot be continued are refused by name", "[system][res
   if (!dataset) return;
   const TemporaryFolder folder;
   const fs::path output = folder.path() / "run";
-  Part part{"3", "0", "2.5"};
+  const Part part{3, "0", "2.5"};
   {
     Process robot(with(command_of(part, *dataset, random_domain()), "--output", output));
     REQUIRE(robot.wait() == 0);

@@ -2,44 +2,39 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <csignal>
-#include <cstdio>
 #include <filesystem>
 #include <functional>
 #include <optional>
-#include <random>
 #include <string>
 #include <vector>
 
-#include "apps/robot/run_summary.hpp"
 #include "modules/core/lie.hpp"
 #include "modules/evaluation/trajectory_error.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
-#include "test/support/command.hpp"
 #include "test/support/euroc_copy.hpp"
 #include "test/support/process.hpp"
 #include "test/support/shared_data.hpp"
-#include "test/support/temporary_folder.hpp"
+#include "test/system/live_run.hpp"
+#include "test/system/team_run.hpp"
 
 namespace km {
 namespace {
 
 namespace fs = std::filesystem;
 
-// A robot without peers: only robots of such tests are on this domain, and they also ignore others.
-std::string robot_command(const TemporaryFolder& folder, const std::string& options) {
-  return KM_BIN_DIR
-         "/kimera_multi_robot --config config/datasets/euroc.yaml --robot 0 --serve-limit 0"
-         " --interface lo --domain 99 --set dds.team=" +
-         folder.path().filename().string() + ' ' + options;
+// A robot without peers.
+std::string lone_robot(const std::string& options) {
+  static const int domain = random_domain();
+  return euroc_robot(0, "--serve-limit 0 --interface lo " + options, domain);
 }
 
 // `dataset` and `output` are in `folder`.
 CommandResult run_robot(const TemporaryFolder& folder, const std::string& dataset,
                         const std::string& output, const std::string& options = {},
                         const std::string& output_option = "--output") {
-  return run_command(robot_command(
-      folder, "--rate max --dataset " + (folder.path() / dataset).string() + ' ' + output_option +
-                  ' ' + (folder.path() / output).string() + ' ' + options));
+  return run_command(lone_robot("--rate max --dataset " + (folder.path() / dataset).string() + ' ' +
+                                output_option + ' ' + (folder.path() / output).string() + ' ' +
+                                options));
 }
 
 // The cameras as a run on the recording "late" estimates them.
@@ -122,7 +117,7 @@ const std::vector<SensorFault>& sensor_faults() {
   return faults;
 }
 
-struct Outcome {
+struct FaultyRun {
   int exit_code = -1;
   std::string output;
   RunSummary summary;
@@ -166,7 +161,7 @@ std::optional<double> back_after_s(const std::vector<PosePair>& pairs, const Ali
   return back ? std::optional(seconds_between(end, *back)) : std::nullopt;
 }
 
-Outcome meet(const fs::path& recording, const SensorFault& fault) {
+FaultyRun meet(const fs::path& recording, const SensorFault& fault) {
   const TemporaryFolder folder;
   EurocCopy copy = first_seconds(recording, kLength_s);
   const Stamp first = copy.cameras[0].front().stamp;
@@ -175,7 +170,7 @@ Outcome meet(const fs::path& recording, const SensorFault& fault) {
   fault.corrupt(copy, begin, end);
   copy.write(folder.path() / "recording");
   const CommandResult run = run_robot(folder, "recording", "results");
-  Outcome outcome;
+  FaultyRun outcome;
   outcome.exit_code = run.exit_code;
   outcome.output = run.output;
   if (run.exit_code != 0) return outcome;
@@ -203,7 +198,7 @@ TEST_CASE("A robot survives what happens to its sensors", "[faults]") {
   const auto recording = shared_data("euroc/MH_01_easy");
   if (!recording) return;
   for (const SensorFault& fault : sensor_faults()) {
-    const Outcome outcome = meet(fs::absolute(*recording), fault);
+    const FaultyRun outcome = meet(fs::absolute(*recording), fault);
     CAPTURE(fault.name, fault.lasts_s, outcome.output);
     CHECK(outcome.exit_code == 0);
     CHECK_THAT(outcome.output, Catch::Contains(fault.event));
@@ -219,19 +214,15 @@ TEST_CASE("A driver that restarts does not end a live robot", "[faults][live]") 
   const auto recording = shared_data("euroc/MH_01_easy");
   if (!recording) return;
   const TemporaryFolder folder;
-  const fs::path rig =
-      folder.write("rig.yaml",
-                   "left: {topic: /cam0/image_raw}\nright: {topic: /cam1/image_raw}\n"
-                   "imu: {topic: /imu0}\ncalibration: " +
-                       fs::absolute(*recording).string() + "\n");
+  const fs::path rig = folder.write("rig.yaml", euroc_rig(*recording));
   const EurocCopy whole = first_seconds(fs::absolute(*recording), 12.0);
   const Stamp first = whole.cameras[0].front().stamp;
   const Stamp silent = first + nanoseconds(5.0), again = first + nanoseconds(7.0);
-  const std::string domain = std::to_string(100 + std::random_device()() % 100);
-  Process robot(words_of(robot_command(
-      folder,
-      "--live " + rig.string() + " --output " + (folder.path() / "results").string() +
-          " --set ros.interface=lo --set sensors.max_lag_s=30 --set ros.domain=" + domain)));
+  const int domain = random_domain();
+  Process robot(words_of(
+      lone_robot("--live " + rig.string() + " --output " + (folder.path() / "results").string() +
+                 " --set ros.interface=lo --set sensors.max_lag_s=30 --set ros.domain=" +
+                 std::to_string(domain))));
   for (const bool is_first : {true, false}) {
     EurocCopy part = whole;
     const auto is_outside = [&](const auto& item) {
@@ -241,16 +232,10 @@ TEST_CASE("A driver that restarts does not end a live robot", "[faults][live]") 
     std::erase_if(part.samples, is_outside);
     const fs::path played = folder.path() / (is_first ? "before" : "after");
     part.write(played);
-    Process driver(words_of(KM_BIN_DIR "/kimera_multi_publish " + played.string() + " --domain " +
-                            domain + " --interface lo --wait 1 --reliable --rate 0.7"));
+    Process driver(driver_command(played, domain, "--reliable --rate 0.7"));
     CHECK(driver.wait() == 0);
   }
-  const auto continues = [](const std::string& line) {  // "10.6 s, 164 images, ..."
-    double seconds = 0.0;
-    int images = 0;
-    return std::sscanf(line.c_str(), "%lf s, %d images", &seconds, &images) == 2 && seconds > 7.5;
-  };
-  CHECK(robot.wait_until(continues));
+  CHECK(robot.wait_until(is_beyond(7.5)));
   robot.kill(SIGINT);
   CHECK(robot.wait() == 0);
   const auto poses = read_trajectory(folder.path() / "results/odometry.tum");

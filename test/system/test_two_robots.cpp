@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <csignal>
-#include <cstdio>
 #include <memory>
 
 #include "apps/lab/pgo/team_graph_file.hpp"
@@ -12,6 +11,7 @@
 #include "test/support/eavesdropper.hpp"
 #include "test/support/process.hpp"
 #include "test/support/shared_data.hpp"
+#include "test/system/live_run.hpp"
 #include "test/system/team_run.hpp"
 
 namespace km {
@@ -54,27 +54,21 @@ TEST_CASE("Two robots on the halves of a recording localise together", "[system]
   CHECK(ear.derivable().empty());
 }
 
-std::vector<std::string> robot_command(const std::string& id, const fs::path& dataset,
-                                       const fs::path& output, int domain) {
-  return words_of(KM_BIN_DIR "/kimera_multi_robot --config config/datasets/euroc.yaml --robot " +
-                  id + " --name r" + id + " --dataset " + dataset.string() + " --output " +
-                  output.string() + " --domain " + std::to_string(domain));
-}
-
 TEST_CASE("Two robots end with the same map of their team", "[system]") {
   const auto dataset = shared_data("euroc/MH_01_easy");
   if (!dataset) return;
   const TemporaryFolder folder;
   const int domain = random_domain();
-  const auto start = [&](const std::string& id, const std::string& part) {
-    auto command = robot_command(id, *dataset, folder.path() / id, domain);
-    for (const std::string& word :
-         words_of(part + " --rate max --serve-limit 200 --set mapping.mode=metric "
-                         "--set map.team=full --set map.max_bytes_per_s=1e7"))
-      command.push_back(word);
-    return std::make_unique<Process>(command);
+  const auto start = [&](int robot, const std::string& part) {
+    const std::string output = (folder.path() / std::to_string(robot)).string();
+    return std::make_unique<Process>(
+        words_of(euroc_robot(robot,
+                             part + " --dataset " + dataset->string() + " --output " + output +
+                                 " --rate max --serve-limit 200 --set mapping.mode=metric --set "
+                                 "map.team=full --set map.max_bytes_per_s=1e7",
+                             domain)));
   };
-  const auto a = start("0", "--from 0 --to 6"), b = start("1", "--from 2 --to 8");
+  const auto a = start(0, "--from 0 --to 6"), b = start(1, "--from 2 --to 8");
   CHECK(a->wait() == 0);
   CHECK(b->wait() == 0);
   std::array<std::size_t, 2> faces{};
@@ -92,15 +86,6 @@ TEST_CASE("Two robots end with the same map of their team", "[system]") {
   CHECK(fused > std::max(faces[0], faces[1]));
 }
 
-// A status line from 4 s of the recording on: the first images are processed, and most are still to
-// come. A machine under load may print none between.
-bool is_past_start(const std::string& line) {
-  double seconds = 0.0;
-  char unit = 0;
-  return std::sscanf(line.c_str(), "%lf %c,", &seconds, &unit) == 2 && unit == 's' &&
-         seconds >= 4.0;
-}
-
 TEST_CASE("A robot whose id is taken reports it and ends, and the first owner of the id continues",
           "[system]") {
   const auto dataset = shared_data("euroc/MH_01_easy");
@@ -109,22 +94,22 @@ TEST_CASE("A robot whose id is taken reports it and ends, and the first owner of
   const int domain = random_domain();
   const bool with_keys = GENERATE(false, true);
   CAPTURE(with_keys);
-  std::vector<std::string> keys;
+  std::string keys;
   if (with_keys) {
-    const fs::path team = folder.path() / "team";
-    REQUIRE(run_command(KM_BIN_DIR "/kimera_multi_keys make " + team.string() + " --robots r7:7")
-                .exit_code == 0);
-    keys = {"--security", (team / "r7").string()};
+    make_keys(folder.path() / "team", "r7:7");
+    keys = " --security " + (folder.path() / "team/r7").string();
   }
-  auto command = robot_command("7", *dataset, folder.path() / "a", domain);
-  command.insert(command.end(), keys.begin(), keys.end());
-  auto same_id = robot_command("7", *dataset, folder.path() / "b", domain);
-  same_id.insert(same_id.end(), keys.begin(), keys.end());
+  const auto command = [&](const char* output, const std::string& options) {
+    return words_of(euroc_robot(7,
+                                "--name r7 --dataset " + dataset->string() + " --output " +
+                                    (folder.path() / output).string() + keys + options,
+                                domain));
+  };
   // It runs as long as the other one needs to start.
-  command.insert(command.end(), {"--to", "7.5", "--set", "run.settle_s=600"});
-  Process incumbent(command);
-  REQUIRE(incumbent.wait_until(is_past_start).has_value());
-  Process twin(same_id);
+  Process incumbent(command("a", " --to 7.5 --set run.settle_s=600"));
+  // The first images are processed. A machine under load may not print a line before the last one.
+  REQUIRE(incumbent.wait_until(is_beyond(3.9)).has_value());
+  Process twin(command("b", ""));
   CHECK(twin.wait() == 3);
   CHECK_THAT(read_summary(folder.path() / "b/summary.json").exit_reason,
              Catch::Contains("give every robot its own --robot"));

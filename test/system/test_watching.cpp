@@ -15,9 +15,7 @@ TEST_CASE("A viewer receives nothing without --view, and from a team with keys o
   const TemporaryFolder folder;
   const int domain = random_domain();
   const std::string keys = (folder.path() / "keys").string();
-  REQUIRE(
-      run_command(KM_BIN_DIR "/kimera_multi_keys make " + keys + " --robots robot0:0").exit_code ==
-      0);
+  make_keys(keys, "robot0:0");
   Audience audience(domain);
   std::string command;
   for (const std::string& word : robot_on({0, 0}, {1, 40}, folder.path(), domain))
