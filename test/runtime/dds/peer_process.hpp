@@ -12,9 +12,6 @@
 
 namespace km {
 
-/// A second is asked for; only a failure takes longer than this.
-inline constexpr double kDiscoveryBound_s = 5.0;
-
 /// Starts test_dds_peer as robot `id` with the settings of the section dds. `keys` is its folder of
 /// keys; empty: the team has none.
 inline std::unique_ptr<Process> start_peer(RobotId id, const std::vector<std::string>& settings,
