@@ -25,7 +25,6 @@
 #include "modules/rbcd/solver_choice.hpp"
 #include "modules/ros_dds/mcap_sink.hpp"
 #include "modules/ros_dds/node/live_sink.hpp"
-#include "modules/vio/node/external_odometry_node.hpp"
 #include "modules/vio/node/vio_node.hpp"
 #include "runtime/dds/robot_status.hpp"
 
@@ -178,9 +177,8 @@ void Robot::add_journal(const RobotOptions& options, const RobotInput& input,
                                              .restarts = topics_.closure_restarts});
 }
 
-template <typename OdometryNode, typename... Arguments>
-void Robot::add_odometry(Arguments&&... arguments) {
-  auto& node = add<OdometryNode>(true, identity_.robot, std::forward<Arguments>(arguments)...);
+void Robot::add_odometry(VioNode::Odometry odometry, const VioTopics& topics) {
+  auto& node = add<VioNode>(true, std::move(odometry), topics);
   if (!restored_) return;
   VioCheckpoint checkpoint{.state = {}, .keyframe = restored_->odometry.back()};
   const std::size_t states = restored_->final_states();
@@ -208,9 +206,9 @@ void Robot::add_sensing(const RobotConfig& config, const PlaybackPace& pace,
                            .images = topics_.tracked_images,
                            .processed = topics_.processed_frames};
   if (gives_poses)
-    add_odometry<ExternalOdometryNode>(rig.stereo.depth_source, config.vio, odometry);
+    add_odometry(ExternalOdometry(identity_.robot, rig.stereo.depth_source, config.vio), odometry);
   else
-    add_odometry<VioNode>(rig, config.tracker, config.vio, odometry);
+    add_odometry(Vio(identity_.robot, rig, config.tracker, config.vio), odometry);
   if (mapping) add_mapping(config, pace, rig.stereo, *mapping, std::move(map));
   std::optional<KeypointDescriber> keypoint_describer;
   if (const std::string& network = config.keyframe_features.network; !network.empty())

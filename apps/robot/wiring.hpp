@@ -46,6 +46,7 @@
 #include "modules/sensors/node/sensors_node.hpp"
 #include "modules/team_map/node/team_map_node.hpp"
 #include "modules/view/node/view_node.hpp"
+#include "modules/vio/node/vio_node.hpp"
 #include "runtime/dds/bridge.hpp"
 #include "runtime/dds/robot_status.hpp"
 #include "runtime/overlay/overlay_node.hpp"
@@ -223,8 +224,7 @@ class Robot {
   void add_sensing(const RobotConfig& config, const PlaybackPace& pace,
                    std::unique_ptr<DatasetReader> reader, const std::optional<MappingPlan>& mapping,
                    std::optional<ResumedMap> map);
-  template <typename OdometryNode, typename... Arguments>
-  void add_odometry(Arguments&&... arguments);
+  void add_odometry(VioNode::Odometry odometry, const VioTopics& topics);
   void add_place_recognition(const RobotConfig& config);
   void add_localization(const RobotConfig& config, FinishedMap map);
   void add_fixes(FixInput input);

@@ -36,18 +36,20 @@ void ExternalOdometry::continue_from(const VioCheckpoint& checkpoint) {
   T_chain_odom_ = checkpoint.keyframe.T_odom_kf * checkpoint.state->T_odom_body.inverse();
 }
 
-ExternalOdometryResult ExternalOdometry::process(const SensorPacket& packet) {
-  ExternalOdometryResult result;
+VioResult ExternalOdometry::process(const SensorPacket& packet) {
+  VioResult result;
   if (packet.frame == nullptr || !packet.pose || !packet.pose->T_odom_body.matrix().allFinite())
     return result;
   const StampedMeasurement measured{packet.frame->stamp, *packet.pose};
   const bool is_taken_up =
       std::exchange(continues_, false) && measured.stamp == last_keyframe_->stamp;
   if (last_ && measured.stamp <= last_->stamp && !is_taken_up) return result;
-  result.has_jumped = !is_taken_up && is_jump(measured);
-  if (result.has_jumped)
+  const bool has_jumped = !is_taken_up && is_jump(measured);
+  if (has_jumped) {
+    result.problem = VioProblem::kJumped;
     T_chain_odom_ = T_chain_odom_ * last_->pose.T_odom_body * measured.pose.T_odom_body.inverse();
-  if (last_ && !result.has_jumped && !is_taken_up)
+  }
+  if (last_ && !has_jumped && !is_taken_up)
     count_motion(measured);
   else
     T_odom_last_motion_ = measured.pose.T_odom_body;
@@ -55,26 +57,26 @@ ExternalOdometryResult ExternalOdometry::process(const SensorPacket& packet) {
   OdometryState state;
   state.stamp = measured.stamp;
   state.T_odom_body = T_odom_body;
-  if (last_ && !result.has_jumped && !is_taken_up)
+  if (last_ && !has_jumped && !is_taken_up)
     state.v_odom =
         (T_odom_body.translation() - (T_chain_odom_ * last_->pose.T_odom_body).translation()) /
         seconds_between(last_->stamp, measured.stamp);
   const bool locates_points =
       depth_source_ == DepthSource::kRightImage || packet.frame->depth != nullptr;
   const bool is_due =
-      !last_kf_ || result.has_jumped ||
+      !last_kf_ || has_jumped ||
       is_keyframe_due(config_, moved_s_, last_keyframe_->T_odom_kf.inverse() * T_odom_body);
   // A keyframe without located points cannot be part of a closure and is useless. After a jump of
   // the external pose, a keyframe is made in any case: the uncertain step to it is then in the
   // graph.
-  if (!is_taken_up && is_due && (locates_points || result.has_jumped))
-    add_keyframe(measured, T_odom_body, result.has_jumped, result);
+  if (!is_taken_up && is_due && (locates_points || has_jumped))
+    add_keyframe(measured, T_odom_body, has_jumped, result);
   if (!last_kf_) return result;
   if (is_taken_up)  // the state was published earlier; the covariance was not kept
     last_kf_ = measured;
   else
-    result.state = state;
-  result.frame = LocatedFrame{packet.frame, last_keyframe_->id.index, T_odom_body};
+    result.states.push_back(state);
+  result.frames.push_back({packet.frame, last_keyframe_->id.index, T_odom_body});
   last_ = measured;
   return result;
 }
@@ -110,7 +112,7 @@ Matrix6 ExternalOdometry::step_covariance(const StampedMeasurement& measured) co
 }
 
 void ExternalOdometry::add_keyframe(const StampedMeasurement& measured, const SE3& T_odom_body,
-                                    bool has_jumped, ExternalOdometryResult& result) {
+                                    bool has_jumped, VioResult& result) {
   KeyframeOdometry keyframe;
   keyframe.id = {robot_, 0};
   keyframe.stamp = measured.stamp;
@@ -123,7 +125,7 @@ void ExternalOdometry::add_keyframe(const StampedMeasurement& measured, const SE
   last_keyframe_ = keyframe;
   moved_s_ = 0.0;
   last_kf_ = measured;
-  result.keyframe = keyframe;
+  result.keyframes.push_back(keyframe);
 }
 
 }  // namespace km

@@ -10,16 +10,6 @@
 
 namespace km {
 
-/// Result of one packet.
-struct ExternalOdometryResult {
-  std::optional<OdometryState> state;        ///< nullopt: the packet has no usable pose.
-  std::optional<KeyframeOdometry> keyframe;  ///< New keyframe, if any.
-  std::optional<LocatedFrame> frame;
-  /// The pose jumped faster than VioConfig::max_speed_mps; the jump is removed from published
-  /// poses.
-  bool has_jumped = false;
-};
-
 /// Publishes the poses of an external odometry (see MeasuredPose) in place of Vio, with keyframes
 /// by the rules of Vio (is_keyframe_due()). The covariance of a keyframe's relative pose is the
 /// growth of the odometry's covariance since the previous keyframe (between_on_chain()), plus the
@@ -35,7 +25,9 @@ class ExternalOdometry {
   /// the state is unknown, the next keyframe has unknown_step_covariance().
   void continue_from(const VioCheckpoint& checkpoint);
 
-  [[nodiscard]] ExternalOdometryResult process(const SensorPacket& packet);
+  /// Without a state if the packet has no usable pose. kJumped: the pose jumped faster than
+  /// VioConfig::max_speed_mps, and the jump is removed from published poses.
+  [[nodiscard]] VioResult process(const SensorPacket& packet);
 
  private:
   struct StampedMeasurement {
@@ -47,7 +39,7 @@ class ExternalOdometry {
   void count_motion(const StampedMeasurement& measured);
   [[nodiscard]] Matrix6 step_covariance(const StampedMeasurement& measured) const;
   void add_keyframe(const StampedMeasurement& measured, const SE3& T_odom_body, bool has_jumped,
-                    ExternalOdometryResult& result);
+                    VioResult& result);
 
   RobotId robot_;
   DepthSource depth_source_;

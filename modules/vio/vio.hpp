@@ -35,6 +35,7 @@ enum class VioProblem {
   /// Without an inertial sensor: images have not determined the pose for a second. Odometry starts
   /// again from the last pose with the first image that has enough features.
   kLost,
+  kJumped,        ///< The poses of an external odometry jumped, see ExternalOdometry.
   kStartTimeout,  ///< No start was possible; the oldest waiting images are dropped without a pose.
 };
 
@@ -83,10 +84,6 @@ class Vio {
   void continue_from(const VioCheckpoint& checkpoint);
 
   [[nodiscard]] VioResult process(const SensorPacket& packet);
-
-  /// Current estimate of time offset and mounting of the cameras relative to the inertial sensor;
-  /// see VioConfig::calibrate.
-  [[nodiscard]] UncertainCalibration calibration() const { return smoother_.calibration(); }
 
   [[nodiscard]] const VioStatistics& statistics() const { return statistics_; }
 

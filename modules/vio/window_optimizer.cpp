@@ -132,7 +132,6 @@ void WindowEquations::add_prior() {
   if (prior.frames.empty()) return;
   const Eigen::VectorXd r =
       prior.J * prior_offset(prior, prior_states(window_), window_.calibration) + prior.r;
-  cost_ += 0.5 * r.squaredNorm();
   const Eigen::MatrixXd H = prior.J.transpose() * prior.J;
   const Eigen::VectorXd g = prior.J.transpose() * r;
   struct Span {
@@ -162,7 +161,6 @@ void WindowEquations::add_imu(std::size_t frame) {
       j.imu->linearize(i.state, j.state, linearization_[frame - 1], linearization_[frame]);
   const auto a = 15 * static_cast<Eigen::Index>(frame - 1);
   const auto b = a + 15;
-  cost_ += 0.5 * term.r.squaredNorm();
   H_.block<15, 15>(a, a).noalias() += term.J_i.transpose() * term.J_i;
   H_.block<15, 15>(b, a).noalias() += term.J_j.transpose() * term.J_i;
   H_.block<15, 15>(b, b).noalias() += term.J_j.transpose() * term.J_j;
@@ -200,9 +198,7 @@ void WindowEquations::add_observation(const WindowObservation& o, const Eigen::V
         !linearize_reprojection(view, *o.bearings[c], images_[o.frame],
                                 image_linearization_[o.frame].T_odom_body, p_odom, term))
       continue;
-    const double s = term.r.squaredNorm();
-    const double w = cauchy_weight(s, window_.loss_scale);
-    cost_ += 0.5 * cauchy(s, window_.loss_scale);
+    const double w = cauchy_weight(term.r.squaredNorm(), window_.loss_scale);
     const Eigen::Matrix<double, 6, 2> wJ_T = w * term.J_pose.transpose();
     A.noalias() += wJ_T * term.J_pose;
     a.noalias() += wJ_T * term.r;

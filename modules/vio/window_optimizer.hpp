@@ -37,7 +37,6 @@ class WindowEquations {
 
   [[nodiscard]] const Eigen::MatrixXd& H() const { return H_; }  ///< Lower triangle only.
   [[nodiscard]] const Eigen::VectorXd& g() const { return g_; }
-  [[nodiscard]] double cost() const { return cost_; }  ///< Cost of all added terms.
 
   /// Solution for the frames; empty if H is not positive definite.
   [[nodiscard]] Eigen::VectorXd solve() const;
@@ -85,7 +84,6 @@ class WindowEquations {
   Eigen::VectorXd images_g_;
   Eigen::MatrixXd H_;
   Eigen::VectorXd g_;
-  double cost_ = 0.0;
   std::vector<Eliminated> eliminated_;
   std::vector<Coupling> couplings_;
 };

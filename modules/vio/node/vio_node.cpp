@@ -1,6 +1,7 @@
 #include "modules/vio/node/vio_node.hpp"
 
 #include <optional>
+#include <string>
 #include <utility>
 
 #include "modules/core/text_table.hpp"
@@ -36,6 +37,8 @@ const char* text(VioProblem problem) {
     case VioProblem::kLost:
       return "images do not determine the pose, and there is no inertial sensor: starting again "
              "from the last pose when they do";
+    case VioProblem::kJumped:
+      return "the odometry jumps faster than vio.max_speed_mps";
     case VioProblem::kStartTimeout:
       return "cannot start, giving up the oldest images held back";
   }
@@ -71,17 +74,22 @@ std::optional<double> tracked_share(const TrackerStatistics& s) {
 
 }  // namespace
 
-VioNode::VioNode(RobotId robot, const SensorRig& rig, const TrackerConfig& tracker,
-                 const VioConfig& config, const VioTopics& topics)
-    : WorkerNode({.name = VioConfig::kSection, .queue = kQueuedPackets}),
-      vio_(robot, rig, tracker, config),
-      has_imu_(rig.has_imu),
+VioNode::VioNode(Odometry odometry, const VioTopics& topics)
+    : WorkerNode({.name = std::holds_alternative<Vio>(odometry) ? VioConfig::kSection : "odometry",
+                  .queue = kQueuedPackets}),
+      odometry_(std::move(odometry)),
+      vio_(std::get_if<Vio>(&odometry_)),
       topics_(topics) {
   follow(topics.packets);
 }
 
 void VioNode::conclude() {
-  const VioStatistics& s = vio_.statistics();
+  if (vio_ == nullptr) {
+    log::info(name()) << images_ << " images, " << without_pose_ << " without a pose, " << jumps_
+                      << " jumps";
+    return;
+  }
+  const VioStatistics& s = vio_->statistics();
   log::info(name()) << s.images << " images, " << s.images_without_pose << " without a pose, "
                     << s.starts << " starts in " << s.start_attempts << " attempts, "
                     << s.divergences << " divergences, " << s.contradictions
@@ -92,27 +100,34 @@ void VioNode::conclude() {
 }
 
 void VioNode::step(const SensorPacket& packet) {
-  VioResult result = vio_.process(packet);
+  VioResult result =
+      std::visit([&](auto& odometry) { return odometry.process(packet); }, odometry_);
+  ++images_;
+  without_pose_ += result.frames.empty() ? 1 : 0;
+  jumps_ += result.problem == VioProblem::kJumped ? 1 : 0;
   report(result, packet.frame ? packet.frame->stamp : 0);
   for (const OdometryState& state : result.states) topics_.odometry.publish(state);
   for (const KeyframeOdometry& keyframe : result.keyframes) topics_.keyframes.publish(keyframe);
   for (const LocatedFrame& frame : result.frames) topics_.frames.publish(frame);
-  if (result.problem != VioProblem::kNone || result.start || result.vision ||
-      vio_.statistics().blind_s > blind_s_)
-    topics_.statistics.publish(vio_.statistics());
-  blind_s_ = vio_.statistics().blind_s;
+  if (vio_ != nullptr) {
+    const VioStatistics& statistics = vio_->statistics();
+    if (result.problem != VioProblem::kNone || result.start || result.vision ||
+        statistics.blind_s > blind_s_)
+      topics_.statistics.publish(statistics);
+    blind_s_ = statistics.blind_s;
+  }
+  if (packet.frame == nullptr) return;
   if (result.problem != VioProblem::kNoImage && result.problem != VioProblem::kUnorderedImage)
     topics_.images.publish(TrackedImage{packet.frame, std::move(result.tracked)});
-  if (packet.frame)
-    topics_.processed.publish(ProcessedFrame{packet.frame->stamp, tracked_share(result.tracking)});
+  topics_.processed.publish(ProcessedFrame{packet.frame->stamp, tracked_share(result.tracking)});
 }
 
-void VioNode::log_event(const VisionEvent& event) const {
+void VioNode::log_event(const VisionEvent& event, bool has_imu) const {
   const std::string since = fixed(1e-9 * static_cast<double>(event.since), 3) + " s";
   if (event.is_lost)
     log::warn(name()) << "vision lost since " << since << ", " << event.features
                       << " features: the pose is "
-                      << (has_imu_ ? "by inertial sensing alone" : "extrapolated");
+                      << (has_imu ? "by inertial sensing alone" : "extrapolated");
   else
     log::info(name()) << "vision lost since " << since << " is back after "
                       << fixed(event.lasted_s, 2) << " s, " << event.features << " features";
@@ -122,7 +137,7 @@ void VioNode::report(const VioResult& result, Stamp stamp) const {
   if (result.problem != VioProblem::kNone)
     log::limited(log::Level::kWarn, name(), text(result.problem))
         << "at " << stamp << " ns: " << text(result.problem);
-  if (result.vision) log_event(*result.vision);
+  if (result.vision) log_event(*result.vision, vio_->statistics().has_imu);
   if (!result.start) return;
   if (*result.start == StartStatus::kContinues)
     log::info(name()) << text(*result.start);

@@ -1,7 +1,11 @@
 #pragma once
 
+#include <cstddef>
+#include <variant>
+
 #include "modules/core/processing_load.hpp"
 #include "modules/core/tracked_image.hpp"
+#include "modules/vio/external_odometry.hpp"
 #include "modules/vio/vio.hpp"
 #include "runtime/worker_node.hpp"
 
@@ -18,15 +22,17 @@ struct VioTopics {
   Out<ProcessedFrame> processed;    ///< For each packet with an image, at the end of its step.
 };
 
-/// Runs one Vio in a thread. A full queue delays the sensors.
+/// Runs an odometry in a thread. A full queue delays the sensors. An external odometry has no
+/// statistics.
 class VioNode final : public WorkerNode<Topic<SensorPacket>::Message> {
  public:
-  /// Throws ConfigError if a config is out of bounds, std::invalid_argument for an unusable rig.
-  VioNode(RobotId robot, const SensorRig& rig, const TrackerConfig& tracker,
-          const VioConfig& config, const VioTopics& topics);
+  using Odometry = std::variant<Vio, ExternalOdometry>;
 
-  /// See Vio. Call before start().
-  void continue_from(const VioCheckpoint& checkpoint) { vio_.continue_from(checkpoint); }
+  VioNode(Odometry odometry, const VioTopics& topics);
+  /// See Vio and ExternalOdometry. Call before start().
+  void continue_from(const VioCheckpoint& checkpoint) {
+    std::visit([&](auto& odometry) { odometry.continue_from(checkpoint); }, odometry_);
+  }
   ~VioNode() override { stop(); }
 
   /// Handles one packet synchronously. The thread calls only this function; tests and replay can
@@ -37,12 +43,13 @@ class VioNode final : public WorkerNode<Topic<SensorPacket>::Message> {
   void handle(const Topic<SensorPacket>::Message& packet) override { step(*packet); }
   void conclude() override;
   void report(const VioResult& result, Stamp stamp) const;
-  void log_event(const VisionEvent& event) const;
+  void log_event(const VisionEvent& event, bool has_imu) const;
 
-  Vio vio_;
-  const bool has_imu_;
+  Odometry odometry_;
+  const Vio* const vio_;  // null: an external odometry
   const VioTopics topics_;
   double blind_s_ = 0.0;
+  std::size_t images_ = 0, without_pose_ = 0, jumps_ = 0;  // those of an external odometry
 };
 
 }  // namespace km

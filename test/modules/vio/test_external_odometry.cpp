@@ -40,11 +40,11 @@ struct Run {
   int jumps = 0;
 
   void add(const SensorPacket& packet) {
-    const ExternalOdometryResult result = odometry.process(packet);
-    if (result.state) states.push_back(*result.state);
-    if (result.keyframe) keyframes.push_back(*result.keyframe);
-    if (result.frame) frames.push_back(*result.frame);
-    jumps += result.has_jumped ? 1 : 0;
+    const VioResult result = odometry.process(packet);
+    std::ranges::copy(result.states, std::back_inserter(states));
+    std::ranges::copy(result.keyframes, std::back_inserter(keyframes));
+    std::ranges::copy(result.frames, std::back_inserter(frames));
+    jumps += result.problem == VioProblem::kJumped ? 1 : 0;
   }
 };
 

@@ -213,14 +213,13 @@ TEST_CASE("The odometry node publishes the results of odometry in order of time"
   Topic<ProcessedFrame> processed;
   std::vector<ProcessedFrame> finished;
   processed.subscribe([&](const auto& frame) { finished.push_back(*frame); });
-  VioNode node(5, data->rig, TrackerConfig{}, VioConfig{},
-               {.packets = packets,
-                .odometry = odometry,
-                .keyframes = keyframes,
-                .frames = frames,
-                .statistics = statistics,
-                .images = images,
-                .processed = processed});
+  VioNode node(Vio(5, data->rig, {}, {}), {.packets = packets,
+                                           .odometry = odometry,
+                                           .keyframes = keyframes,
+                                           .frames = frames,
+                                           .statistics = statistics,
+                                           .images = images,
+                                           .processed = processed});
   node.start();
   for (std::size_t k = 0; k < 40; ++k) packets.publish(data->packets[k]);
   node.stop();  // drains the queue
