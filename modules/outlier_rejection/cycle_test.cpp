@@ -24,16 +24,16 @@ bool before(const PreparedClosure& i, const PreparedClosure& k) {
 
 }  // namespace
 
-PreparedClosure::PreparedClosure(const OrientedClosure& closure)
-    : id(closure.id),
-      a(closure.a.id),
-      b(closure.b.id),
-      T_odoma_odomb(closure.a.T_odom_kf * closure.T_a_b.T * closure.b.T_odom_kf.inverse()),
-      odometry_a(transported(closure.a.T_odom_kf, BlockCovariance(closure.a.covariance))),
-      odometry_b(transported(closure.b.T_odom_kf, BlockCovariance(closure.b.covariance))),
+PreparedClosure::PreparedClosure(const Closure& closure)
+    : id(closure.id()),
+      a(closure.from.id),
+      b(closure.to.id),
+      T_odoma_odomb(closure.from.T_odom_kf * closure.T_from_to * closure.to.T_odom_kf.inverse()),
+      odometry_a(transported(closure.from.T_odom_kf, BlockCovariance(closure.from.covariance))),
+      odometry_b(transported(closure.to.T_odom_kf, BlockCovariance(closure.to.covariance))),
       measured(transported(
-          closure.a.T_odom_kf * closure.T_a_b.T,
-          BlockCovariance(closure.T_a_b.Sigma + kLeastClosureVariance * Matrix6::Identity()))) {}
+          closure.from.T_odom_kf * closure.T_from_to,
+          BlockCovariance(closure.covariance + kLeastClosureVariance * Matrix6::Identity()))) {}
 
 bool closes_within(const PreparedClosure& i, const PreparedClosure& k,
                    double max_distance_squared) {
@@ -67,17 +67,17 @@ bool closes_within(const PreparedClosure& i, const PreparedClosure& k,
 CycleTest::CycleTest(const PcmConfig& config)
     : config_(checked(config)), max_distance_squared_(chi_squared_6_quantile(config.confidence)) {}
 
-OrientedClosure CycleTest::orient(const Closure& closure) const {
-  const double odometry = config_.odometry_noise_scale * config_.odometry_noise_scale;
-  const double measured = config_.closure_noise_scale * config_.closure_noise_scale;
-  OrientedClosure result{
-      closure.id(), closure.from, closure.to, {closure.T_from_to, measured * closure.covariance}};
-  if (result.b.id < result.a.id) {
-    std::swap(result.a, result.b);
-    result.T_a_b = inverse(result.T_a_b);
+Closure CycleTest::orient(const Closure& closure) const {
+  Closure result = closure;
+  result.covariance *= config_.closure_noise_scale * config_.closure_noise_scale;
+  if (result.to.id < result.from.id) {
+    std::swap(result.from, result.to);
+    const UncertainPose T_from_to = inverse({result.T_from_to, result.covariance});
+    result.T_from_to = T_from_to.T;
+    result.covariance = T_from_to.Sigma;
   }
-  result.a.covariance *= odometry;
-  result.b.covariance *= odometry;
+  for (OdometryPose* end : {&result.from, &result.to})
+    end->covariance *= config_.odometry_noise_scale * config_.odometry_noise_scale;
   return result;
 }
 

@@ -61,22 +61,14 @@ struct BlockCovariance {
   return moved;
 }
 
-/// A closure with a.id < b.id, inverted if necessary, because a cycle does not depend on the
-/// direction. Covariances are multiplied by the squared noise scales of the test.
-struct OrientedClosure {
-  ClosureId id;
-  OdometryPose a;
-  OdometryPose b;
-  UncertainPose T_a_b;
-};
-
 /// Quantities of a closure that all cycles through it use, computed once.
 ///
 /// Expressed in odom_a, the frame in which robot a's odometry began, covariances do not depend on
 /// the rest of the cycle. The covariance of the odometry between two keyframes is the difference of
 /// the covariances accumulated at each.
 struct PreparedClosure {
-  explicit PreparedClosure(const OrientedClosure& closure);
+  /// `closure` is from a to b, as CycleTest::orient() returns it.
+  explicit PreparedClosure(const Closure& closure);
 
   ClosureId id;
   KeyframeId a, b;
@@ -106,8 +98,10 @@ class CycleTest {
   /// Throws ConfigError if `config` is out of bounds.
   explicit CycleTest(const PcmConfig& config);
 
-  /// The closure with a.id < b.id and scaled covariances. Precondition: its two ends differ.
-  [[nodiscard]] OrientedClosure orient(const Closure& closure) const;
+  /// The closure from its lower keyframe, inverted if necessary, because a cycle does not depend on
+  /// the direction. Covariances are multiplied by the squared noise scales of the test.
+  /// Precondition: its two ends differ.
+  [[nodiscard]] Closure orient(const Closure& closure) const;
 
   /// True if the cycle through both closures is consistent. Symmetric in i and k. Precondition:
   /// both are between the same robots.

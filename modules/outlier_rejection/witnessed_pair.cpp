@@ -66,7 +66,7 @@ std::vector<ClosureId> WitnessedPair::closures() const {
   return result;
 }
 
-void WitnessedPair::test(const OrientedClosure& closure) {
+void WitnessedPair::test(const Closure& closure) {
   PreparedClosure added(closure);
   std::vector<std::size_t> agreeing;
   for (std::size_t k = 0; k < tested_.size(); ++k)

@@ -48,7 +48,7 @@ class WitnessedPair {
   [[nodiscard]] int support() const { return static_cast<int>(contest_.most_support()); }
 
  private:
-  void test(const OrientedClosure& closure);
+  void test(const Closure& closure);
   void thin();
 
   RobotId a_, b_;

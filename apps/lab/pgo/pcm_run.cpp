@@ -70,8 +70,8 @@ class RecordedSearch {
 
 // True if the closure agrees with the odometry between its ends: the cycle through it and through
 // the keyframe `a` itself is consistent.
-bool agrees_with_odometry(const CycleTest& test, const OrientedClosure& closure) {
-  const OrientedClosure itself{{closure.a.id, closure.a.id}, closure.a, closure.a, {}};
+bool agrees_with_odometry(const CycleTest& test, const Closure& closure) {
+  const Closure itself{.from = closure.from, .to = closure.from, .covariance = Matrix6::Zero()};
   return test.consistent(PreparedClosure(closure), PreparedClosure(itself));
 }
 
@@ -90,7 +90,7 @@ PcmRun run_pcm(const std::vector<LabelledClosure>& closures, CliqueMethod method
       throw std::invalid_argument("closure " + to_string(closure.from.id) + " -> " +
                                   to_string(closure.to.id) + " cannot be weighed");
     const double begin_s = thread_cpu_s();
-    const OrientedClosure oriented = test.orient(closure);
+    const Closure oriented = test.orient(closure);
     if (!agrees_with_odometry(test, oriented)) {
       ++(outlier ? additions.run.dropped_false : additions.run.dropped_true);
       continue;

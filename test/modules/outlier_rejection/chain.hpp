@@ -44,16 +44,17 @@ inline Closure closure(const OdometryPose& from, const OdometryPose& to, const S
   return {from, to, T_from_to, variance * Matrix6::Identity(), 0, 0.8};
 }
 
-/// The cycle through two closures between the same robots, from keyframe a_i to a_i, composed
+/// The cycle through two closures from one robot to another, from keyframe a_i to a_i, composed
 /// transform by transform: what closes_within() computes faster.
-inline UncertainPose cycle_through(const OrientedClosure& i, const OrientedClosure& k) {
+inline UncertainPose cycle_through(const Closure& i, const Closure& k) {
   const auto along_odometry = [](const OdometryPose& from, const OdometryPose& to) {
     const UncertainPose T_from{from.T_odom_kf, from.covariance}, T_to{to.T_odom_kf, to.covariance};
     return from.id.index <= to.id.index ? between_on_chain(T_from, T_to)
                                         : inverse(between_on_chain(T_to, T_from));
   };
-  const UncertainPose T_ai_bk = compose(i.T_a_b, along_odometry(i.b, k.b));
-  return compose(compose(T_ai_bk, inverse(k.T_a_b)), along_odometry(k.a, i.a));
+  const UncertainPose T_ai_bi{i.T_from_to, i.covariance}, T_ak_bk{k.T_from_to, k.covariance};
+  const UncertainPose T_ai_bk = compose(T_ai_bi, along_odometry(i.to, k.to));
+  return compose(compose(T_ai_bk, inverse(T_ak_bk)), along_odometry(k.from, i.from));
 }
 
 /// Squared Mahalanobis distance of the identity from T.

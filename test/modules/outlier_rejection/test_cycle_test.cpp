@@ -77,7 +77,7 @@ Matrix6 random_covariance(std::mt19937& rng) {
 }
 
 struct Pair {
-  OrientedClosure i, k;
+  Closure i, k;
 };
 
 // Two closures with noise on two long chains, so that every covariance matters; some wrong.
