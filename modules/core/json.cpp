@@ -19,10 +19,4 @@ Json read_json(const std::filesystem::path& file) try {
   throw std::runtime_error(file.string() + ": " + readable(error.what()));
 }
 
-std::optional<double> number_at(const Json& json, const char* pointer) {
-  const Json::json_pointer at(pointer);
-  if (!json.contains(at) || !json.at(at).is_number()) return std::nullopt;
-  return json.at(at).get<double>();
-}
-
 }  // namespace km

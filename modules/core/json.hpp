@@ -2,7 +2,6 @@
 
 #include <filesystem>
 #include <nlohmann/json_fwd.hpp>
-#include <optional>
 #include <string>
 
 namespace km {
@@ -18,8 +17,5 @@ using Json = nlohmann::ordered_json;
 
 /// Throws std::runtime_error with the file name if the file is missing or not JSON.
 [[nodiscard]] Json read_json(const std::filesystem::path& file);
-
-/// The number at a JSON pointer like "/optimized/joint/position_m/rmse"; nullopt if there is none.
-[[nodiscard]] std::optional<double> number_at(const Json& json, const char* pointer);
 
 }  // namespace km

@@ -31,10 +31,6 @@ struct Keypoint {
   std::uint8_t octave = 0;     ///< Level of the scale pyramid (factor 1.2): noise 1.2^octave px.
 
   [[nodiscard]] bool has_depth() const { return inverse_depth > 0.0F; }
-  /// Point in the left camera's frame [m]. Precondition: has_depth().
-  [[nodiscard]] Eigen::Vector3d point_cam() const {
-    return bearing.homogeneous().cast<double>() / static_cast<double>(inverse_depth);
-  }
 };
 
 /// Features with which another robot aligns itself to a keyframe: points, descriptors, and the

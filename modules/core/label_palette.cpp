@@ -1,6 +1,7 @@
 #include "modules/core/label_palette.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <map>
 #include <stdexcept>
 
@@ -12,12 +13,7 @@ namespace {
 constexpr std::string_view kHeader = "name,red,green,blue,alpha,id";
 constexpr std::size_t kFields = 6;
 
-std::uint32_t packed(const std::array<std::uint8_t, 3>& color) {
-  return static_cast<std::uint32_t>(color[0]) << 16 | static_cast<std::uint32_t>(color[1]) << 8 |
-         color[2];
-}
-
-std::string text_of(const std::array<std::uint8_t, 3>& color) {
+std::string text_of(const LabelClass::Color& color) {
   return std::to_string(color[0]) + "," + std::to_string(color[1]) + "," + std::to_string(color[2]);
 }
 
@@ -29,10 +25,6 @@ void require_storable(const std::string& name) {
         "label palette: the name '" + readable(name) +
         "' is empty, has blanks around it, or a comma, # or line end in it");
   }
-}
-
-bool by_id(const LabelClass& a, const LabelClass& b) {
-  return a.id < b.id;
 }
 
 std::uint8_t parse_byte(std::string_view field, const char* what, const std::string& place) {
@@ -65,42 +57,27 @@ LabelClass parse_entry(const TextRow& row, const std::string& place) {
 LabelPalette::LabelPalette(const std::vector<LabelClass>& entries) {
   for (const LabelClass& entry : entries) {
     require_storable(entry.name);
-    const std::pair key(packed(entry.color), entry.id);
-    const auto known = std::lower_bound(id_by_color_.begin(), id_by_color_.end(),
-                                        std::pair(key.first, LabelId{0}));
-    const bool color_known = known != id_by_color_.end() && known->first == key.first;
-    if (color_known && known->second != entry.id) {
+    const auto [known, is_new] = id_by_color_.try_emplace(entry.color, entry.id);
+    if (known->second != entry.id) {
       throw std::invalid_argument("label palette: the colour " + text_of(entry.color) + " of '" +
                                   readable(entry.name) + "' stands for id " +
                                   std::to_string(known->second) + " and id " +
                                   std::to_string(entry.id));
     }
-    if (color_known) continue;
-    id_by_color_.insert(known, key);
-    auto& list = find(entry.id) == nullptr ? classes_ : others_;
-    list.insert(std::upper_bound(list.begin(), list.end(), entry, by_id), entry);
+    if (is_new)
+      entries_.insert(std::ranges::upper_bound(entries_, entry.id, {}, &LabelClass::id), entry);
   }
+  std::ranges::unique_copy(entries_, std::back_inserter(classes_), {}, &LabelClass::id);
 }
 
 const LabelClass* LabelPalette::find(LabelId id) const {
-  LabelClass wanted;
-  wanted.id = id;
-  const auto found = std::lower_bound(classes_.begin(), classes_.end(), wanted, by_id);
+  const auto found = std::ranges::lower_bound(classes_, id, {}, &LabelClass::id);
   return found != classes_.end() && found->id == id ? &*found : nullptr;
 }
 
-std::optional<LabelId> LabelPalette::id_of(const std::array<std::uint8_t, 3>& color) const {
-  const auto found = std::lower_bound(id_by_color_.begin(), id_by_color_.end(),
-                                      std::pair(packed(color), LabelId{0}));
-  if (found == id_by_color_.end() || found->first != packed(color)) return std::nullopt;
-  return found->second;
-}
-
-std::vector<LabelClass> LabelPalette::entries() const {
-  std::vector<LabelClass> all = classes_;
-  all.insert(all.end(), others_.begin(), others_.end());
-  std::stable_sort(all.begin(), all.end(), by_id);
-  return all;
+std::optional<LabelId> LabelPalette::id_of(const LabelClass::Color& color) const {
+  const auto found = id_by_color_.find(color);
+  return found == id_by_color_.end() ? std::nullopt : std::optional(found->second);
 }
 
 LabelPalette parse_label_palette(std::string_view csv, std::string_view source) {
@@ -111,14 +88,13 @@ LabelPalette parse_label_palette(std::string_view csv, std::string_view source) 
     throw std::invalid_argument(where + ": the first line is not '" + std::string(kHeader) + "'");
   }
   std::vector<LabelClass> entries;
-  std::map<std::uint32_t, std::pair<LabelId, int>> first_use;  // id and line of the first use of
-                                                               // each colour
+  std::map<LabelClass::Color, std::pair<LabelId, int>> first_use;  // id and line of a colour
   for (std::size_t i = 1; i < rows.size(); ++i) {
     const int line = rows[i].line;
     const std::string place = where + ":" + std::to_string(line) + ": ";
     entries.push_back(parse_entry(rows[i], place));
     const LabelClass& entry = entries.back();
-    const auto [use, is_new] = first_use.try_emplace(packed(entry.color), entry.id, line);
+    const auto [use, is_new] = first_use.try_emplace(entry.color, entry.id, line);
     if (use->second.first != entry.id) {
       throw std::invalid_argument(
           place + "the colour " + text_of(entry.color) + " of '" + readable(entry.name) +

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -15,9 +16,11 @@ using LabelId = std::uint8_t;
 
 /// One semantic class with its colour in pictures.
 struct LabelClass {
+  using Color = std::array<std::uint8_t, 3>;  ///< red, green, blue
+
   LabelId id = 0;
   std::string name;
-  std::array<std::uint8_t, 3> color = {0, 0, 0};  ///< red, green, blue
+  Color color = {0, 0, 0};
 };
 
 /// The classes of a recording or a map, one per id. Several colours may belong to one class,
@@ -32,25 +35,22 @@ class LabelPalette {
   /// could not contain: empty, with surrounding blanks, or with a comma, `#` or line end in it.
   explicit LabelPalette(const std::vector<LabelClass>& entries);
 
-  [[nodiscard]] const std::vector<LabelClass>& classes() const {
-    return classes_;
-  }  ///< Classes,
-     ///< ascending
-     ///< by id.
+  /// Ascending by id.
+  [[nodiscard]] const std::vector<LabelClass>& classes() const { return classes_; }
 
   /// nullptr if no class has this id.
   [[nodiscard]] const LabelClass* find(LabelId id) const;
 
   /// The class with this colour, as its first or a further one; nullopt if there is none.
-  [[nodiscard]] std::optional<LabelId> id_of(const std::array<std::uint8_t, 3>& color) const;
+  [[nodiscard]] std::optional<LabelId> id_of(const LabelClass::Color& color) const;
 
-  /// Every distinct (id, name, colour); the first entry of an id comes before its further ones.
-  [[nodiscard]] std::vector<LabelClass> entries() const;
+  /// The entries of all colours, ascending by id, those of an id in their order.
+  [[nodiscard]] const std::vector<LabelClass>& entries() const { return entries_; }
 
  private:
-  std::vector<LabelClass> classes_;
-  std::vector<LabelClass> others_;  // further entries of ids, ascending by id
-  std::vector<std::pair<std::uint32_t, LabelId>> id_by_color_;  // sorted by 0xRRGGBB
+  std::vector<LabelClass> entries_;
+  std::vector<LabelClass> classes_;  // the first entry of each id
+  std::map<LabelClass::Color, LabelId> id_by_color_;
 };
 
 /// Parses `name,red,green,blue,alpha,id` with a header row (Kimera-Semantics' format). Alpha is

@@ -76,10 +76,8 @@ TEST_CASE("Corrupted tables of a run are refused with file and line", "[evaluati
     check_corrupted<std::runtime_error>(
         "{\n\"frames\": 12,\n\"pgo\": {\"cost\": 1.5, \"members\": [0, 1]},\n\"end\": "
         "\"done\"\n}\n",
-        "summary.json", [&](const std::string& text) {
-          const Json json = read_json(folder.write("summary.json", text));
-          (void)number_at(json, "/pgo/cost");
-        });
+        "summary.json",
+        [&](const std::string& text) { (void)read_json(folder.write("summary.json", text)); });
   }
 }
 

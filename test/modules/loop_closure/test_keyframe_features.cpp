@@ -85,7 +85,8 @@ TEST_CASE("keypoints of an RGB-D frame have the depth of their pixel", "[loop_cl
     } else if (x > 107) {
       REQUIRE(keypoint.has_depth());
       // Rounded to millimetres: 1e-3 / z.
-      CHECK(keypoint.point_cam().dot(kNormal) == Approx(kDistance_m).epsilon(1e-3));
+      CHECK(bearing.homogeneous().dot(kNormal) / double{keypoint.inverse_depth} ==
+            Approx(kDistance_m).epsilon(1e-3));
     }
   }
   CHECK(holes > 20);
