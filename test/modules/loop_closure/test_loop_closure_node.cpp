@@ -342,15 +342,5 @@ TEST_CASE("closures that start at another robot and misdirected requests are ign
   CHECK(robot.reports.empty());
 }
 
-TEST_CASE("a reply without a request changes nothing", "[loop_closure_node]") {
-  const Scene scene(11);
-  Robot robot(kSelf);
-  robot.give(scene.own);
-  robot.give(KeyframeReply{0, true, scene.peer});
-  robot.give(scene.candidate());
-  CHECK(robot.requests.size() == 1);  // it was not kept
-  CHECK(robot.closures.empty());
-}
-
 }  // namespace
 }  // namespace km

@@ -25,16 +25,7 @@ TEST_CASE("the verifier recovers the pose of the bodies", "[verifier]") {
   CHECK(xi.dot(result.covariance.inverse() * xi) < 16.8);  // 99 % quantile, and that is cautious
   CHECK(xi.head<3>().norm() < 0.01);
   CHECK(xi.tail<3>().norm() < 0.03);
-}
-
-TEST_CASE("the same keyframes give the same result", "[verifier]") {
-  std::mt19937 rng(2);
-  const KeyframePair pair = make_keyframe_pair(rng, 150, kNoise, 1.0);
-  const Verifier verifier({});
-  const Verification first = verifier.verify(pair.from, pair.to);
-  const Verification second = verifier.verify(pair.from, pair.to);
-  CHECK(first.T_from_to.matrix() == second.T_from_to.matrix());
-  CHECK(first.covariance == second.covariance);
+  CHECK(Verifier({}).verify(pair.from, pair.to).covariance == result.covariance);
 }
 
 TEST_CASE("a keypoint that is not a number is no inlier", "[verifier]") {

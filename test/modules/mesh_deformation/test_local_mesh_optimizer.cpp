@@ -146,18 +146,6 @@ TEST_CASE("Removed and moved vertices leave the rest in place", "[mesh_deformati
   CHECK(largest_distance_m(result.mesh, map.mesh) < kSame);
 }
 
-TEST_CASE("The same calls give the same mesh, bit by bit", "[mesh_deformation]") {
-  const MapMesh map = sheet(kSheet);
-  const std::vector<SE3> keyframes = keyframes_above(kSheet);
-  LocalMeshOptimizer a;
-  LocalMeshOptimizer b;
-  for (const double radius_m : {40.0, 15.0}) {
-    const auto corrected = bent(keyframes, radius_m);
-    CHECK(a.optimize(map, keyframes, corrected).mesh.vertices ==
-          b.optimize(map, keyframes, corrected).mesh.vertices);
-  }
-}
-
 TEST_CASE("Invalid input is refused by name", "[mesh_deformation]") {
   struct Call {
     MapMesh map = sheet(kSheet);

@@ -283,19 +283,5 @@ TEST_CASE("Marginalisation does not change the batch solution of a linear proble
   CHECK((H.inverse() - covariance).norm() < 1e-9 * covariance.norm());
 }
 
-TEST_CASE("Later measurements and a prior give the solution of all measurements", "[vio]") {
-  const Quadratic early = random_quadratic(1, 30);
-  Quadratic late = random_quadratic(2, 30);
-  late.H.topRows(kTaken).setZero();  // later measurements do not involve the eliminated variables
-  late.H.leftCols(kTaken).setZero();
-  late.g.head(kTaken).setZero();
-  const Eigen::VectorXd batch = -(early.H + late.H).ldlt().solve(early.g + late.g);
-  const SquareRootPrior prior = marginalize(early.H, early.g, kTaken);
-  constexpr int kLeft = kSize - kTaken;
-  const Eigen::MatrixXd H = prior.J.transpose() * prior.J + late.H.bottomRightCorner(kLeft, kLeft);
-  const Eigen::VectorXd g = prior.J.transpose() * prior.r + late.g.tail(kLeft);
-  CHECK((-H.ldlt().solve(g) - batch.tail(kLeft)).norm() < 1e-10);
-}
-
 }  // namespace
 }  // namespace km
