@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <functional>
 #include <numeric>
 
 namespace km {
@@ -84,7 +83,7 @@ void take_differences(std::span<const std::uint8_t>& plain, auto byte_of,
 
 // The bytes before compression.
 std::size_t plain_size(const ChunkCounts& counts) {
-  return (6 + (counts.labelled ? 1 : 0) + (counts.seen ? 3 : 0)) * counts.vertices +
+  return (6 + (counts.labelled ? 1 : 0) + (counts.seen ? 2 : 0)) * counts.vertices +
          6 * counts.faces;
 }
 
@@ -113,7 +112,6 @@ MeshChunk sorted_in_space(const MeshChunk& chunk) {
   reorder(sorted.offsets, order);
   reorder(sorted.labels, order);
   reorder(sorted.views, order);
-  reorder(sorted.certainty, order);
   for (ChunkTriple& face : sorted.faces) {
     for (std::uint16_t& corner : face) corner = place[corner];
     std::ranges::rotate(face, std::ranges::min_element(face));  // same orientation
@@ -132,7 +130,6 @@ std::vector<std::uint8_t> packed(const MeshChunk& chunk) {
   for (std::size_t i = 0; i < 2; ++i)
     append_differences(
         chunk.views, [i](const auto& views) { return views[i]; }, plain);
-  append_differences(chunk.certainty, std::identity(), plain);
   // Compression succeeds with a buffer of this size.
   Bytes result(ZSTD_compressBound(plain.size()));
   result.resize(ZSTD_compress(result.data(), result.size(), plain.data(), plain.size(), kFastest));
@@ -157,12 +154,9 @@ bool unpack(std::span<const std::uint8_t> bytes, const ChunkCounts& counts, Mesh
   }
   if (!counts.seen) return true;
   chunk.views.resize(counts.vertices);
-  chunk.certainty.resize(counts.vertices);
   for (std::size_t i = 0; i < 2; ++i)
     take_differences(
         plain, [&](std::size_t v) -> auto& { return chunk.views[v][i]; }, counts);
-  take_differences(
-      plain, [&](std::size_t v) -> auto& { return chunk.certainty[v]; }, counts);
   return true;
 }
 

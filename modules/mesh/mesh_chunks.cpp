@@ -75,7 +75,7 @@ class ChunkViews {
 
   // Bytes that state() adds at most to a chunk with this number of vertices.
   [[nodiscard]] std::size_t largest_bytes(std::size_t vertices) const {
-    return origin_ == nullptr ? 0 : kMaxChunkKeyframes * kMeshKeyframeBytes + 3 * vertices;
+    return origin_ == nullptr ? 0 : kMaxChunkKeyframes * kMeshKeyframeBytes + 2 * vertices;
   }
 
   void state(std::span<const std::uint32_t> vertices, MeshChunk& chunk) const {
@@ -93,8 +93,6 @@ class ChunkViews {
                                                 time.share);
       }
       chunk.views.push_back(views);
-      chunk.certainty.push_back(
-          origin_->certainty.empty() ? 0 : std::min(origin_->certainty[v], kMaxCertainty));
     }
   }
 
@@ -265,8 +263,7 @@ class Splitter {
 
 void check(const MeshOrigin& origin, const LabelledMesh& mesh) {
   const std::size_t vertices = mesh.vertices.size();
-  if (origin.seen_by.size() != vertices || origin.mapped.size() != vertices ||
-      (!origin.certainty.empty() && origin.certainty.size() != vertices))
+  if (origin.seen_by.size() != vertices || origin.mapped.size() != vertices)
     throw std::invalid_argument("mesh chunks: an origin of " +
                                 std::to_string(origin.seen_by.size()) + " vertices for " +
                                 std::to_string(vertices));
@@ -329,9 +326,6 @@ const char* fault_of_views(const MeshChunk& chunk) {
   if (chunk.keyframes.size() > kMaxChunkKeyframes) return "too many keyframes";
   if (chunk.views.size() != (chunk.keyframes.empty() ? 0 : chunk.offsets.size()))
     return "views do not fit the vertices";
-  if (chunk.certainty.size() != chunk.views.size()) return "certainties do not fit the vertices";
-  if (!chunk.certainty.empty() && std::ranges::max(chunk.certainty) > kMaxCertainty)
-    return "a certainty above the bound";
   for (const auto& views : chunk.views)
     for (const MeshChunk::View view : views)
       if ((view + kViewsPerKeyframe - 1) / kViewsPerKeyframe >= chunk.keyframes.size())

@@ -51,8 +51,6 @@ struct MeshChunk {
   std::vector<MeshKeyframe> keyframes = {};        ///< Ascending; empty: the chunk never moves.
   /// First and last view of each vertex; empty without `keyframes`.
   std::vector<std::array<View, 2>> views = {};
-  /// MapMesh::certainty of each vertex, at most kMaxCertainty; empty without `keyframes`.
-  std::vector<std::uint8_t> certainty = {};
 
   [[nodiscard]] bool empty() const { return faces.empty(); }
   bool operator==(const MeshChunk&) const = default;
@@ -67,9 +65,6 @@ inline constexpr std::size_t kViewsPerKeyframe = 4;
 /// Largest number of MeshChunk::keyframes, so that a View has one byte.
 inline constexpr std::size_t kMaxChunkKeyframes = 256 / kViewsPerKeyframe;
 
-/// Largest MeshChunk::certainty, so that weights of 2^certainty can be added.
-inline constexpr std::uint8_t kMaxCertainty = 31;
-
 /// Bytes of all fields of a chunk that are not sequences, with its envelope and padding: an upper
 /// bound.
 inline constexpr std::size_t kChunkFixedBytes = 116;
@@ -81,8 +76,7 @@ inline constexpr std::size_t kChunkFixedBytes = 116;
 }
 [[nodiscard]] inline std::size_t plain_bytes(const MeshChunk& chunk) {
   return plain_bytes(chunk.offsets.size(), chunk.faces.size(), !chunk.labels.empty()) +
-         kMeshKeyframeBytes * chunk.keyframes.size() + 2 * chunk.views.size() +
-         chunk.certainty.size();
+         kMeshKeyframeBytes * chunk.keyframes.size() + 2 * chunk.views.size();
 }
 
 /// The reason why `chunk` cannot be from split_mesh() (a string literal), or null. Received chunks

@@ -17,8 +17,6 @@ struct MeshOrigin {
   std::vector<SE3> T_world_kf;  ///< Poses with which the mesh was placed; all of these keyframes.
   /// Position of each vertex before the deformation, in the robot's odometry frame [m].
   std::vector<Eigen::Vector3f> mapped = {};
-  /// MapMesh::certainty of each vertex; empty: unknown.
-  std::vector<std::uint8_t> certainty = {};
 };
 
 }  // namespace km

@@ -150,7 +150,6 @@ MeshCorrection MeshCorrector::deform(const CorrectionInput& input, std::vector<S
   }
   origin_.seen_by = elements_of(map.seen_by, kept);
   origin_.mapped = elements_of(map.mesh.vertices, kept);
-  origin_.certainty = elements_of(map.certainty, kept);
   const std::size_t superseded = present - optimized_.faces.size();
   return {optimized_, report_, true, std::move(dropped), superseded, all - present, origin_};
 }

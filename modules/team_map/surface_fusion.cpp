@@ -123,7 +123,7 @@ void SurfaceFusion::observe(const RobotSurface::Triangle& triangle,
         const float cosine = distance > same_m ? std::abs(height) / distance : 1.0F;
         const bool nearer = now.cosine < 0.0F || distance < before - same_m;
         if (!nearer && !(distance <= before + same_m && cosine > now.cosine)) continue;
-        now = {std::copysign(distance, height), cosine, normal, triangle.label, triangle.weight};
+        now = {std::copysign(distance, height), cosine, normal, triangle.label};
       }
 }
 
@@ -141,14 +141,14 @@ void SurfaceFusion::blend(std::span<const std::vector<Observation>> robots) {
     const auto counts = [nearest](const Observation& seen) {
       return seen.cosine >= kLeastCosine && seen.normal.dot(nearest->normal) >= kLeastCosine;
     };
-    float sum = 0.0F, weight = 0.0F;
-    int most = 0;
+    float sum = 0.0F;
+    int count = 0, most = 0;
     LabelId label = nearest->label;
     for (const auto& robot : robots) {
       const Observation& seen = robot[v];
       if (!counts(seen)) continue;
-      sum += seen.weight * seen.distance_m;
-      weight += seen.weight;
+      sum += seen.distance_m;
+      ++count;
       // Unknown has no vote; of labels with as many votes the nearest surface's counts.
       const auto votes = static_cast<int>(std::ranges::count_if(robots, [&](const auto& other) {
         return counts(other[v]) && other[v].label == seen.label;
@@ -158,7 +158,7 @@ void SurfaceFusion::blend(std::span<const std::vector<Observation>> robots) {
         label = seen.label;
       }
     }
-    fused_[v] = {sum / weight, label, true};
+    fused_[v] = {sum / static_cast<float>(count), label, true};
   }
 }
 

@@ -18,7 +18,6 @@ struct RobotSurface {
   struct Triangle {
     std::array<Eigen::Vector3f, 3> corners;  ///< [m], counter-clockwise seen from free space.
     LabelId label = 0;
-    float weight = 1.0F;  ///< Above 0.
   };
   RobotId robot = 0;
   std::vector<Triangle> triangles;
@@ -44,9 +43,9 @@ struct FusedBox {
 ///
 /// Each robot gives each voxel near its surface the signed distance to it: the distance to the
 /// nearest triangle, positive on the side of its normal. At a voxel the distances of the robots are
-/// averaged with the weights of these triangles, as Curless and Levoy average those of range images
-/// ("A Volumetric Method for Building Complex Models from Range Images", SIGGRAPH 1996, eq. (1)).
-/// Marching cubes extract the surface of the averages. Labels are voted, one vote per robot.
+/// averaged, as Curless and Levoy average those of range images ("A Volumetric Method for Building
+/// Complex Models from Range Images", SIGGRAPH 1996, eq. (1), with equal weights). Marching cubes
+/// extract the surface of the averages. Labels are voted, one vote per robot.
 ///
 /// A wall that is seen from both sides has two surfaces. Only surfaces with similar normals are
 /// averaged: those within 60 degrees of the normal of the nearest surface. A voxel beside the
@@ -84,7 +83,6 @@ class SurfaceFusion {
     float cosine = -1.0F;     // between the normal and the direction to the voxel; below 0: none
     Eigen::Vector3f normal = Eigen::Vector3f::Zero();
     LabelId label = 0;
-    float weight = 0.0F;
   };
   struct Fused {
     float distance_m = 0.0F;

@@ -27,15 +27,6 @@ LabelId label_of(const MeshChunk& chunk, const MeshChunk::Triple& face) {
   return b == c ? b : a;
 }
 
-// The weight of the least certain corner. It is the square root of its weight in the TSDF, because
-// errors of poses, which the fusion averages too, do not depend on that weight.
-float weight_of(const MeshChunk& chunk, const MeshChunk::Triple& face) {
-  if (chunk.certainty.empty()) return 1.0F;
-  const auto [a, b, c] = face;
-  const auto least = std::min({chunk.certainty[a], chunk.certainty[b], chunk.certainty[c]});
-  return std::ldexp(1.0F, least);
-}
-
 Eigen::AlignedBox3f bounds_of(const std::array<Eigen::Vector3f, 3>& corners, float margin_m) {
   Eigen::AlignedBox3f bounds(corners[0]);
   bounds.extend(corners[1]).extend(corners[2]);
@@ -89,8 +80,7 @@ std::vector<RobotSurface> surfaces_near(const Box& box,
       const auto corners = corners_of(*placed, face);
       const Eigen::AlignedBox3f bounds = bounds_of(corners, fusion.reach_m());
       if (space.intersects(bounds) && !is_left_out(bounds, fusion))
-        surfaces.back().triangles.push_back(
-            {corners, label_of(chunk, face), weight_of(chunk, face)});
+        surfaces.back().triangles.push_back({corners, label_of(chunk, face)});
     }
   }
   return surfaces;

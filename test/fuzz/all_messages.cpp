@@ -71,8 +71,7 @@ MeshChunk some_chunk() {
           .labels = {1, 2, 3, 4},
           .faces = {{0, 1, 2}, {0, 2, 3}},
           .keyframes = mesh_keyframes(std::vector<SE3>(8, SE3::Identity())),
-          .views = {{0, 0}, {0, 3}, {2, 4}, {4, 4}},
-          .certainty = {0, 7, 8, 31}};
+          .views = {{0, 0}, {0, 3}, {2, 4}, {4, 4}}};
 }
 
 template <OverlayLane kLane>

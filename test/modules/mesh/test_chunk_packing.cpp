@@ -25,7 +25,6 @@ MeshChunk unpacked(const MeshChunk& chunk) {
   result.faces.clear();
   result.labels.clear();
   result.views.clear();
-  result.certainty.clear();
   CHECK(unpack(packed(chunk), counts_of(chunk), result));
   return result;
 }
@@ -50,21 +49,17 @@ MeshChunk shuffled_chunk() {
     origin.seen_by.push_back(p.x() < 0.0F ? Seen{0, 2} : Seen{3, 8});
   for (const Eigen::Vector3f& p : mesh.vertices)
     origin.mapped.emplace_back(p + Eigen::Vector3f::Constant(10.0F));
-  for (std::size_t v = 0; v < mesh.vertices.size(); ++v)
-    origin.certainty.push_back(static_cast<std::uint8_t>(v % 32));
   return split_mesh(mesh, 1, 0, {.cell_m = 20.0}, &origin).chunks.at(0);
 }
 
-// Corners of a face with their labels, views and certainties, from the lowest corner on.
+// Corners of a face with their labels and views, from the lowest corner on.
 auto content_of(const MeshChunk& chunk, MeshChunk::Triple face) {
   const auto lowest =
       std::ranges::min_element(face, {}, [&](std::uint16_t v) { return chunk.offsets[v]; });
   std::ranges::rotate(face, lowest);
   std::vector<std::pair<MeshChunk::Triple, std::vector<int>>> corners;
   for (const std::uint16_t v : face)
-    corners.push_back(
-        {chunk.offsets[v],
-         {chunk.labels[v], chunk.views[v][0], chunk.views[v][1], chunk.certainty[v]}});
+    corners.push_back({chunk.offsets[v], {chunk.labels[v], chunk.views[v][0], chunk.views[v][1]}});
   return corners;
 }
 
@@ -78,14 +73,12 @@ TEST_CASE("A chunk is equal after packing and unpacking", "[mesh]") {
   }
   SECTION("without views") {
     chunk.views.clear();
-    chunk.certainty.clear();
   }
   SECTION("with extreme numbers") {
     chunk.offsets = {{0, 65535, 32768}, {65535, 0, 0}, {32767, 65535, 1}};
     chunk.faces = {{65535, 0, 32768}, {0, 65535, 0}, {32767, 32768, 32767}};
     chunk.labels = {0, 255, 128};
     chunk.views = {{{0, 255}}, {{255, 0}}, {{127, 128}}};
-    chunk.certainty = {255, 0, 127};
   }
   SECTION("with random numbers") {
     std::mt19937 rng(2);

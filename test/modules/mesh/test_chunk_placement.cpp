@@ -49,7 +49,6 @@ MeshChunk seen_triangle(std::array<MeshChunk::View, 2> views) {
   chunk.faces = {{0, 1, 2}};
   chunk.keyframes = mesh_keyframes(std::vector<SE3>(5, SE3::Identity()));
   chunk.views.assign(3, views);
-  chunk.certainty.assign(3, 0);
   return chunk;
 }
 
@@ -107,7 +106,6 @@ TEST_CASE("A chunk without poses of its keyframes stays as it was sent", "[mesh]
   MeshChunk fixed = chunk;
   fixed.keyframes.clear();
   fixed.views.clear();
-  fixed.certainty.clear();
   CHECK(place(fixed, &poses).vertices == place(fixed, nullptr).vertices);
 }
 
@@ -180,20 +178,6 @@ TEST_CASE("Surfaces that were mapped at one place and belong far apart are sent 
     CHECK(high.x() - low.x() < 66.0F);
   }
   CHECK(faces == sheet.mesh.faces.size());
-}
-
-TEST_CASE("Chunks state the certainty of their vertices", "[mesh]") {
-  SeenSheet sheet;
-  for (const MeshChunk& chunk : sheet.chunks())
-    CHECK(chunk.certainty == std::vector<std::uint8_t>(chunk.offsets.size(), 0));
-  for (const Eigen::Vector3f& vertex : sheet.mesh.vertices)
-    sheet.origin.certainty.push_back(vertex.x() < 0.0F ? 5 : 200);
-  for (const MeshChunk& chunk : sheet.chunks()) {
-    const PlacedChunk placed = place(chunk, nullptr);
-    REQUIRE(chunk.certainty.size() == placed.vertices.size());
-    for (std::size_t v = 0; v < placed.vertices.size(); ++v)
-      CHECK(chunk.certainty[v] == (placed.vertices[v].x() < -1e-3F ? 5 : kMaxCertainty));
-  }
 }
 
 TEST_CASE("Poses are sent again if they move surface or have other keyframes", "[mesh]") {

@@ -159,7 +159,6 @@ void state_keyframes(MeshChunk& chunk) {
   chunk.keyframes = mesh_keyframes(
       std::vector<SE3>(20, make_pose(so3_exp({0.1, 0.2, 0.3}), {1.5, -2.25, 300.0})));
   chunk.views.assign(chunk.offsets.size(), {0, 16});
-  chunk.certainty.assign(chunk.offsets.size(), 7);
 }
 
 Arrived<MeshChunk> received(const MeshChunk& chunk) {
@@ -243,8 +242,6 @@ TEST_CASE("An impossible mesh chunk is refused", "[codec]") {
         changed([](MeshChunk& late) { late.views.back()[1] = 17; })},
        {"a view of a keyframe outside", "a view between keyframes which do not exist",
         changed([](MeshChunk& late) { late.views.back()[1] = 255; })},
-       {"a certainty without bound", "a certainty above the bound",
-        changed([](MeshChunk& sure) { sure.certainty.back() = kMaxCertainty + 1; })},
        {"a keyframe twice", "keyframes do not ascend",
         [](auto& m) { m.keyframes[1].keyframe = 0; }},
        {"no rotation", "a keyframe without a rotation",

@@ -33,7 +33,7 @@ OptimizedMesh mesh_with(const std::vector<ObjectBox>& chairs, RobotId robot) {
           .mesh = map.mesh,
           .trajectory = poses(robot),
           .report = {},
-          .origin = {map.seen_by, {}}};
+          .origin = {.seen_by = map.seen_by, .T_world_kf = {}}};
 }
 
 struct NodeTopics {

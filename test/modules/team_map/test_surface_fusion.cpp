@@ -62,21 +62,6 @@ TEST_CASE("Two copies of a surface become one, half way between them", "[surface
   check_area(area_along(box, kUp));
 }
 
-TEST_CASE("The surface of more certain triangles counts more", "[surface_fusion]") {
-  RobotSurface less = square(0, kUp, 0.60F), more = square(3, kUp, 0.65F);
-  for (Triangle& triangle : less.triangles) triangle.weight = 4.0F;
-  for (Triangle& triangle : more.triangles) triangle.weight = 16.0F;
-  // Beside the border of both squares some voxels have the distance of one robot only.
-  const auto is_inside = [](float x) { return std::abs(x - 0.8F) < 0.38F; };
-  std::size_t inside = 0;
-  for (const Eigen::Vector3f& p : fuse({less, more}).vertices) {
-    if (!is_inside(p.x()) || !is_inside(p.y())) continue;
-    CHECK(p.z() == Approx(0.64F).margin(1e-5));
-    ++inside;
-  }
-  CHECK(inside > 200);
-}
-
 TEST_CASE("Copies beyond the band stay two surfaces", "[surface_fusion]") {
   const FusedBox box = fuse({square(0, kUp, 0.40F), square(1, kUp, 0.80F)});
   check_area(0.5 * area_along(box, kUp));
