@@ -5,7 +5,6 @@
 #include <cmath>
 #include <stdexcept>
 #include <string>
-#include <tuple>
 
 #include "modules/core/config.hpp"
 
@@ -13,10 +12,6 @@ namespace km {
 namespace {
 
 constexpr std::uint64_t kColumnX0 = 0x0101010101010101, kColumnX7 = kColumnX0 << 7U;
-
-bool less(const Eigen::Vector3i& a, const Eigen::Vector3i& b) {
-  return std::tie(a.z(), a.y(), a.x()) < std::tie(b.z(), b.y(), b.x());
-}
 
 bool any(const BlockBits& bits) {
   return std::ranges::any_of(bits, [](std::uint64_t word) { return word != 0; });
@@ -34,15 +29,6 @@ double checked_voxel(double voxel_m, double max_m) {
 }
 
 }  // namespace
-
-std::size_t DistanceField::PositionHash::operator()(
-    const Eigen::Vector3i& position) const noexcept {
-  const auto mix = [](int value, std::uint64_t prime) {
-    return static_cast<std::uint64_t>(static_cast<std::uint32_t>(value)) * prime;
-  };
-  return mix(position.x(), 0x9E3779B97F4A7C15) ^ mix(position.y(), 0xC2B2AE3D27D4EB4F) ^
-         mix(position.z(), 0x165667B19E3779F9);
-}
 
 DistanceField::DistanceField(double max_distance_m, double voxel_size_m)
     : voxel_m_(checked_voxel(voxel_size_m, max_distance_m)),
@@ -195,7 +181,7 @@ std::vector<DistanceField::SlicePoint> DistanceField::slice(double z_m) {
     if (block->outdated) outdated.push_back(position);
   }
   compute(outdated);
-  std::ranges::sort(positions, less);
+  std::ranges::sort(positions, BlockOrder());
   std::vector<SlicePoint> points;
   for (const Eigen::Vector3i& position : positions)
     for (int y = 0; y < kBlockSide; ++y)

@@ -76,9 +76,6 @@ class DistanceField {
     bool outdated = true;    // the distances are not valid
     SquaredDistances squared = {};
   };
-  struct PositionHash {
-    std::size_t operator()(const Eigen::Vector3i& position) const noexcept;
-  };
   // Blocks from `low` to before `high`.
   struct Box {
     Eigen::Vector3i low, high;
@@ -95,7 +92,7 @@ class DistanceField {
   const int reach_;         // max_distance in voxels, rounded up
   const int reach_blocks_;  // and in blocks
   bool is_surface_outdated_ = false;
-  std::unordered_map<Eigen::Vector3i, std::unique_ptr<Block>, PositionHash> blocks_;
+  std::unordered_map<Eigen::Vector3i, std::unique_ptr<Block>, BlockHash> blocks_;
 };
 
 }  // namespace km

@@ -9,6 +9,8 @@
 #include <unordered_map>
 #include <utility>
 
+#include "modules/mesh/grid_cell.hpp"
+
 namespace km {
 namespace {
 
@@ -35,16 +37,6 @@ class Sets {
 
  private:
   std::vector<std::uint32_t> parent_;
-};
-
-using Cell = std::array<std::int32_t, 3>;
-struct CellHash {
-  std::size_t operator()(const Cell& cell) const noexcept {
-    std::uint64_t hash = 0;
-    for (const std::int32_t c : cell)
-      hash = (hash ^ static_cast<std::uint32_t>(c)) * 0x9E3779B97F4A7C15U;
-    return hash ^ (hash >> 29U);
-  }
 };
 
 // The part of a mesh that has one label.
@@ -84,7 +76,7 @@ class Surface {
 
  private:
   void join_near(Sets& sets, float gap_m) const {
-    std::unordered_map<Cell, std::vector<std::uint32_t>, CellHash> cells;
+    std::unordered_map<GridCell, std::vector<std::uint32_t>, GridCellHash> cells;
     for (std::uint32_t i = 0; i < vertices_.size(); ++i) {
       const Eigen::Vector3f& p = mesh_.vertices[vertices_[i]];
       const Eigen::Vector3i at = (p / gap_m).array().floor().cast<int>();

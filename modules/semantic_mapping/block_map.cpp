@@ -7,8 +7,8 @@
 namespace km {
 
 // Fibonacci hashing after mixing the high parts into the low.
-std::size_t BlockMap::PositionHash::operator()(const Eigen::Vector3i& position) const noexcept {
-  const auto part = [](int value) { return static_cast<std::uint64_t>(value + kReach); };
+std::size_t BlockHash::operator()(const Eigen::Vector3i& position) const noexcept {
+  const auto part = [](int value) { return static_cast<std::uint64_t>(value + BlockMap::kReach); };
   const std::uint64_t key =
       part(position.x()) | part(position.y()) << 21U | part(position.z()) << 42U;
   return static_cast<std::size_t>(((key ^ key >> 29U) * 0x9E3779B97F4A7C15U) >> 32U);

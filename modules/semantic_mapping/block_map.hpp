@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <tuple>
 #include <unordered_map>
 #include <utility>
 #include <vector>
@@ -67,6 +68,16 @@ struct VoxelBlock {
   bool changed = false;             ///< Changed since the block was last meshed.
 };
 
+/// Hash and order of the positions of blocks; the order is by z, then y, then x.
+struct BlockHash {
+  std::size_t operator()(const Eigen::Vector3i& position) const noexcept;
+};
+struct BlockOrder {
+  bool operator()(const Eigen::Vector3i& a, const Eigen::Vector3i& b) const {
+    return std::tie(a.z(), a.y(), a.x()) < std::tie(b.z(), b.y(), b.x());
+  }
+};
+
 /// The blocks of a map, hashed by their position. References to blocks stay valid until they are
 /// erased. The order of blocks() depends only on the sequence of calls.
 class BlockMap {
@@ -94,12 +105,8 @@ class BlockMap {
   [[nodiscard]] const std::vector<std::unique_ptr<VoxelBlock>>& blocks() const { return blocks_; }
 
  private:
-  struct PositionHash {
-    std::size_t operator()(const Eigen::Vector3i& position) const noexcept;
-  };
-
   std::vector<std::unique_ptr<VoxelBlock>> blocks_;
-  std::unordered_map<Eigen::Vector3i, std::size_t, PositionHash> index_;  // index in blocks_
+  std::unordered_map<Eigen::Vector3i, std::size_t, BlockHash> index_;  // index in blocks_
 };
 
 }  // namespace km

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <opencv2/core/utility.hpp>
 #include <optional>
 #include <stdexcept>
@@ -79,7 +80,7 @@ DepthViewMaker::DepthViewMaker(const Camera& camera, double min_range_m, double 
       static_cast<std::size_t>(view_.tile_columns) * static_cast<std::size_t>(view_.tile_rows);
   view_.nearest.assign(tiles, 0);
   view_.farthest.assign(tiles, 0);
-  strips_.resize(static_cast<std::size_t>(view_.tile_rows));
+  off_palette_.resize(static_cast<std::size_t>(view_.tile_rows));
 }
 
 void DepthViewMaker::plan_rectification(const Camera& camera) {
@@ -127,21 +128,19 @@ std::size_t DepthViewMaker::fill(std::size_t begin, std::size_t end, const Depth
 }
 
 // Minimum and maximum by columns first, so that whole rows are processed at a time.
-std::size_t DepthViewMaker::summarise(int row) {
+void DepthViewMaker::summarise(int row) {
   const auto width = static_cast<std::size_t>(view_.width);
   const int first = row * DepthView::kTileSide;
   const int last = std::min(view_.height, first + DepthView::kTileSide);
-  std::vector<std::int32_t> nearest(width, kNoDepth), farthest(width, 0), count(width, 0);
+  std::vector<std::int32_t> nearest(width, kNoDepth), farthest(width, 0);
   for (int v = first; v < last; ++v) {
     const std::uint32_t* line = &view_.pixels[static_cast<std::size_t>(v) * width];
     for (std::size_t u = 0; u < width; ++u) {
       const auto mm = static_cast<std::int32_t>(line[u] & 0xFFFFU);
       nearest[u] = mm < nearest[u] ? mm : nearest[u];
       farthest[u] = mm > farthest[u] ? mm : farthest[u];
-      count[u] += mm > 0 ? 1 : 0;
     }
   }
-  std::size_t with_depth = 0;
   for (int column = 0; column < view_.tile_columns; ++column) {
     const auto begin = static_cast<std::ptrdiff_t>(column) * DepthView::kTileSide;
     const auto end = std::min<std::ptrdiff_t>(view_.width, begin + DepthView::kTileSide);
@@ -151,33 +150,27 @@ std::size_t DepthViewMaker::summarise(int row) {
     view_.farthest[tile] = static_cast<std::uint16_t>(
         *std::max_element(farthest.begin() + begin, farthest.begin() + end));
   }
-  for (const std::int32_t n : count) with_depth += static_cast<std::size_t>(n);
-  return with_depth;
 }
 
-DepthViewMaker::StripSums DepthViewMaker::make_strip(int row, const DepthImage& depth,
-                                                     const LabelImage* labels) {
+// Returns the number of pixels whose label the palette lacks.
+std::size_t DepthViewMaker::make_strip(int row, const DepthImage& depth, const LabelImage* labels) {
   const auto width = static_cast<std::size_t>(view_.width);
   const auto begin = static_cast<std::size_t>(row * DepthView::kTileSide);
   const std::size_t end = std::min(static_cast<std::size_t>(view_.height),
                                    begin + static_cast<std::size_t>(DepthView::kTileSide));
-  StripSums sums;
-  sums.off_palette_pixels = fill(begin * width, end * width, depth, labels);
-  sums.with_depth = summarise(row);
-  return sums;
+  const std::size_t off_palette = fill(begin * width, end * width, depth, labels);
+  summarise(row);
+  return off_palette;
 }
 
 const DepthView& DepthViewMaker::make(const DepthImage& depth, const LabelImage* labels) {
   cv::parallel_for_(cv::Range(0, view_.tile_rows), [&](const cv::Range& range) {
     for (int row = range.start; row < range.end; ++row)
-      strips_[static_cast<std::size_t>(row)] = make_strip(row, depth, labels);
+      off_palette_[static_cast<std::size_t>(row)] = make_strip(row, depth, labels);
   });
   view_.labelled = labels != nullptr;
-  view_.with_depth = view_.off_palette_pixels = 0;
-  for (const StripSums& sums : strips_) {
-    view_.with_depth += sums.with_depth;
-    view_.off_palette_pixels += sums.off_palette_pixels;
-  }
+  view_.off_palette_pixels =
+      std::accumulate(off_palette_.begin(), off_palette_.end(), std::size_t{0});
   return view_;
 }
 

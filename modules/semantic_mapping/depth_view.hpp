@@ -29,7 +29,6 @@ struct DepthView {
   std::vector<std::uint16_t> nearest, farthest;
   int tile_columns = 0, tile_rows = 0;
 
-  std::size_t with_depth = 0;          ///< Pixels with a depth.
   std::size_t off_palette_pixels = 0;  ///< Pixels whose label the palette lacks.
   bool labelled = false;
 
@@ -52,22 +51,17 @@ class DepthViewMaker {
   const DepthView& make(const DepthImage& depth, const LabelImage* labels);
 
  private:
-  // Contribution of a strip of tiles to the sums of a view.
-  struct StripSums {
-    std::size_t with_depth = 0, off_palette_pixels = 0;
-  };
-
   void plan_rectification(const Camera& camera);
-  StripSums make_strip(int row, const DepthImage& depth, const LabelImage* labels);
+  std::size_t make_strip(int row, const DepthImage& depth, const LabelImage* labels);
   std::size_t fill(std::size_t begin, std::size_t end, const DepthImage& depth,
                    const LabelImage* labels);
-  std::size_t summarise(int row);
+  void summarise(int row);
 
   DepthView view_;
   std::uint32_t min_mm_ = 0, max_mm_ = 0;
   std::array<std::uint32_t, 256> codes_ = {};  // by label: known ones << 16, others kOutside
   std::vector<std::uint32_t> source_;          // source of each ideal pixel; empty: identity
-  std::vector<StripSums> strips_;
+  std::vector<std::size_t> off_palette_;       // pixels of each strip of tiles
 };
 
 }  // namespace km

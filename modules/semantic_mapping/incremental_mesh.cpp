@@ -62,7 +62,7 @@ class PlaceOfId {
 IncrementalMesh::IncrementalMesh(double voxel_size_m, double min_weight)
     : voxel_m_(voxel_size_m), min_weight_(static_cast<float>(min_weight)) {}
 
-MeshUpdateReport IncrementalMesh::update(BlockMap& map) {
+std::size_t IncrementalMesh::update(BlockMap& map) {
   std::vector<VoxelBlock*> blocks;
   for (const auto& block : map.blocks())
     if (block->changed) blocks.push_back(block.get());
@@ -76,22 +76,19 @@ MeshUpdateReport IncrementalMesh::update(BlockMap& map) {
   return mesh_blocks(blocks, map);
 }
 
-MeshUpdateReport IncrementalMesh::mesh_blocks(const std::vector<VoxelBlock*>& blocks,
-                                              BlockMap& map) {
+std::size_t IncrementalMesh::mesh_blocks(const std::vector<VoxelBlock*>& blocks, BlockMap& map) {
   ++update_;
-  MeshUpdateReport report;
-  report.blocks = blocks.size();
   for (const Face& face : forgotten_faces_) release(face);
   faces_ -= forgotten_faces_.size();
   forgotten_faces_.clear();
   for (VoxelBlock* block : blocks) release_faces(*block);
-  for (VoxelBlock* block : blocks) mesh_block(*block, map, report);
+  for (VoxelBlock* block : blocks) mesh_block(*block, map);
   for (VoxelBlock* block : blocks) {
     block->changed = false;
     block->near_rows.fill(0);
   }
-  report.vertices_removed = remove_unused();
-  return report;
+  remove_unused();
+  return blocks.size();
 }
 
 void IncrementalMesh::release(const Face& face) {
@@ -107,7 +104,7 @@ void IncrementalMesh::release_faces(VoxelBlock& block) {
   block.mesh->cell_of_face.clear();
 }
 
-void IncrementalMesh::mesh_block(VoxelBlock& block, BlockMap& map, MeshUpdateReport& report) {
+void IncrementalMesh::mesh_block(VoxelBlock& block, BlockMap& map) {
   const BlockCells cells(block, map, min_weight_);
   if (!cells.any()) return;
   std::array<std::uint32_t, MarchingCubes::kEdges> vertices;
@@ -125,7 +122,7 @@ void IncrementalMesh::mesh_block(VoxelBlock& block, BlockMap& map, MeshUpdateRep
             if (vertex == BlockMesh::kNone)
               vertex =
                   vertex_on(cells, {x + (corner & 1), y + (corner >> 1 & 1), z + (corner >> 2 & 1)},
-                            MarchingCubes::axis_of_edge(triangle[i]), block, report);
+                            MarchingCubes::axis_of_edge(triangle[i]), block);
             face[i] = vertex;
             ++vertices_[vertex].uses;
           }
@@ -139,8 +136,7 @@ void IncrementalMesh::mesh_block(VoxelBlock& block, BlockMap& map, MeshUpdateRep
 }
 
 std::uint32_t IncrementalMesh::vertex_on(const BlockCells& cells, const Eigen::Vector3i& voxel,
-                                         int axis, const VoxelBlock& meshed,
-                                         MeshUpdateReport& report) {
+                                         int axis, const VoxelBlock& meshed) {
   VoxelBlock& owner = cells.block_of(voxel.x(), voxel.y(), voxel.z());
   if (owner.mesh == nullptr) owner.mesh = std::make_unique<BlockMesh>();
   const std::size_t edge =
@@ -150,7 +146,6 @@ std::uint32_t IncrementalMesh::vertex_on(const BlockCells& cells, const Eigen::V
     place = new_vertex(meshed.changed_since);
     vertices_[place].owner = owner.mesh.get();
     vertices_[place].edge = static_cast<std::uint16_t>(edge);
-    ++report.vertices_added;
   }
   Vertex& vertex = vertices_[place];
   if (vertex.computed != update_) {
@@ -239,7 +234,7 @@ void IncrementalMesh::forget(VoxelBlock& block, BlockMap& map, KeyframeIndex key
   disown(block);
 }
 
-MeshUpdateReport IncrementalMesh::finalise(const std::vector<VoxelBlock*>& blocks, BlockMap& map) {
+std::size_t IncrementalMesh::finalise(const std::vector<VoxelBlock*>& blocks, BlockMap& map) {
   // The lower neighbours of `blocks` have cells that extend into `blocks`. They are meshed as well,
   // because their cells need the voxels of `blocks`, which are discarded afterwards.
   std::vector<VoxelBlock*> last_time;
@@ -257,9 +252,9 @@ MeshUpdateReport IncrementalMesh::finalise(const std::vector<VoxelBlock*>& block
     visit_lower_neighbours(*block, map, [&](VoxelBlock& lower, int) {
       if (!lower.changed) mark_changed(lower, block->changed_since);
     });
-  const MeshUpdateReport report = mesh_blocks(last_time, map);
+  const std::size_t meshed = mesh_blocks(last_time, map);
   for (VoxelBlock* block : blocks) finalise(*block, map);
-  return report;
+  return meshed;
 }
 
 void IncrementalMesh::finalise(VoxelBlock& block, BlockMap& map) {

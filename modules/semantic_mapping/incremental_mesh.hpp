@@ -11,13 +11,6 @@
 
 namespace km {
 
-/// Result of IncrementalMesh::update().
-struct MeshUpdateReport {
-  std::size_t blocks = 0;  ///< Number of blocks that were meshed.
-  std::size_t vertices_added = 0;
-  std::size_t vertices_removed = 0;
-};
-
 /// Result of IncrementalMesh::drop().
 struct SurfaceDrop {
   std::size_t faces = 0;
@@ -35,15 +28,17 @@ class IncrementalMesh {
   IncrementalMesh(double voxel_size_m, double min_weight);
 
   /// Meshes the blocks that changed, and the blocks below them whose cells extend into them.
-  MeshUpdateReport update(BlockMap& map);
+  /// Returns their number.
+  std::size_t update(BlockMap& map);
 
   /// Call before a block is erased because `keyframe` showed no surface in it. The next update()
   /// removes the faces of the block.
   void forget(VoxelBlock& block, BlockMap& map, KeyframeIndex keyframe);
 
   /// Call before blocks are erased whose mesh stays. Changed blocks are meshed once more. Faces of
-  /// the blocks' cells, and of cells that extend into the blocks, become final.
-  MeshUpdateReport finalise(const std::vector<VoxelBlock*>& blocks, BlockMap& map);
+  /// the blocks' cells, and of cells that extend into the blocks, become final. Returns the number
+  /// of blocks that were meshed.
+  std::size_t finalise(const std::vector<VoxelBlock*>& blocks, BlockMap& map);
 
   /// Drops the final faces whose vertices are all listed, and then the listed vertices without
   /// other faces. The votes on labels of such a vertex are added to its replacement, unless that is
@@ -75,13 +70,13 @@ class IncrementalMesh {
     std::uint8_t certainty = 0;  // see MapMesh
   };
 
-  MeshUpdateReport mesh_blocks(const std::vector<VoxelBlock*>& blocks, BlockMap& map);
+  std::size_t mesh_blocks(const std::vector<VoxelBlock*>& blocks, BlockMap& map);
   void finalise(VoxelBlock& block, BlockMap& map);
   void release(const Face& face);
   void release_faces(VoxelBlock& block);
-  void mesh_block(VoxelBlock& block, BlockMap& map, MeshUpdateReport& report);
+  void mesh_block(VoxelBlock& block, BlockMap& map);
   std::uint32_t vertex_on(const BlockCells& cells, const Eigen::Vector3i& voxel, int axis,
-                          const VoxelBlock& meshed, MeshUpdateReport& report);
+                          const VoxelBlock& meshed);
   std::uint32_t new_vertex(KeyframeIndex keyframe);
   void compute(Vertex& vertex, const BlockCells& cells, const Eigen::Vector3i& voxel,
                int axis) const;

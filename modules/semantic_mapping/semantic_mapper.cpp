@@ -5,6 +5,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "modules/mesh/coarse_view.hpp"
@@ -73,12 +74,10 @@ struct SemanticMapper::State {
   std::vector<Update> select(const DepthView& view, const BlockFusion& fusion,
                              const SE3& T_odom_cam, IntegrationReport& report);
   static void fuse(const BlockFusion& fusion, const std::vector<Update>& updates);
-  void remove_empty(const BlockFusion& fusion, const std::vector<Update>& updates,
-                    IntegrationReport& report);
-  void leave_window(IntegrationReport& report);
-  void make_room(IntegrationReport& report);
+  void remove_empty(const BlockFusion& fusion, const std::vector<Update>& updates);
+  void leave_window();
+  void make_room();
   void finalise(const std::vector<VoxelBlock*>& blocks);
-  MeshUpdateReport update_mesh();
 
   SemanticMappingConfig config;
   Camera camera;
@@ -86,7 +85,7 @@ struct SemanticMapper::State {
   CoarseViews coarse_views;
   BlockMap map;
   IncrementalMesh mesh;
-  MeshUpdateReport unreported;  // counts of blocks that became final, until reported
+  std::size_t unreported = 0;  // number of blocks that were meshed since update_mesh()
   std::uint64_t frame = 0;
   KeyframeIndex keyframe = 0;
   std::optional<Eigen::Vector3d> camera_at;  // last position
@@ -104,7 +103,6 @@ std::vector<SemanticMapper::State::Update> SemanticMapper::State::select(
       select_near_blocks(view, T_odom_cam, config.voxel_size_m,
                          static_cast<std::size_t>(config.max_blocks), frame, keyframe, map);
   report.blocks_refused = near.refused;
-  report.blocks_updated = near.blocks.size();
   for (VoxelBlock* block : near.blocks) {
     if (view.labelled && block->labels == nullptr)
       block->labels = std::make_unique<std::array<VoxelLabels, kBlockVoxels>>();
@@ -134,37 +132,31 @@ void SemanticMapper::State::fuse(const BlockFusion& fusion, const std::vector<Up
 }
 
 void SemanticMapper::State::remove_empty(const BlockFusion& fusion,
-                                         const std::vector<Update>& updates,
-                                         IntegrationReport& report) {
+                                         const std::vector<Update>& updates) {
   for (const Update& update : updates) {
     if (update.near || !fusion.is_empty(*update.block)) continue;
     mesh.forget(*update.block, map, keyframe);
     if (space) space->note_empty(update.block->position, way_m);
     map.erase(Eigen::Vector3i(update.block->position));
-    ++report.blocks_removed;
   }
 }
 
 void SemanticMapper::State::finalise(const std::vector<VoxelBlock*>& blocks) {
-  const MeshUpdateReport done = mesh.finalise(blocks, map);
-  unreported.blocks += done.blocks;
-  unreported.vertices_added += done.vertices_added;
-  unreported.vertices_removed += done.vertices_removed;
+  unreported += mesh.finalise(blocks, map);
   for (VoxelBlock* block : blocks) {
     if (space) space->note_left(block->position);
     map.erase(Eigen::Vector3i(block->position));
   }
 }
 
-void SemanticMapper::State::leave_window(IntegrationReport& report) {
+void SemanticMapper::State::leave_window() {
   std::vector<VoxelBlock*> old;
   for (const auto& block : map.blocks())
     if (way_m - block->last_seen_m > config.window_m) old.push_back(block.get());
-  report.blocks_finalised += old.size();
   if (!old.empty()) finalise(old);
 }
 
-void SemanticMapper::State::make_room(IntegrationReport& report) {
+void SemanticMapper::State::make_room() {
   const std::size_t most = static_cast<std::size_t>(config.max_blocks) * kFullEighths / 8;
   if (map.size() <= most) return;
   std::vector<VoxelBlock*> others;  // blocks not selected for this frame
@@ -175,17 +167,7 @@ void SemanticMapper::State::make_room(IntegrationReport& report) {
                                         : a->selected_in < b->selected_in;
   });
   others.resize(std::min(others.size(), map.size() - most));
-  report.blocks_finalised += others.size();
   finalise(others);
-}
-
-MeshUpdateReport SemanticMapper::State::update_mesh() {
-  MeshUpdateReport report = mesh.update(map);
-  report.blocks += unreported.blocks;
-  report.vertices_added += unreported.vertices_added;
-  report.vertices_removed += unreported.vertices_removed;
-  unreported = {};
-  return report;
 }
 
 SemanticMapper::SemanticMapper(const SemanticMappingConfig& config, const Camera& camera,
@@ -222,7 +204,6 @@ IntegrationReport SemanticMapper::integrate(const DepthImage& depth, const Label
   state.camera_at = T_odom_cam.translation();
   const DepthView& view = state.views.make(depth, labels);
   state.coarse_views.add(depth, T_odom_cam, keyframe);
-  report.pixels = view.with_depth;
   report.off_palette_pixels = view.off_palette_pixels;
 
   const BlockFusion fusion(state.config, view, T_odom_cam, keyframe);
@@ -233,14 +214,14 @@ IntegrationReport SemanticMapper::integrate(const DepthImage& depth, const Label
     if (new_keyframe || state.frame == 1)
       state.space->see_free(view, fusion, T_odom_cam, state.map, state.way_m);
   }
-  state.remove_empty(fusion, updates, report);
-  if (new_keyframe) state.leave_window(report);
-  state.make_room(report);
+  state.remove_empty(fusion, updates);
+  if (new_keyframe) state.leave_window();
+  state.make_room();
   return report;
 }
 
-MeshUpdateReport SemanticMapper::update_mesh() {
-  return state_->update_mesh();
+std::size_t SemanticMapper::update_mesh() {
+  return state_->mesh.update(state_->map) + std::exchange(state_->unreported, 0);
 }
 
 SurfaceDrop SemanticMapper::drop(const SupersededSurface& superseded) {

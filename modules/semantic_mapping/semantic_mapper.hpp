@@ -30,13 +30,9 @@ enum class IntegrationStatus {
 /// Counts of one call of integrate(). All but status are zero for a skipped frame.
 struct [[nodiscard]] IntegrationReport {
   IntegrationStatus status = IntegrationStatus::kIntegrated;
-  std::size_t pixels = 0;              ///< Pixels with a depth within range, after rectification.
   std::size_t off_palette_pixels = 0;  ///< Pixels whose label the palette lacks: unknown.
   bool label_size_differs = false;     ///< Integrated without the labels, whose size is wrong.
-  std::size_t blocks_updated = 0;      ///< Blocks near an observed surface.
-  std::size_t blocks_refused = 0;    ///< Requests for new blocks that were refused, see NearBlocks.
-  std::size_t blocks_removed = 0;    ///< Erased blocks: empty after carving.
-  std::size_t blocks_finalised = 0;  ///< Blocks that left the window and became final mesh.
+  std::size_t blocks_refused = 0;  ///< Requests for new blocks that were refused, see NearBlocks.
 };
 
 /// Sizes of the map.
@@ -87,8 +83,9 @@ class SemanticMapper {
                               const SE3& T_odom_cam, KeyframeIndex keyframe);
 
   /// Meshes the blocks that changed since the last call. Call it after every frame or less often. A
-  /// new vertex gets the keyframe of the first frame since the last call as its first one.
-  MeshUpdateReport update_mesh();
+  /// new vertex gets the keyframe of the first frame since the last call as its first one. Returns
+  /// the number of blocks that were meshed.
+  std::size_t update_mesh();
 
   /// Drops final surface that another visit has mapped better (see IncrementalMesh::drop()). Its
   /// votes on labels are kept, its faces are permanently removed. Surface in the window stays.

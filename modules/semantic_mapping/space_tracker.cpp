@@ -27,27 +27,15 @@ std::pair<Eigen::Vector3i, Eigen::Vector3i> blocks_in(const DepthView& view, con
 
 }  // namespace
 
-SpaceTracker::Key SpaceTracker::key_of(const Eigen::Vector3i& position) {
-  const auto part = [](int value) { return static_cast<Key>(value + BlockMap::kReach); };
-  return part(position.z()) << 42U | part(position.y()) << 21U | part(position.x());
-}
-
-Eigen::Vector3i SpaceTracker::position_of(Key key) {
-  const auto part = [key](unsigned shift) {
-    return static_cast<int>(key >> shift & 0x1FFFFFU) - BlockMap::kReach;
-  };
-  return {part(0), part(21), part(42)};
-}
-
 void SpaceTracker::note_empty(const Eigen::Vector3i& position, double way_m) {
   FreeBlock block{.last_seen_m = way_m};
   block.observed.fill(~std::uint64_t{0});
-  free_.insert_or_assign(key_of(position), block);
+  free_.insert_or_assign(position, block);
   note(position);
 }
 
 void SpaceTracker::note_left(const Eigen::Vector3i& position) {
-  free_.erase(key_of(position));
+  free_.erase(position);
   note(position);
 }
 
@@ -86,13 +74,12 @@ void SpaceTracker::add_free(const BlockFusion& fusion, double way_m) {
         seen[k / 64] |= std::uint64_t{1} << (k % 64);
     if (seen == BlockBits{}) return;
   }
-  const Key key = key_of(scratch_.position);
-  FreeBlock& block = free_[key];
+  FreeBlock& block = free_[scratch_.position];
   block.last_seen_m = way_m;
   for (std::size_t z = 0; z < seen.size(); ++z) {
     if ((seen[z] & ~block.observed[z]) == 0) continue;
     block.observed[z] |= seen[z];
-    changed_.insert(key);
+    changed_.insert(scratch_.position);
   }
 }
 
@@ -109,13 +96,9 @@ BlockSpace SpaceTracker::space_of(const VoxelBlock& block) const {
 }
 
 SpaceChanges SpaceTracker::take(const BlockMap& map) {
-  std::vector<Key> keys(changed_.begin(), changed_.end());
-  changed_.clear();
-  std::ranges::sort(keys);
   SpaceChanges changes;
-  for (const Key key : keys) {
-    const Eigen::Vector3i position = position_of(key);
-    const auto free = free_.find(key);
+  for (const Eigen::Vector3i& position : std::exchange(changed_, {})) {
+    const auto free = free_.find(position);
     BlockSpace space{.position = position};
     if (const VoxelBlock* block = map.find(position)) space = space_of(*block);
     // A voxel that was seen free before the block had surface stays known.

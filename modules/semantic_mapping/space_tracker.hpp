@@ -1,8 +1,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <set>
 #include <unordered_map>
-#include <unordered_set>
 
 #include "modules/core/geometry.hpp"
 #include "modules/semantic_mapping/block_fusion.hpp"
@@ -22,7 +22,7 @@ class SpaceTracker {
   explicit SpaceTracker(const SemanticMappingConfig& config) : config_(config) {}
 
   /// The block of the map has changed.
-  void note(const Eigen::Vector3i& position) { changed_.insert(key_of(position)); }
+  void note(const Eigen::Vector3i& position) { changed_.insert(position); }
 
   /// The block was erased from the map because it is empty: its voxels are free.
   void note_empty(const Eigen::Vector3i& position, double way_m);
@@ -39,20 +39,17 @@ class SpaceTracker {
   [[nodiscard]] SpaceChanges take(const BlockMap& map);
 
  private:
-  using Key = std::uint64_t;
   struct FreeBlock {
     BlockBits observed = {};
     double last_seen_m = 0.0;
   };
 
-  [[nodiscard]] static Key key_of(const Eigen::Vector3i& position);
-  [[nodiscard]] static Eigen::Vector3i position_of(Key key);
   [[nodiscard]] BlockSpace space_of(const VoxelBlock& block) const;
   void add_free(const BlockFusion& fusion, double way_m);
 
   SemanticMappingConfig config_;
-  std::unordered_map<Key, FreeBlock> free_;
-  std::unordered_set<Key> changed_;
+  std::unordered_map<Eigen::Vector3i, FreeBlock, BlockHash> free_;
+  std::set<Eigen::Vector3i, BlockOrder> changed_;
   VoxelBlock scratch_;
 };
 
