@@ -8,13 +8,15 @@
 #include <optional>
 #include <string>
 
-#include "modules/core/input_file.hpp"
 #include "modules/core/text_rows.hpp"
-#include "modules/images/network.hpp"
+#include "modules/images/configured_network.hpp"
+#include "modules/images/image_view.hpp"
 
 namespace km {
 namespace {
 
+constexpr NetworkKey kKey{"segmentation.network",
+                          "leave segmentation.network empty to do without its labels"};
 constexpr std::size_t kClasses = 256;  // largest number of classes, that of labels
 
 std::array<std::optional<LabelId>, kClasses> labels_of(const SegmentationConfig& config) {
@@ -38,16 +40,6 @@ SegmentationConfig checked_network(SegmentationConfig config) {
   config = checked(config);
   if (config.channels == 2) throw ConfigError("segmentation.channels = 2 is neither 1 nor 3\n");
   return config;
-}
-
-cv::dnn::Net read_network(const std::string& file) {
-  if (!is_file(file)) throw ConfigError("segmentation.network: no such file: " + file + "\n");
-  try {
-    return read_onnx(read_input_file(file, kMaxNetworkBytes));
-  } catch (const cv::Exception& error) {
-    throw ConfigError("segmentation.network: " + file +
-                      " cannot be read as ONNX: " + reason_of(error) + "\n");
-  }
 }
 
 // A network's output as one plane of scores per class, or a single plane of class numbers.
@@ -94,13 +86,15 @@ struct SegmentationNetwork::State {
   explicit State(const SegmentationConfig& settings)
       : config(checked_network(settings)),
         labels(labels_of(config)),
-        net(read_network(config.network)) {}
+        network(config.network, kKey) {}
 
   cv::Mat run(const GrayImage& image) {
-    cv::Mat input = resized(image, {config.width_px, config.height_px});
+    cv::Mat input;
+    cv::resize(view(image), input, {config.width_px, config.height_px}, 0.0, 0.0,
+               image.width > config.width_px ? cv::INTER_AREA : cv::INTER_LINEAR);
     if (config.channels == 3) cv::cvtColor(input, input, cv::COLOR_GRAY2BGR);
-    net.setInput(cv::dnn::blobFromImage(input, config.scale, {}, cv::Scalar::all(config.mean)));
-    return net.forward();
+    return network.run(
+        cv::dnn::blobFromImage(input, config.scale, {}, cv::Scalar::all(config.mean)));
   }
 
   [[nodiscard]] std::optional<LabelId> label_of(float value) const {
@@ -111,24 +105,23 @@ struct SegmentationNetwork::State {
 
   SegmentationConfig config;
   std::array<std::optional<LabelId>, kClasses> labels;  // label of each class of the network
-  cv::dnn::Net net;
+  ConfiguredNetwork network;
 };
 
 SegmentationNetwork::SegmentationNetwork(const SegmentationConfig& config)
     : state_(std::make_unique<State>(config)) {
   const auto& c = state_->config;
   const auto size = static_cast<std::size_t>(c.width_px) * static_cast<std::size_t>(c.height_px);
-  const std::string place = "segmentation.network: " + c.network + ": ";
   try {
     const cv::Mat output = state_->run({c.width_px, c.height_px, std::vector<std::uint8_t>(size)});
     if (!planes_of(output))
-      throw ConfigError(place + "its output is " +
-                        shape_text({output.size.p, static_cast<std::size_t>(output.dims)}) +
-                        ", not 1 x classes x height x width\n");
+      state_->network.refuse("its output is " +
+                             shape_text({output.size.p, static_cast<std::size_t>(output.dims)}) +
+                             ", not 1 x classes x height x width");
   } catch (const cv::Exception& error) {
-    throw ConfigError(place + "does not run on an image of " + std::to_string(c.width_px) + " x " +
-                      std::to_string(c.height_px) + " px with " + std::to_string(c.channels) +
-                      " channels: " + reason_of(error) + "\n");
+    state_->network.refuse("does not run on an image of " + std::to_string(c.width_px) + " x " +
+                           std::to_string(c.height_px) + " px with " + std::to_string(c.channels) +
+                           " channels: " + reason_of(error));
   }
 }
 

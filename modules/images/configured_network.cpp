@@ -10,12 +10,13 @@
 #include "modules/core/bytes.hpp"
 #include "modules/core/config.hpp"
 #include "modules/core/input_file.hpp"
-#include "modules/images/network.hpp"
 
 namespace km {
 namespace {
 
 using Bytes = std::span<const std::uint8_t>;
+
+constexpr std::size_t kMaxNetworkBytes = 1U << 30U;
 
 // The values of field `wanted` of a protobuf message (protobuf.dev: encoding). A number is its
 // value and has no bytes; a message or text is its bytes. Ends at the first byte that is none of
@@ -59,16 +60,11 @@ cv::dnn::MatShape shape_of_input(Bytes model) {
   return shape;
 }
 
-std::string way_out(const NetworkKey& key) {
-  return std::string("; use ") + key.shipped + ", which comes with the program, or leave " +
-         key.key + " empty";
-}
-
 std::string read_network(const std::filesystem::path& file, const NetworkKey& key) {
   try {
     return read_input_file(file, kMaxNetworkBytes);
   } catch (const std::runtime_error& error) {
-    throw ConfigError(std::string(key.key) + ": " + error.what() + way_out(key));
+    throw ConfigError(std::string(key.key) + ": " + error.what() + "; " + key.way_out);
   }
 }
 
@@ -81,20 +77,35 @@ ConfiguredNetwork::ConfiguredNetwork(std::filesystem::path file, const NetworkKe
   mix_fnv1a(fingerprint_, model);
   fingerprint_ = std::max<std::uint64_t>(fingerprint_, 1);
   try {
-    net_ = read_onnx(bytes);
+    net_ = cv::dnn::readNetFromONNX(bytes.data(), bytes.size());
   } catch (const cv::Exception& error) {
     refuse("cannot be run as ONNX: " + reason_of(error));
   }
+  net_.setPreferableBackend(cv::dnn::DNN_BACKEND_OPENCV);
+  net_.setPreferableTarget(cv::dnn::DNN_TARGET_CPU);
   input_ = shape_of_input(model);
 }
 
 void ConfiguredNetwork::refuse(const std::string& reason) const {
-  throw ConfigError(std::string(key_.key) + ": " + file_.string() + ": " + reason + way_out(key_));
+  throw ConfigError(std::string(key_.key) + ": " + file_.string() + ": " + reason + "; " +
+                    key_.way_out);
 }
 
 cv::Mat ConfiguredNetwork::run(const cv::Mat& blob) {
   net_.setInput(blob);
   return net_.forward();
+}
+
+std::string reason_of(const cv::Exception& error) {
+  std::string text = error.err.empty() ? error.what() : error.err;
+  while (!text.empty() && text.back() == '\n') text.pop_back();
+  return text;
+}
+
+std::string shape_text(std::span<const int> sizes) {
+  std::string text;
+  for (const int size : sizes) text += (text.empty() ? "" : " x ") + std::to_string(size);
+  return text.empty() ? "unknown" : text;
 }
 
 }  // namespace km

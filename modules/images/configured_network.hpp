@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <opencv2/core.hpp>
 #include <opencv2/dnn.hpp>
+#include <span>
 #include <string>
 
 namespace km {
@@ -11,7 +12,7 @@ namespace km {
 /// The place of a network in the configuration, for messages.
 struct NetworkKey {
   const char* key;      ///< "keyframe_features.network"
-  const char* shipped;  ///< The file that comes with the program: "networks/keypoints.onnx".
+  const char* way_out;  ///< Remedy for a file that cannot be used, in the imperative.
 };
 
 /// A network in ONNX format whose file the configuration names. It is run by OpenCV's dnn module on
@@ -40,5 +41,11 @@ class ConfiguredNetwork {
   cv::dnn::Net net_;
   cv::dnn::MatShape input_;
 };
+
+/// The reason of `error` without its place in OpenCV's sources.
+[[nodiscard]] std::string reason_of(const cv::Exception& error);
+
+/// "1 x 3 x 120 x 160"; "unknown" without sizes.
+[[nodiscard]] std::string shape_text(std::span<const int> sizes);
 
 }  // namespace km

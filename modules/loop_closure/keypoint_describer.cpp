@@ -7,13 +7,14 @@
 
 #include "modules/images/configured_network.hpp"
 #include "modules/images/keypoint_patches.hpp"
-#include "modules/images/network.hpp"
 #include "modules/loop_closure/matching.hpp"
 
 namespace km {
 namespace {
 
-constexpr NetworkKey kKey{"keyframe_features.network", "networks/keypoints.onnx"};
+constexpr NetworkKey kKey{"keyframe_features.network",
+                          "use networks/keypoints.onnx, which comes with the program, or leave "
+                          "keyframe_features.network empty"};
 constexpr int kSamples = kPatchSide * kPatchSide;
 constexpr int kNumbers = kMatchedNumbers;
 

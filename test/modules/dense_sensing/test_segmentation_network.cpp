@@ -98,10 +98,10 @@ TEST_CASE("A network that cannot be used is refused with the reason", "[segmenta
     CHECK_THROWS_WITH(SegmentationNetwork(config), Catch::Contains(words));
   };
   fails_with(config_of(folder.path() / "none.onnx"), "no such file");
-  fails_with(config_of(folder.write("text.onnx", "no network at all")), "cannot be read as ONNX");
+  fails_with(config_of(folder.write("text.onnx", "no network at all")), "cannot be run as ONNX");
   const std::string whole = three_levels().onnx();
   fails_with(config_of(folder.write("half.onnx", whole.substr(0, whole.size() / 2))),
-             "cannot be read as ONNX");
+             "cannot be run as ONNX");
 
   PointwiseNetwork three = three_levels();
   three.channels = 3;
