@@ -85,22 +85,6 @@ template <typename Prepared>
   return matches;
 }
 
-#if defined(__x86_64__)
-[[gnu::target("popcnt")]] std::vector<Match> match_popcount(const std::vector<Bits>& a,
-                                                            const std::vector<Bits>& b,
-                                                            const MatchRules& rules) {
-  return match_all(a, b, rules);
-}
-#endif
-
-std::vector<Match> match_bits(const std::vector<Bits>& a, const std::vector<Bits>& b,
-                              const MatchRules& rules) {
-#if defined(__x86_64__)
-  if (has_popcount()) return match_popcount(a, b, rules);
-#endif
-  return match_all(a, b, rules);
-}
-
 // Keypoints of one image in square cells, to find the keypoints near a position.
 class KeypointGrid {
  public:
@@ -283,7 +267,10 @@ std::vector<Match> match_descriptors(const KeyframeFeatures& a, const KeyframeFe
   const std::uint16_t network = common_network(a, b);
   const auto own = matched_by(network, a), theirs = matched_by(network, b);
   if (theirs.size() < 2) return {};
-  if (network == 0) return match_bits(prepared<Bits>(own), prepared<Bits>(theirs), rules);
+  if (network == 0)
+    return run_counting_bits([&]() __attribute__((always_inline)) {
+      return match_all(prepared<Bits>(own), prepared<Bits>(theirs), rules);
+    });
   return match_all(prepared<Numbers>(own), prepared<Numbers>(theirs), rules);
 }
 

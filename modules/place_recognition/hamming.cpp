@@ -3,30 +3,6 @@
 #include <cstring>
 
 namespace km {
-namespace {
-
-[[gnu::always_inline]] inline void nearest_of_each_into(std::span<const DescriptorBits> queries,
-                                                        std::span<const DescriptorBits> candidates,
-                                                        std::vector<NearestBits>& result) {
-  const auto count = static_cast<std::uint32_t>(candidates.size());
-  for (std::size_t i = 0; i < queries.size(); ++i)
-    result[i] = nearest(queries[i], candidates.data(), count);
-}
-
-void portable(std::span<const DescriptorBits> queries, std::span<const DescriptorBits> candidates,
-              std::vector<NearestBits>& result) {
-  nearest_of_each_into(queries, candidates, result);
-}
-
-#if defined(__x86_64__)
-[[gnu::target("popcnt")]] void with_popcount(std::span<const DescriptorBits> queries,
-                                             std::span<const DescriptorBits> candidates,
-                                             std::vector<NearestBits>& result) {
-  nearest_of_each_into(queries, candidates, result);
-}
-#endif
-
-}  // namespace
 
 DescriptorBits to_bits(const BinaryDescriptor& descriptor) {
   DescriptorBits bits;
@@ -40,25 +16,14 @@ BinaryDescriptor to_descriptor(const DescriptorBits& bits) {
   return descriptor;
 }
 
-bool has_popcount() {
-#if defined(__x86_64__)
-  static const bool supported = __builtin_cpu_supports("popcnt") != 0;
-  return supported;
-#else
-  return false;
-#endif
-}
-
 std::vector<NearestBits> nearest_of_each(std::span<const DescriptorBits> queries,
                                          std::span<const DescriptorBits> candidates) {
+  const auto count = static_cast<std::uint32_t>(candidates.size());
   std::vector<NearestBits> result(queries.size());
-#if defined(__x86_64__)
-  if (has_popcount()) {
-    with_popcount(queries, candidates, result);
-    return result;
-  }
-#endif
-  portable(queries, candidates, result);
+  run_counting_bits([&]() __attribute__((always_inline)) {
+    for (std::size_t i = 0; i < queries.size(); ++i)
+      result[i] = nearest(queries[i], candidates.data(), count);
+  });
   return result;
 }
 

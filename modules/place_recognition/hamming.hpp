@@ -50,8 +50,22 @@ struct NearestBits {
 [[nodiscard]] std::vector<NearestBits> nearest_of_each(std::span<const DescriptorBits> queries,
                                                        std::span<const DescriptorBits> candidates);
 
-/// True if this processor counts bits in one instruction. Important kernels exist twice, once
-/// compiled for such processors; the always_inline functions above adapt to their caller.
-[[nodiscard]] bool has_popcount();
+#if defined(__x86_64__)
+template <typename Kernel>
+[[gnu::target("popcnt")]] auto run_with_popcount(const Kernel& kernel) {
+  return kernel();
+}
+#endif
+
+/// The result of `kernel`, a lambda with the attribute always_inline. It is compiled twice: for all
+/// processors, and for those that count bits in one instruction.
+template <typename Kernel>
+auto run_counting_bits(const Kernel& kernel) {
+#if defined(__x86_64__)
+  static const bool supported = __builtin_cpu_supports("popcnt") != 0;
+  if (supported) return run_with_popcount(kernel);
+#endif
+  return kernel();
+}
 
 }  // namespace km

@@ -95,30 +95,6 @@ std::string fingerprint_text(std::uint64_t fingerprint) {
   return text;
 }
 
-// The descent of many descriptors, compiled twice (see has_popcount()).
-struct Vocabulary::Descent {
-  const Vocabulary& tree;
-  std::span<const BinaryDescriptor> descriptors;
-  std::vector<std::uint32_t>& words;
-
-  [[gnu::always_inline]] void run() const {
-    for (const BinaryDescriptor& descriptor : descriptors) {
-      const DescriptorBits query = to_bits(descriptor);
-      Node at = tree.nodes_[0];
-      while (at.children != 0)
-        at = tree.nodes_[at.first +
-                         nearest(query, tree.centers_.data() + at.first, at.children).index];
-      words.push_back(at.first);
-    }
-  }
-  void portable() const { run(); }
-#if defined(__x86_64__)
-  [[gnu::target("popcnt")]] void with_popcount() const {
-    run();
-  }
-#endif
-};
-
 Vocabulary::Vocabulary(VocabularyData data) : data_(std::move(data)) {
   if (const std::string problem = problem_of(data_); !problem.empty())
     throw std::invalid_argument("Vocabulary: " + problem);
@@ -138,14 +114,15 @@ Vocabulary::Vocabulary(VocabularyData data) : data_(std::move(data)) {
 std::vector<std::uint32_t> Vocabulary::words(std::span<const BinaryDescriptor> descriptors) const {
   std::vector<std::uint32_t> result;
   result.reserve(descriptors.size());
-  const Descent descent{*this, descriptors, result};
-#if defined(__x86_64__)
-  if (has_popcount()) {
-    descent.with_popcount();
-    return result;
-  }
-#endif
-  descent.portable();
+  run_counting_bits([&]() __attribute__((always_inline)) {
+    for (const BinaryDescriptor& descriptor : descriptors) {
+      const DescriptorBits query = to_bits(descriptor);
+      Node at = nodes_[0];
+      while (at.children != 0)
+        at = nodes_[at.first + nearest(query, centers_.data() + at.first, at.children).index];
+      result.push_back(at.first);
+    }
+  });
   return result;
 }
 

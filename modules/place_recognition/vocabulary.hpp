@@ -79,7 +79,6 @@ class Vocabulary {
     std::uint32_t first;     // index of the first child; of a leaf: its word
     std::uint32_t children;  // 0 for a leaf
   };
-  struct Descent;
   std::vector<Node> nodes_;
   std::vector<DescriptorBits> centers_;  // centres of nodes_, for the descent
 };
