@@ -105,22 +105,13 @@ class MeshCorrector {
 };
 
 /// A robot's mesh, corrected to agree with its optimised trajectory.
-struct OptimizedMesh {
+struct OptimizedMesh : MeshCorrection {
   RobotId robot = 0;
-  RobotId anchor = 0;                            ///< Robot whose odometry frame is `world`.
-  LabelledMesh mesh;                             ///< In `world`.
-  std::shared_ptr<const Trajectory> trajectory;  ///< Poses to which the mesh was corrected.
-  MeshDeformationReport report;                  ///< Report of the last optimisation.
-  /// False: no optimisation was due, and the former mesh was moved as a whole.
-  bool deformed = true;
-  double seconds = 0.0;  ///< Duration of the correction.
-  /// Faces of the map that are missing because another visit saw them better.
-  std::size_t superseded_faces = 0;
-  /// Faces of the map that are missing because later views saw through them.
-  std::size_t seen_through = 0;
+  RobotId anchor = 0;  ///< Robot whose odometry frame is `world`.
+  std::shared_ptr<const Trajectory> trajectory = nullptr;  ///< Poses to which it was corrected.
+  double seconds = 0.0;                                    ///< Duration of the correction.
   /// T_world_kf * T_odom_kf^-1 of the poses in `origin`: where the correction moved what they saw.
   std::vector<SE3> T_world_odom = {};
-  MeshOrigin origin = {};  ///< Keyframes that saw the mesh.
 };
 
 }  // namespace km

@@ -135,21 +135,12 @@ void MeshDeformationNode::correct() {
   const double end_s = steady_now_s();
   next_s_ = end_s + config_.period_s;
   timing_.add(end_s - start_s);
-  OptimizedMesh result{self_,
-                       trajectory_->anchor,
-                       std::move(correction->mesh),
-                       trajectory_,
-                       correction->report,
-                       correction->deformed,
-                       end_s - start_s,
-                       correction->superseded_faces,
-                       correction->seen_through,
-                       {},
-                       std::move(correction->origin)};
+  OptimizedMesh result{*std::move(correction), self_, trajectory_->anchor, trajectory_,
+                       end_s - start_s};
   for (std::size_t k = 0; k < result.origin.T_world_kf.size(); ++k)
     result.T_world_odom.push_back(result.origin.T_world_kf[k] * T_odom_kf_[k].inverse());
-  if (!correction->superseded.vertices.empty())
-    superseded_.publish(std::move(correction->superseded));
+  if (!result.superseded.vertices.empty())
+    superseded_.publish(std::exchange(result.superseded, {}));
   report(result);
   optimized_.publish(std::move(result));
   corrected_ = handled_;  // not before the mesh is published

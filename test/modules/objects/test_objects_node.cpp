@@ -28,12 +28,13 @@ OptimizedMesh mesh_with(const std::vector<ObjectBox>& chairs, RobotId robot) {
   TestMap map;
   map.add_sheet({-5, -5, 0}, {10, 0, 0}, {0, 10, 0}, kGround, {0, 9});
   for (const ObjectBox& chair : chairs) map.add_box(chair, kChair);
-  return {.robot = robot,
-          .anchor = 3,
-          .mesh = map.mesh,
-          .trajectory = poses(robot),
-          .report = {},
-          .origin = {.seen_by = map.seen_by, .T_world_kf = {}}};
+  OptimizedMesh result;
+  result.robot = robot;
+  result.anchor = 3;
+  result.mesh = map.mesh;
+  result.trajectory = poses(robot);
+  result.origin.seen_by = map.seen_by;
+  return result;
 }
 
 struct NodeTopics {
