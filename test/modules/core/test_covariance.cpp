@@ -38,14 +38,6 @@ TEST_CASE("The covariance between two poses of a chain is the one composed betwe
   CHECK((found.T.matrix() - b_c.T.matrix()).norm() < 1e-12);
 }
 
-TEST_CASE("Inverting twice gives the original pose and covariance", "[core]") {
-  std::mt19937 rng(9);
-  const UncertainPose a{random_pose(rng), random_covariance(rng, 0.1)};
-  const UncertainPose again = inverse(inverse(a));
-  CHECK((again.Sigma - a.Sigma).norm() < 1e-9);
-  CHECK((again.T.matrix() - a.T.matrix()).norm() < 1e-12);
-}
-
 TEST_CASE("A wrong scale moves positions along their own direction", "[core]") {
   std::mt19937 rng(11);
   const UncertainPose a{random_pose(rng), random_covariance(rng, 0.1)};

@@ -14,7 +14,6 @@
 #include "modules/place_recognition/vocabulary.hpp"
 #include "modules/place_recognition/vocabulary_file.hpp"
 #include "modules/place_recognition/vocabulary_training.hpp"
-#include "test/support/corrupted_input.hpp"
 #include "test/support/temporary_folder.hpp"
 
 namespace km {
@@ -264,14 +263,6 @@ TEST_CASE("A refusal names the file, the offset and what is wrong there", "[plac
   data.children[0] = 5;  // the checksum fits
   CHECK_THROWS_WITH(deserialize(serialize(data), "forged"),
                     Contains("offset 40: node 0 has 5 children, branching is 4"));
-}
-
-TEST_CASE("A corrupted vocabulary is refused by name", "[place_recognition]") {
-  check_corrupted<std::runtime_error>(
-      serialize(small_vocabulary()), "corrupted.kmvoc",
-      [](const std::string& bytes) { (void)deserialize(bytes, "corrupted.kmvoc"); });
-  check_no_files<std::runtime_error>(".kmvoc",
-                                     [](const auto& place) { (void)load_vocabulary(place); });
 }
 
 TEST_CASE("A missing file is named", "[place_recognition]") {
