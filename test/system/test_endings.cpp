@@ -185,24 +185,6 @@ TEST_CASE(
   CHECK(fs::exists(output / "run.journal") == is_back);
 }
 
-TEST_CASE("One result that cannot be written leaves the others whole", "[system][endings]") {
-  const TemporaryFolder folder;
-  const fs::path output = folder.path() / "out";
-  const int quiet = open("/dev/null", O_WRONLY | O_CLOEXEC);
-  Process robot(robot_on_walk(long_walk(folder.path(), 0), output), 0, quiet);
-  close(quiet);
-  REQUIRE(wait_for_lines(output / "process.csv", 2));
-  fs::create_directory(output / "optimized.tum");  // the second of all
-  robot.kill(SIGTERM);
-  CHECK(robot.wait() == 4);
-  for (const char* file : {"odometry.tum", "pose_graph.g2o", "keyframes.csv", "loop_closures.csv",
-                           "optimizer.csv", "timing.csv"})
-    CHECK(fs::is_regular_file(output / file));
-  CHECK(read_summary(output / "summary.json").exit_reason ==
-        "interrupted; 1 result lost: " + (output / "optimized.tum").string() +
-            ": cannot be written: Is a directory");
-}
-
 // A team of two robots that walk for long; results in `folder`/robot0 and robot1.
 std::vector<std::string> team_on_walks(const TemporaryFolder& folder) {
   long_walk(folder.path(), 0);

@@ -107,35 +107,5 @@ TEST_CASE("A disk that stands still under the map leaves the other results", "[s
                  Catch::Contains("mesh.ply"));
 }
 
-TEST_CASE("The team continues without a robot whose module hangs, and sees it leave",
-          "[system][faults]") {
-  FaultyRobot faulty;
-  const fs::path output = faulty.folder.path() / "sound";
-  const int log =
-      open((faulty.folder.path() / "sound.log").c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
-  Process sound(words_of(KM_BIN_DIR "/kimera_multi_robot --robot 0 --graph " +
-                         long_walk(faulty.folder.path(), 0).string() + " --output " +
-                         output.string() + " --domain " + std::to_string(faulty.domain)),
-                0, log);
-  close(log);
-  const bool runs = wait_for_lines(output / "process.csv", 2);
-  CAPTURE(faulty.folder.read("sound.log"));
-  REQUIRE(runs);
-  faulty.start("graph_playback", "hang", long_walk(faulty.folder.path(), 1));
-  check_end(faulty, "graph_playback", "hang");
-  const auto end = std::chrono::steady_clock::now() + kPatience;
-  // On an overloaded machine it may be silent for two seconds before its leave message.
-  const auto has = [&](const char* words) {
-    return faulty.folder.read("sound.log").find(words) != std::string::npos;
-  };
-  const auto gone = [&] { return has("faulty left") || has("faulty lost"); };
-  while (!gone() && std::chrono::steady_clock::now() < end) poll(nullptr, 0, 50);
-  CAPTURE(faulty.folder.read("sound.log"));
-  CHECK(has("faulty alive"));
-  CHECK(gone());
-  sound.kill(SIGTERM);
-  CHECK(sound.wait() == 0);
-}
-
 }  // namespace
 }  // namespace km

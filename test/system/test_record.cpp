@@ -7,11 +7,13 @@
 #include <string>
 #include <vector>
 
+#include "apps/lab/pgo/team_graph_file.hpp"
 #include "modules/core/input_file.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
 #include "modules/recordings/mcap_reader.hpp"
 #include "modules/recordings/ros_messages.hpp"
 #include "test/modules/recordings/bag_contents.hpp"
+#include "test/support/eavesdropper.hpp"
 #include "test/support/process.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/system/record/other_readers.hpp"
@@ -151,13 +153,40 @@ TEST_CASE(
               read_trajectory(folder.path() / "optimized.tum"));
 }
 
-TEST_CASE("A team's records become one", "[system]") {
+TEST_CASE("Two robots on the halves of a recording localise together, and their records become one",
+          "[system]") {
   const auto dataset = shared_data("euroc/MH_01_easy");
   if (!dataset) return;
   const TemporaryFolder folder;
   const TeamRun run = run_team("config/teams/euroc_two_robots.yaml", *dataset, folder, "--record");
   CAPTURE(run.result.output);
   REQUIRE(run.result.exit_code == 0);
+  // Bounds of the recording's requirements; the actual errors are two to three times smaller.
+  const double max_odometry_ate_m = 0.010;
+  const double max_team_ate_m = 0.015;
+  const int min_inter_robot_inliers = 10;
+  int inliers = 0;
+  for (const auto& robot : run.json["robots"]) {
+    CHECK(robot["odometry"]["completeness"] > 0.999);
+    CHECK(robot["odometry"]["position_m"]["rmse"] < max_odometry_ate_m);
+    CHECK(robot["pgo"]["members"].size() == 2);
+    inliers += robot["closures"]["inliers"].get<int>();
+  }
+  CHECK(inliers >= min_inter_robot_inliers);
+  CHECK(run.json["optimized"]["joint"]["position_m"]["rmse"] < max_team_ate_m);
+  CHECK(run.json["live"]["joint"]["position_m"]["rmse"] < max_team_ate_m);
+  for (const char* file :
+       {"odometry.tum", "live.tum", "optimized.tum", "pose_graph.g2o", "loop_closures.csv",
+        "traffic.csv", "timing.csv", "config.yaml", "summary.json"})
+    CHECK(fs::file_size(folder.path() / "a" / file) > 0);
+
+  // The same graph solved once more: a keyframe without a path to the others could not be located.
+  Eavesdropper ear = listen_to(read_team_folder(folder.path()), 100);
+  CHECK(ear.messages() > 0);
+  CHECK(ear.private_poses() > 0);
+  CHECK(ear.misfits() == 0);
+  CHECK(ear.derivable().empty());
+
   Record team(folder.path() / "team.mcap");
   CHECK_THAT(to_string(team.reader.report()), Catch::Equals(""));
   std::size_t messages = 1;  // begins with the message that places `map`

@@ -5,10 +5,8 @@
 #include <csignal>
 #include <memory>
 
-#include "apps/lab/pgo/team_graph_file.hpp"
 #include "modules/core/input_file.hpp"
 #include "modules/mesh/mesh_file.hpp"
-#include "test/support/eavesdropper.hpp"
 #include "test/support/process.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/system/live_run.hpp"
@@ -18,41 +16,6 @@ namespace km {
 namespace {
 
 namespace fs = std::filesystem;
-
-TEST_CASE("Two robots on the halves of a recording localise together", "[system]") {
-  const auto dataset = shared_data("euroc/MH_01_easy");
-  if (!dataset) return;
-  const TemporaryFolder folder;
-  const TeamRun run = run_team("config/teams/euroc_two_robots.yaml", *dataset, folder);
-  CAPTURE(run.result.output);
-  REQUIRE(run.result.exit_code == 0);
-
-  // Bounds of the recording's requirements; the actual errors are two to three times smaller.
-  const double max_odometry_ate_m = 0.010;
-  const double max_team_ate_m = 0.015;
-  const int min_inter_robot_inliers = 10;
-  int inliers = 0;
-  for (const auto& robot : run.json["robots"]) {
-    CHECK(robot["odometry"]["completeness"] > 0.999);
-    CHECK(robot["odometry"]["position_m"]["rmse"] < max_odometry_ate_m);
-    CHECK(robot["pgo"]["members"].size() == 2);
-    inliers += robot["closures"]["inliers"].get<int>();
-  }
-  CHECK(inliers >= min_inter_robot_inliers);
-  CHECK(run.json["optimized"]["joint"]["position_m"]["rmse"] < max_team_ate_m);
-  CHECK(run.json["live"]["joint"]["position_m"]["rmse"] < max_team_ate_m);
-  for (const char* file :
-       {"odometry.tum", "live.tum", "optimized.tum", "pose_graph.g2o", "loop_closures.csv",
-        "traffic.csv", "timing.csv", "config.yaml", "summary.json"})
-    CHECK(fs::file_size(folder.path() / "a" / file) > 0);
-
-  // The same graph solved once more: a keyframe without a path to the others could not be located.
-  Eavesdropper ear = listen_to(read_team_folder(folder.path()), 100);
-  CHECK(ear.messages() > 0);
-  CHECK(ear.private_poses() > 0);
-  CHECK(ear.misfits() == 0);
-  CHECK(ear.derivable().empty());
-}
 
 TEST_CASE("Two robots end with the same map of their team", "[system]") {
   const auto dataset = shared_data("euroc/MH_01_easy");
