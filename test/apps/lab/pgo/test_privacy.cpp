@@ -28,7 +28,8 @@ const auto kGraphs = {
 // Enough for several updates of the weights. Second derivatives are sent in the first of them.
 constexpr int kRounds = 12;
 
-TEST_CASE("No private pose can be derived from the poses and edges that robots send", "[pgo]") {
+TEST_CASE("No private pose can be derived from the poses and edges that robots send",
+          "[pgo][slow]") {
   const auto [name, robots] = GENERATE(values(kGraphs));
   CAPTURE(name);
   const auto graph = recorded(name, robots);

@@ -313,7 +313,8 @@ TEST_CASE("Robots without a true closure between them have a reference of two fr
 }
 
 // Each scenario that a robust team must stand, on the graph that it is meant for.
-TEST_CASE("The robots' sessions stand noise and places that are not as claimed", "[scenario]") {
+TEST_CASE("The robots' sessions stand noise and places that are not as claimed",
+          "[scenario][slow]") {
   struct Row {
     std::string scenario;
     std::string graph;
