@@ -74,7 +74,7 @@ TEST_CASE("The viewer refuses unusable input", "[viewer]") {
     CHECK_FALSE(std::filesystem::exists(record));
   }
   const auto nowhere =
-      run_command("timeout 20 " + kViewer + " --domain 7 --interface lo --record " +
+      run_command("timeout 300 " + kViewer + " --domain 7 --interface lo --record " +
                   (empty.path() / "none/team.mcap").string());
   CHECK(nowhere.exit_code == 1);
   CHECK_THAT(nowhere.output, Catch::Contains("cannot be written, there is no folder"));
