@@ -11,7 +11,7 @@
 #include "apps/output_file.hpp"
 #include "modules/evaluation/closure_truth.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
-#include "modules/recordings/mcap_reader.hpp"
+#include "modules/recordings/open_bag.hpp"
 #include "modules/sensors/node/euroc_rig.hpp"
 
 namespace km {

@@ -6,7 +6,7 @@
 
 #include "modules/core/input_file.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
-#include "modules/recordings/mcap_reader.hpp"
+#include "modules/recordings/open_bag.hpp"
 #include "modules/recordings/ros_messages.hpp"
 
 namespace km {
@@ -45,11 +45,11 @@ void take(const BagChannel& channel, const BagMessage& message, const std::strin
 }
 
 std::vector<StampedPose> read_topic(const RecordTopic& record) {
-  McapReader reader(record.file);
+  const auto reader = open_mcap(record.file);
   const std::string place = record.file.string() + ':' + record.topic;
   std::vector<StampedPose> poses;
-  while (const auto message = reader.next()) {
-    const BagChannel& channel = reader.channels()[message->channel];
+  while (const auto message = reader->next()) {
+    const BagChannel& channel = reader->channels()[message->channel];
     if (channel.topic == record.topic) take(channel, *message, place, poses);
   }
   if (poses.empty()) throw InputFileError(place + ": no pose on this topic");
@@ -60,14 +60,14 @@ std::vector<StampedPose> read_topic(const RecordTopic& record) {
 }
 
 std::vector<fs::path> trajectories_in(const fs::path& file) {
-  const McapReader reader(file);
+  const auto reader = open_mcap(file);
   const auto name = [&file](const std::string& topic) {
     return fs::path(file.string() + ':' + topic);
   };
   std::vector<fs::path> found;
   for (const auto& [ending, type] :
        {std::pair("/path", RosPath::kType), std::pair("/odometry", RosOdometry::kType)}) {
-    for (const BagChannel& channel : reader.channels())
+    for (const BagChannel& channel : reader->channels())
       if (channel.topic.ends_with(ending) && is_of_type(channel, type))
         found.push_back(name(channel.topic));
     std::ranges::sort(found);

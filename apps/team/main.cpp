@@ -19,8 +19,7 @@
 #include "apps/team/team_results.hpp"
 #include "modules/core/write_file.hpp"
 #include "modules/mesh/mesh_file.hpp"
-#include "modules/recordings/mcap_reader.hpp"
-#include "modules/recordings/merged_reader.hpp"
+#include "modules/recordings/open_bag.hpp"
 #include "modules/recordings/ros_messages.hpp"
 #include "modules/ros_dds/mcap_sink.hpp"
 #include "runtime/dds/dds_config.hpp"
@@ -212,18 +211,17 @@ std::vector<fs::path> robot_records(const fs::path& folder) {
 void merge_records(std::span<const fs::path> records, const std::string& root,
                    const fs::path& file) {
   std::vector<std::unique_ptr<km::BagReader>> readers;
-  for (const fs::path& record : records)
-    readers.push_back(std::make_unique<km::McapReader>(record));
-  km::MergedReader merged(std::move(readers));
+  for (const fs::path& record : records) readers.push_back(km::open_mcap(record));
+  const auto merged = km::merge_bags(std::move(readers));
   std::optional<std::string> failure;
   km::McapSink sink(file, [&failure](const std::string& why) { failure = why; });
   const std::size_t statics = sink.open({"/tf_static", km::RosTFMessage::kType, true, 1});
   std::vector<std::size_t> topics;
   bool begun = root.empty();
-  while (const auto message = merged.next()) {
-    for (std::size_t k = topics.size(); k < merged.channels().size(); ++k)
+  while (const auto message = merged->next()) {
+    for (std::size_t k = topics.size(); k < merged->channels().size(); ++k)
       topics.push_back(
-          sink.open({merged.channels()[k].topic, km::ros1_name(merged.channels()[k].type)}));
+          sink.open({merged->channels()[k].topic, km::ros1_name(merged->channels()[k].type)}));
     if (!std::exchange(begun, true))
       sink.put(statics, message->log_time, km::encode_ros(root_transform(root, message->log_time)));
     sink.put(topics[message->channel], message->log_time, message->bytes);

@@ -25,10 +25,7 @@ class ChannelTable {
     return known->second;
   }
 
-  void add_messages(std::size_t index, std::uint64_t count) {
-    channels_[index].message_count += count;
-  }
-
+  [[nodiscard]] BagChannel& at(std::size_t index) { return channels_.at(index); }
   [[nodiscard]] const std::vector<BagChannel>& channels() const { return channels_; }
 
  private:

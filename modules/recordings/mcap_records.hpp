@@ -1,5 +1,7 @@
 #pragma once
 
+#include <zlib.h>
+
 #include <cstdint>
 #include <limits>
 #include <map>
@@ -92,14 +94,17 @@ struct McapChannel {
   }
 };
 
-/// Fields of a message before its data.
+/// Fields of a message. Its data follow them.
 struct McapMessage {
   static constexpr McapOpcode kOpcode = McapOpcode::kMessage;
   std::uint16_t channel_id = 0;
   std::uint32_t sequence = 0;
   Stamp log_time = 0;
   Stamp publish_time = 0;
-  std::uint32_t data_size = 0;
+
+  static void visit(auto& wire, auto& m) {
+    wire(m.channel_id, m.sequence, m.log_time, m.publish_time);
+  }
 };
 inline constexpr std::uint64_t kMcapMessageFields_bytes = 2 + 4 + 8 + 8;
 
@@ -214,7 +219,10 @@ struct McapDataEnd {
 };
 
 /// Checksum (CRC-32) of `bytes`, continued from the checksum `before` of the preceding bytes.
-[[nodiscard]] std::uint32_t mcap_crc(std::span<const std::uint8_t> bytes, std::uint32_t before = 0);
+[[nodiscard]] inline std::uint32_t mcap_crc(std::span<const std::uint8_t> bytes,
+                                            std::uint32_t before = 0) {
+  return static_cast<std::uint32_t>(crc32_z(before, bytes.data(), bytes.size()));
+}
 
 /// Reads the fields of a record, one after the other.
 class McapIn {
@@ -314,12 +322,18 @@ class McapOut {
   ByteWriter writer_;
 };
 
-[[nodiscard]] std::optional<McapRecordHeader> parse_mcap_record_header(
-    std::span<const std::uint8_t> bytes);
+[[nodiscard]] inline std::optional<McapRecordHeader> parse_mcap_record_header(
+    std::span<const std::uint8_t> bytes) {
+  ByteReader reader(bytes);
+  McapRecordHeader header;
+  header.opcode = reader.u8();
+  header.size = reader.u64();
+  if (reader.failed() || header.opcode == 0) return std::nullopt;
+  return header;
+}
 
-/// Parses the content after a record's header, for the record types that readers use, except
-/// messages. nullopt for an invalid content, times beyond 2^63 - 1 ns, and attachments with a wrong
-/// checksum.
+/// Parses the content after a record's header, for the record types that readers use. nullopt for
+/// an invalid content, times beyond 2^63 - 1 ns, and attachments with a wrong checksum.
 template <typename Record>
 [[nodiscard]] std::optional<Record> parse_mcap(std::span<const std::uint8_t> bytes) {
   McapIn in(bytes);
@@ -331,24 +345,16 @@ template <typename Record>
   return record;
 }
 
-/// Parses the fields of a message. `bytes` may end after kMcapMessageFields_bytes; `size` is the
-/// full size of the content.
-[[nodiscard]] std::optional<McapMessage> parse_mcap_message(std::span<const std::uint8_t> bytes,
-                                                            std::uint64_t size);
-
-/// Writes a record with its header.
+/// Writes a record with its header; `data` follows its fields.
 template <typename Record>
-void put_mcap(ByteWriter& out, const Record& record) {
+void put_mcap(ByteWriter& out, const Record& record, std::span<const std::uint8_t> data = {}) {
   McapOut content;
   Record::visit(content, record);
   const auto bytes = content.release();
   out.u8(static_cast<std::uint8_t>(Record::kOpcode));
-  out.u64(bytes.size());
+  out.u64(bytes.size() + data.size());
   out.bytes(bytes);
+  out.bytes(data);
 }
-
-/// Writes a message record; ignores the data size in `message`.
-void put_mcap_message(ByteWriter& out, const McapMessage& message,
-                      std::span<const std::uint8_t> data);
 
 }  // namespace km

@@ -56,7 +56,7 @@ void McapWriter::add(const McapMessage& message, std::span<const std::uint8_t> d
   auto& index = chunk_.indexes[message.channel_id];
   index.channel_id = message.channel_id;
   index.messages.emplace_back(message.log_time, chunk_.records.size());
-  put_mcap_message(chunk_.records, message, data);
+  put_mcap(chunk_.records, message, data);
   count(message);
   if (chunk_.records.size() >= options_.chunk_bytes) end_chunk();
 }

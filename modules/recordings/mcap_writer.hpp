@@ -32,7 +32,7 @@ class McapWriter {
   /// or schemas.
   std::uint16_t add_channel(McapChannel channel, const McapSchema& schema);
 
-  /// Adds a message of a channel of add_channel(); its data_size is ignored.
+  /// Adds a message of a channel of add_channel().
   void add(const McapMessage& message, std::span<const std::uint8_t> data);
 
   /// Ends the chunk, unless it is empty.

@@ -7,12 +7,9 @@
 #include <vector>
 
 #include "modules/core/input_file.hpp"
-#include "modules/recordings/db3_reader.hpp"
-#include "modules/recordings/mcap_reader.hpp"
+#include "modules/recordings/channel_table.hpp"
 #include "modules/recordings/mcap_records.hpp"
-#include "modules/recordings/merged_reader.hpp"
 #include "modules/recordings/random_access_file.hpp"
-#include "modules/recordings/ros1_bag_reader.hpp"
 
 namespace km {
 namespace {
@@ -24,9 +21,9 @@ std::unique_ptr<BagReader> open_file(const fs::path& path) {
   const RandomAccessFile file(path);
   if (file.size() == 0) throw InputFileError(path.string() + ": is empty");
   const std::string magic = file.beginning(kMagic_bytes);
-  if (magic == "#ROSBAG ") return std::make_unique<Ros1BagReader>(path);
-  if (magic == kMcapMagic) return std::make_unique<McapReader>(path);
-  if (magic == "SQLite f") return std::make_unique<Db3Reader>(path);
+  if (magic == "#ROSBAG ") return open_ros1_bag(path);
+  if (magic == kMcapMagic) return open_mcap(path);
+  if (magic == "SQLite f") return open_db3(path);
   throw InputFileError(file.place(0) + ": does not begin like a .bag, .mcap or .db3 file");
 }
 
@@ -55,8 +52,60 @@ std::unique_ptr<BagReader> open_folder(const fs::path& folder) {
   if (files.empty()) throw InputFileError(folder.string() + ": no .db3 or .mcap file in it");
   std::vector<std::unique_ptr<BagReader>> readers;
   for (const fs::path& file : files) readers.push_back(open_file(file));
-  return std::make_unique<MergedReader>(std::move(readers));
+  return merge_bags(std::move(readers));
 }
+
+class MergedReader final : public BagReader {
+ public:
+  explicit MergedReader(std::vector<std::unique_ptr<BagReader>> readers) {
+    for (auto& reader : readers) sources_.push_back({.reader = std::move(reader)});
+    for (Source& source : sources_) add_channels(source);
+    for (Source& source : sources_) advance(source);
+  }
+
+  [[nodiscard]] const std::vector<BagChannel>& channels() const override {
+    return channels_.channels();
+  }
+
+  [[nodiscard]] std::optional<BagMessage> next() override {
+    Source* first = nullptr;
+    for (Source& source : sources_)
+      if (source.head && (first == nullptr || source.head->log_time < first->head->log_time))
+        first = &source;
+    if (first == nullptr) return std::nullopt;
+    BagMessage message = *std::move(first->head);
+    advance(*first);
+    return message;
+  }
+
+  [[nodiscard]] BagReport report() const override {
+    BagReport report;
+    for (const Source& source : sources_) report.add(source.reader->report());
+    return report;
+  }
+
+ private:
+  struct Source {
+    std::unique_ptr<BagReader> reader;
+    std::vector<std::size_t> channel_of = {};  // merged channel of each channel of `reader`
+    std::optional<BagMessage> head = {};
+  };
+
+  void add_channels(Source& source) {
+    const auto& channels = source.reader->channels();
+    for (std::size_t i = source.channel_of.size(); i < channels.size(); ++i)
+      source.channel_of.push_back(channels_.add(channels[i]));
+  }
+
+  void advance(Source& source) {
+    source.head = source.reader->next();
+    add_channels(source);  // next() may find more
+    if (source.head) source.head->channel = source.channel_of[source.head->channel];
+  }
+
+  std::vector<Source> sources_;
+  ChannelTable channels_;
+};
 
 }  // namespace
 
@@ -67,6 +116,10 @@ bool may_be_bag(const fs::path& path) {
 
 std::unique_ptr<BagReader> open_bag(const fs::path& path) {
   return is_folder(path) ? open_folder(path) : open_file(path);
+}
+
+std::unique_ptr<BagReader> merge_bags(std::vector<std::unique_ptr<BagReader>> readers) {
+  return std::make_unique<MergedReader>(std::move(readers));
 }
 
 }  // namespace km

@@ -10,7 +10,7 @@
 #include "apps/lab/pgo/team_graph_file.hpp"
 #include "modules/core/input_file.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
-#include "modules/recordings/mcap_reader.hpp"
+#include "modules/recordings/open_bag.hpp"
 #include "modules/recordings/ros_messages.hpp"
 #include "test/modules/recordings/bag_contents.hpp"
 #include "test/support/eavesdropper.hpp"
@@ -32,7 +32,8 @@ std::string record_command(const fs::path& dataset, const std::string& options) 
 }
 
 struct Record {
-  explicit Record(const fs::path& file) : reader(file), messages(topic_messages_of(reader)) {
+  explicit Record(const fs::path& file)
+      : reader(open_mcap(file)), messages(topic_messages_of(*reader)) {
     for (const TopicMessage& message : messages) ++counts[message.topic];
   }
   template <typename Message>
@@ -43,7 +44,7 @@ struct Record {
     throw std::out_of_range(topic);
   }
 
-  McapReader reader;
+  const std::unique_ptr<BagReader> reader;
   std::vector<TopicMessage> messages;
   std::map<std::string, std::size_t> counts;
 };
@@ -80,7 +81,7 @@ TEST_CASE("A robot's record has the poses of its results, also for readers that 
   REQUIRE(run.exit_code == 0);
   const fs::path file = folder.path() / "record.mcap";
   Record record(file);
-  CHECK_THAT(to_string(record.reader.report()), Catch::Equals(""));
+  CHECK_THAT(to_string(record.reader->report()), Catch::Equals(""));
   const std::size_t rows = line_count(folder.path() / "odometry.tum");
   REQUIRE(rows > 200);
   CHECK(record.counts["/alice/odometry"] == rows);
@@ -139,8 +140,8 @@ TEST_CASE(
   }
   Record killed(first);
   CHECK(killed.counts["/alice/odometry"] > 0);
-  CHECK(killed.reader.report().count(BagFault::kTruncated) > 0);
-  CHECK(killed.reader.report().entries().size() == 1);
+  CHECK(killed.reader->report().count(BagFault::kTruncated) > 0);
+  CHECK(killed.reader->report().entries().size() == 1);
 
   const auto size = fs::file_size(first);
   Process robot(
@@ -148,7 +149,7 @@ TEST_CASE(
   CHECK(robot.wait() == 0);
   CHECK(fs::file_size(first) == size);
   const Record resumed(second);
-  CHECK_THAT(to_string(resumed.reader.report()), Catch::Equals(""));
+  CHECK_THAT(to_string(resumed.reader->report()), Catch::Equals(""));
   check_equal(resumed.last<RosPath>("/alice/path"),
               read_trajectory(folder.path() / "optimized.tum"));
 }
@@ -188,7 +189,7 @@ TEST_CASE("Two robots on the halves of a recording localise together, and their 
   CHECK(ear.derivable().empty());
 
   Record team(folder.path() / "team.mcap");
-  CHECK_THAT(to_string(team.reader.report()), Catch::Equals(""));
+  CHECK_THAT(to_string(team.reader->report()), Catch::Equals(""));
   std::size_t messages = 1;  // begins with the message that places `map`
   for (const char* name : {"a", "b"}) {
     const Record own(folder.path() / name / "record.mcap");

@@ -6,7 +6,7 @@
 #include <string>
 #include <thread>
 
-#include "modules/recordings/mcap_reader.hpp"
+#include "modules/recordings/open_bag.hpp"
 #include "modules/view/node/view_channel_codec.hpp"
 #include "runtime/dds/participant.hpp"
 #include "test/apps/viewer/page_listener.hpp"
@@ -56,10 +56,10 @@ TEST_CASE("Messages of the robots of a domain are shown in the page, and recorde
   CHECK(page.receives(R"("kind":"pose")"));
   viewer.kill(SIGINT);
   CHECK(viewer.wait() == 0);
-  McapReader reader(record);
-  const auto messages = topic_messages_of(reader);
+  const auto reader = open_mcap(record);
+  const auto messages = topic_messages_of(*reader);
   CHECK(std::ranges::count(messages, "/alpha/pose", &TopicMessage::topic) == 1);
-  CHECK(to_string(reader.report()) == "");
+  CHECK(to_string(reader->report()) == "");
 }
 
 }  // namespace

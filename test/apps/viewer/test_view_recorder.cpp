@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "apps/viewer/view_recorder.hpp"
-#include "modules/recordings/mcap_reader.hpp"
+#include "modules/recordings/open_bag.hpp"
 #include "modules/recordings/ros_messages.hpp"
 #include "test/modules/mesh/wavy_sheet.hpp"
 #include "test/modules/recordings/bag_contents.hpp"
@@ -79,7 +79,8 @@ std::vector<ViewUpdate> team() {
 }
 
 struct Record {
-  explicit Record(const fs::path& file) : reader(file), messages(topic_messages_of(reader)) {}
+  explicit Record(const fs::path& file)
+      : reader(open_mcap(file)), messages(topic_messages_of(*reader)) {}
 
   [[nodiscard]] std::size_t count(const std::string& topic) const {
     return static_cast<std::size_t>(std::ranges::count(messages, topic, &TopicMessage::topic));
@@ -92,7 +93,7 @@ struct Record {
     throw std::out_of_range(topic);
   }
 
-  McapReader reader;
+  const std::unique_ptr<BagReader> reader;
   std::vector<TopicMessage> messages;
 };
 
@@ -106,7 +107,7 @@ TEST_CASE("A viewer's record has the messages of each robot as the robot's own r
   for (const ViewUpdate& update : team()) recorder.add(update);
   recorder.finish();
   const Record record(file);
-  CHECK(to_string(record.reader.report()) == "");
+  CHECK(to_string(record.reader->report()) == "");
 
   const auto path = record.last<RosPath>("/bob/path");
   CHECK(path.header.frame_id == "bob/map");

@@ -70,5 +70,12 @@ TEST_CASE("Messages of chunks that overlap come in order of time and of the file
   CHECK((merged.loads == times.size()) == (held_bytes > 25));
 }
 
+TEST_CASE("Messages are dropped if their chunk begins earlier than stated", "[recordings]") {
+  const Merged merged = merge({{100, 101, 102, 103}, {99, 100, 103, 104}}, {100, 102});
+  CHECK(merged.lost == std::vector<Stamp>{99, 100});
+  check_order(merged.messages);
+  CHECK(merged.messages.size() == 6);
+}
+
 }  // namespace
 }  // namespace km

@@ -6,7 +6,6 @@
 #include <filesystem>
 
 #include "modules/core/input_file.hpp"
-#include "modules/recordings/db3_reader.hpp"
 #include "modules/recordings/open_bag.hpp"
 #include "modules/recordings/ros_messages.hpp"
 #include "test/modules/recordings/listed_sum.hpp"
@@ -114,20 +113,20 @@ TEST_CASE("Messages of a database come in order of time and id", "[recordings]")
   const bool has_index = GENERATE(true, false);
   const fs::path path =
       database_of(folder, "a b%?#.db3", std::string(kTables) + (has_index ? kIndex : "") + kRows);
-  Db3Reader reader(path);
-  REQUIRE(reader.channels().size() == 2);
-  CHECK(reader.channels()[0].message_count == 3);
-  CHECK(reader.channels()[1].topic == "/odom");
-  CHECK(reader.channels()[1].type == "nav_msgs/msg/Odometry");
-  CHECK(reader.channels()[1].encoding == "cdr");
-  const auto messages = messages_of(reader);
+  const auto reader = open_db3(path);
+  REQUIRE(reader->channels().size() == 2);
+  CHECK(reader->channels()[0].message_count == 3);
+  CHECK(reader->channels()[1].topic == "/odom");
+  CHECK(reader->channels()[1].type == "nav_msgs/msg/Odometry");
+  CHECK(reader->channels()[1].encoding == "cdr");
+  const auto messages = messages_of(*reader);
   REQUIRE(messages.size() == 4);
   CHECK(messages[0].bytes == std::vector<std::uint8_t>{2});
   CHECK(messages[0].channel == 1);
   CHECK(messages[1].bytes == std::vector<std::uint8_t>{3});
   CHECK(messages[2].log_time == 20);
   CHECK(messages[3].bytes.empty());
-  CHECK(to_string(reader.report()) == "");
+  CHECK(to_string(reader->report()) == "");
   CHECK(names_in(folder.path()) == std::vector<std::string>{"a b%?#.db3"});
 }
 
@@ -139,8 +138,7 @@ TEST_CASE("Messages in a write-ahead log are read", "[recordings]") {
   recorder.run(kTables);
   recorder.run(kRows);
   REQUIRE(fs::file_size(path.string() + "-wal") > 0);
-  Db3Reader reader(path);
-  CHECK(messages_of(reader).size() == 4);
+  CHECK(messages_of(*open_db3(path)).size() == 4);
 }
 
 TEST_CASE("Rows that are no messages are lost with their place", "[recordings]") {
@@ -150,9 +148,9 @@ TEST_CASE("Rows that are no messages are lost with their place", "[recordings]")
                   std::string(kTables) + kRows +
                       "INSERT INTO messages VALUES (7, 99, 40, x'01'), (8, 3, 'noon', x'01'),"
                       " (9, 3, 40, 'text');");
-  Db3Reader reader(path);
-  CHECK(messages_of(reader).size() == 4);
-  const BagReport report = reader.report();
+  const auto reader = open_db3(path);
+  CHECK(messages_of(*reader).size() == 4);
+  const BagReport report = reader->report();
   CHECK(report.count(BagFault::kUnknownChannel) == 1);
   CHECK(report.count(BagFault::kMalformed) == 2);
   CHECK(report.entries().at(BagFault::kUnknownChannel).first ==
@@ -161,17 +159,17 @@ TEST_CASE("Rows that are no messages are lost with their place", "[recordings]")
 
 TEST_CASE("A database without the tables is refused and its views are not run", "[recordings]") {
   const TemporaryFolder folder;
-  CHECK_THROWS_WITH(Db3Reader(database_of(folder, "a.db3", "CREATE TABLE other(id INTEGER);")),
+  CHECK_THROWS_WITH(open_db3(database_of(folder, "a.db3", "CREATE TABLE other(id INTEGER);")),
                     Catch::Contains("a.db3: no table topics"));
   const std::string endless =
       "CREATE TABLE topics(id INTEGER PRIMARY KEY, name, type, serialization_format);"
       "CREATE VIEW messages AS WITH RECURSIVE n(id) AS (SELECT 1 UNION ALL SELECT id FROM n)"
       " SELECT id, 1 AS topic_id, 1 AS timestamp, x'' AS data FROM n;";
-  CHECK_THROWS_WITH(Db3Reader(database_of(folder, "b.db3", endless)),
+  CHECK_THROWS_WITH(open_db3(database_of(folder, "b.db3", endless)),
                     Catch::Contains("b.db3: no table messages"));
-  CHECK_THROWS_WITH(Db3Reader(folder.write("c.db3", "SQLite")),
+  CHECK_THROWS_WITH(open_db3(folder.write("c.db3", "SQLite")),
                     Catch::Contains("c.db3: not a SQLite database"));
-  check_no_files<InputFileError>(".db3", [](const fs::path& path) { Db3Reader{path}; });
+  check_no_files<InputFileError>(".db3", [](const fs::path& path) { (void)open_db3(path); });
 }
 
 TEST_CASE("Several files of a folder are one recording", "[recordings]") {
@@ -218,11 +216,10 @@ TEST_CASE("Corrupted databases are refused or read in order", "[recordings]") {
       std::string(kTables) + kIndex + kRows +
           "WITH RECURSIVE n(id) AS (SELECT 10 UNION ALL SELECT id + 1 FROM n WHERE id < 400)"
           " INSERT INTO messages SELECT id, 3, id * 7919 % 1000, zeroblob(id * id % 5000) FROM n;");
-  check_corrupted<InputFileError>(read_input_file(good), folder.path().string(),
-                                  [&](const std::string& bytes) {
-                                    Db3Reader reader(folder.write("a.db3", bytes));
-                                    check_order(messages_of(reader));
-                                  });
+  check_corrupted<InputFileError>(
+      read_input_file(good), folder.path().string(), [&](const std::string& bytes) {
+        check_order(messages_of(*open_db3(folder.write("a.db3", bytes))));
+      });
 }
 
 }  // namespace km

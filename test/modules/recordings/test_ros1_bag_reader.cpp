@@ -3,8 +3,9 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "modules/core/bytes.hpp"
 #include "modules/core/input_file.hpp"
-#include "modules/recordings/ros1_bag_reader.hpp"
+#include "modules/recordings/open_bag.hpp"
 #include "modules/recordings/ros_messages.hpp"
 #include "test/modules/recordings/listed_sum.hpp"
 #include "test/support/corrupted_input.hpp"
@@ -61,7 +62,7 @@ class BagFile {
     field(header, "index_pos", position.release());
     field(header, "conn_count", u32(2));
     field(header, "chunk_count", u32(static_cast<std::uint32_t>(chunks_.size())));
-    put(file_, header, Bytes(kHeaderRecord_bytes - 8 - header_size(header), ' '));
+    put(file_, header, Bytes(kHeaderRecord_bytes - 8 - header.size(), ' '));
     file_.bytes(chunks);
     if (has_index) put_index(begin);
     const Bytes whole = file_.release();
@@ -90,7 +91,6 @@ class BagFile {
     out.u32(0);
     return out.release();
   }
-  static std::size_t header_size(const ByteWriter& header) { return header.size(); }
   static void field(ByteWriter& out, const std::string& name, const Bytes& value) {
     out.u32(static_cast<std::uint32_t>(name.size() + 1 + value.size()));
     out.bytes(octets(name + '='));
@@ -171,26 +171,26 @@ TEST_CASE("Bags of ROS 1 give the same messages as ROS' own reader", "[recording
   CAPTURE(known.file);
   const auto file = shared_data(std::string("ros_recordings/rosbag1/") + known.file);
   if (!file) return;
-  Ros1BagReader summed(*file);
-  CHECK(sum_of(summed) == known.sum);
-  CHECK(to_string(summed.report()) == "");
+  const auto summed = open_ros1_bag(*file);
+  CHECK(sum_of(*summed) == known.sum);
+  CHECK(to_string(summed->report()) == "");
 
-  Ros1BagReader reader(*file);
-  CHECK(reader.channels().size() == known.topics);
-  const auto messages = messages_of(reader);
+  const auto reader = open_ros1_bag(*file);
+  CHECK(reader->channels().size() == known.topics);
+  const auto messages = messages_of(*reader);
   check_order(messages);
-  std::vector<std::uint64_t> counts(reader.channels().size());
+  std::vector<std::uint64_t> counts(reader->channels().size());
   for (const BagMessage& message : messages) ++counts[message.channel];
   for (std::size_t i = 0; i < counts.size(); ++i)
-    CHECK(counts[i] == reader.channels()[i].message_count);
+    CHECK(counts[i] == reader->channels()[i].message_count);
 }
 
 TEST_CASE("Poses in a bag of ROS 1 are decoded", "[recordings]") {
   const auto file = shared_data("ros_recordings/rosbag1/ROS_example.bag");
   if (!file) return;
-  Ros1BagReader reader(*file);
-  for (auto message = reader.next(); message; message = reader.next()) {
-    const BagChannel& channel = reader.channels()[message->channel];
+  const auto reader = open_ros1_bag(*file);
+  for (auto message = reader->next(); message; message = reader->next()) {
+    const BagChannel& channel = reader->channels()[message->channel];
     REQUIRE(is_of_type(channel, RosPoseStamped::kType));
     const auto pose = decode_ros<RosPoseStamped>(channel.encoding, message->bytes);
     REQUIRE(pose.value);
@@ -208,17 +208,17 @@ TEST_CASE("Poses in a bag of ROS 1 are decoded", "[recordings]") {
 TEST_CASE("A bag is read the same with and without an index", "[recordings]") {
   const bool has_index = GENERATE(true, false);
   const TemporaryFolder folder;
-  Ros1BagReader reader(folder.write("a.bag", small_bag(has_index)));
-  REQUIRE(reader.channels().size() == 2);
-  CHECK(reader.channels()[1].topic == "/imu1");
-  CHECK(reader.channels()[1].type == "sensor_msgs/Imu");
-  CHECK(reader.channels()[1].encoding == "ros1");
-  CHECK(reader.channels()[1].message_count == 6);
+  const auto reader = open_ros1_bag(folder.write("a.bag", small_bag(has_index)));
+  REQUIRE(reader->channels().size() == 2);
+  CHECK(reader->channels()[1].topic == "/imu1");
+  CHECK(reader->channels()[1].type == "sensor_msgs/Imu");
+  CHECK(reader->channels()[1].encoding == "ros1");
+  CHECK(reader->channels()[1].message_count == 6);
   std::vector<std::uint8_t> order;
-  for (const BagMessage& message : messages_of(reader)) order.push_back(message.bytes.at(0));
+  for (const BagMessage& message : messages_of(*reader)) order.push_back(message.bytes.at(0));
   // 80, 87, 90, 94, 97, 100, 101, 104, 107, 111, 114, 121 s
   CHECK(order == std::vector<std::uint8_t>{8, 9, 4, 10, 5, 0, 11, 6, 1, 7, 2, 3});
-  CHECK(reader.report().count(BagFault::kIndex) == (has_index ? 0 : 1));
+  CHECK(reader->report().count(BagFault::kIndex) == (has_index ? 0 : 1));
 }
 
 TEST_CASE("The complete chunks of a truncated bag are read", "[recordings]") {
@@ -227,12 +227,12 @@ TEST_CASE("The complete chunks of a truncated bag are read", "[recordings]") {
   std::size_t before = 0;
   for (std::size_t size = 4200; size < whole.size(); size += 7) {
     CAPTURE(size);
-    Ros1BagReader reader(folder.write("a.bag", whole.substr(0, size)));
-    const auto messages = messages_of(reader);
+    const auto reader = open_ros1_bag(folder.write("a.bag", whole.substr(0, size)));
+    const auto messages = messages_of(*reader);
     check_order(messages);
     CHECK(messages.size() % 4 == 0);
     CHECK(messages.size() >= before);
-    CHECK(reader.report().count(BagFault::kIndex) == 1);
+    CHECK(reader->report().count(BagFault::kIndex) == 1);
     before = messages.size();
   }
   CHECK(before >= 8);
@@ -246,20 +246,20 @@ TEST_CASE("Corrupted bags are refused or read in order", "[recordings]") {
   const std::string bag =
       recorded.empty() ? small_bag(GENERATE(true, false)) : read_input_file(*file);
   check_corrupted<InputFileError>(bag, folder.path().string(), [&](const std::string& bytes) {
-    Ros1BagReader reader(folder.write("a.bag", bytes));
-    check_order(messages_of(reader));
-    const BagReport report = reader.report();
+    const auto reader = open_ros1_bag(folder.write("a.bag", bytes));
+    check_order(messages_of(*reader));
+    const BagReport report = reader->report();
     for (const auto& [fault, entry] : report.entries())
       CHECK(entry.first.find("a.bag byte ") != entry.first.npos);
   });
 }
 
 TEST_CASE("A file that is no bag of version 2 is refused by name", "[recordings]") {
-  check_no_files<InputFileError>(".bag", [](const fs::path& path) { Ros1BagReader{path}; });
+  check_no_files<InputFileError>(".bag", [](const fs::path& path) { (void)open_ros1_bag(path); });
   const TemporaryFolder folder;
-  CHECK_THROWS_WITH(Ros1BagReader(folder.write("a.bag", "#ROSBAG V1.2\n")),
+  CHECK_THROWS_WITH(open_ros1_bag(folder.write("a.bag", "#ROSBAG V1.2\n")),
                     Catch::Contains("a.bag byte 0: does not begin as bags of version 2.0"));
-  CHECK_THROWS_WITH(Ros1BagReader(folder.write("b.bag", "#ROSBAG V2.0\n")),
+  CHECK_THROWS_WITH(open_ros1_bag(folder.write("b.bag", "#ROSBAG V2.0\n")),
                     Catch::Contains("b.bag byte 13: no bag header"));
 }
 

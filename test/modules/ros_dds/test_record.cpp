@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "modules/recordings/mcap_reader.hpp"
+#include "modules/recordings/open_bag.hpp"
 #include "modules/recordings/ros_messages.hpp"
 #include "modules/ros_dds/mcap_sink.hpp"
 #include "modules/ros_dds/mesh_cloud.hpp"
@@ -149,9 +149,9 @@ TEST_CASE("A robot's record holds the published messages and the final states", 
   CHECK(lost.empty());
   CHECK(node.dropped() == 0);
 
-  McapReader reader(file);
-  const auto messages = topic_messages_of(reader);
-  CHECK(to_string(reader.report()) == "");
+  const auto reader = open_mcap(file);
+  const auto messages = topic_messages_of(*reader);
+  CHECK(to_string(reader->report()) == "");
   CHECK(count(messages, "/bob_3/odometry") == 30);
   CHECK(count(messages, "/bob_3/pose") == 30);
   CHECK(count(messages, "/bob_3/path") == 2);
@@ -233,9 +233,9 @@ TEST_CASE("The map frame of a robot that has not joined has no parent frame", "[
   trajectories.publish(straight(anchor));
   node.stop();
   node.finish({}, {}, {});
-  McapReader reader(file);
+  const auto reader = open_mcap(file);
   std::set<std::pair<std::string, std::string>> links;
-  for (const TopicMessage& message : topic_messages_of(reader)) {
+  for (const TopicMessage& message : topic_messages_of(*reader)) {
     if (message.topic != "/tf") continue;
     const auto transforms = decode_ros<RosTFMessage>("cdr", message.bytes);
     REQUIRE(transforms.value);
@@ -273,13 +273,13 @@ TEST_CASE("The record of a killed process is complete up to the last flush", "[r
   for (Stamp k = 1; k < 5; ++k) sink.put(topic, k, encode_ros(RosPoseStamped{{k, "map"}, {}}));
   sink.flush();
   sink.put(topic, 5, encode_ros(RosPoseStamped{}));
-  McapReader reader(file);
-  const auto messages = topic_messages_of(reader);
+  const auto reader = open_mcap(file);
+  const auto messages = topic_messages_of(*reader);
   REQUIRE(messages.size() == 4);
   CHECK(messages[0].log_time == 1);
   CHECK(messages[0].type == "geometry_msgs/msg/PoseStamped");
   CHECK(messages[0].encoding == "cdr");
-  CHECK(reader.report().count(BagFault::kTruncated) == 1);
+  CHECK(reader->report().count(BagFault::kTruncated) == 1);
 }
 
 }  // namespace km
