@@ -15,7 +15,7 @@
 #include "modules/images/image_codec.hpp"
 #include "modules/images/image_view.hpp"
 #include "modules/mesh/mesh_file.hpp"
-#include "modules/sensors/node/euroc_rig.hpp"
+#include "modules/sensors/node/open_folder.hpp"
 
 namespace km {
 namespace {
@@ -47,7 +47,7 @@ std::map<Stamp, SE3> poses_in(const fs::path& results) {
 void add_robot(ColmapModel& model, const fs::path& results, const fs::path& dataset,
                const fs::path& images) {
   const std::map<Stamp, SE3> poses = poses_in(results);
-  EurocReader reader = open_euroc(dataset);
+  FolderReader reader = open_folder(dataset);
   const Camera& camera = reader.rig().stereo.cameras[0];
   const std::string name = fs::absolute(results).lexically_normal().filename().string();
   fs::create_directories(images / name);

@@ -6,7 +6,7 @@
 #include <iostream>
 #include <stdexcept>
 
-#include "modules/sensors/node/euroc_rig.hpp"
+#include "modules/sensors/node/open_folder.hpp"
 #include "modules/vio/vio.hpp"
 #include "tum_row.hpp"
 
@@ -15,12 +15,12 @@ namespace {
 
 int run(int argc, char** argv) {
   if (argc < 3) throw std::invalid_argument("usage: run_odometry FOLDER POSES.tum [SECONDS]");
-  EurocOptions part;
-  if (argc > 3) part.to_s = std::atof(argv[3]);
+  FolderOptions options;
+  if (argc > 3) options.part.to_s = std::atof(argv[3]);
 
   // The reader takes the calibration from the folder. It skips faults of the recording and counts
   // them.
-  EurocReader reader = open_euroc(argv[1], part);
+  FolderReader reader = open_folder(argv[1], options);
   Vio vio(0, reader.rig(), TrackerConfig(), VioConfig());
 
   // A packet is an image with the inertial samples since the image before. The first poses come

@@ -20,7 +20,7 @@
 #include "modules/recordings/open_bag.hpp"
 #include "modules/ros_dds/node/live_bag.hpp"
 #include "modules/sensors/node/open_folder.hpp"
-#include "modules/sensors/ros_image.hpp"
+#include "modules/sensors/sensor_messages.hpp"
 #include "runtime/clock.hpp"
 #include "runtime/dds/ros_discovery.hpp"
 #include "runtime/log.hpp"
@@ -143,7 +143,7 @@ TopicSummary image_topic(const std::string& name, const std::string& type) {
 std::vector<TopicSummary> folder_topics(const fs::path& folder, FolderLayout layout) {
   const bool is_stereo = layout == FolderLayout::kKitti;
   const ImageFolder found =
-      layout == FolderLayout::kTum ? read_tum_folder(folder, {}) : read_image_folder(folder);
+      layout == FolderLayout::kTum ? read_tum_folder(folder, {}) : read_folder(folder);
   std::vector<TopicSummary> topics = {
       image_topic(is_stereo ? "left" : "color", to_string(layout)),
       image_topic(is_stereo ? "right" : "depth", to_string(layout))};

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "modules/core/input_file.hpp"
-#include "modules/sensors/image_folder.hpp"
+#include "modules/sensors/folder_layouts.hpp"
 #include "modules/sensors/text_file.hpp"
 
 namespace km {

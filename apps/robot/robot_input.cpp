@@ -16,10 +16,9 @@
 #include "modules/recordings/ros_messages.hpp"
 #include "modules/ros_dds/node/live_bag.hpp"
 #include "modules/sensors/bag_dataset.hpp"
-#include "modules/sensors/euroc_reader.hpp"
 #include "modules/sensors/node/open_folder.hpp"
 #include "modules/sensors/node/rig_file.hpp"
-#include "modules/sensors/pose_stream.hpp"
+#include "modules/sensors/sample_streams.hpp"
 #include "runtime/log.hpp"
 
 namespace km {
@@ -330,15 +329,17 @@ std::unique_ptr<DatasetReader> open_dataset(const RobotOptions& options, const R
   if (is_bag && !rig.messages) refuse_without_rig(options.dataset.string());
   if (is_bag)
     return open_messages(options, config, mapping, rig, std::move(ros), not_before, signals);
-  EurocOptions euroc{.from_s = options.from_s.value_or(0.0),
-                     .to_s = options.to_s.value_or(std::numeric_limits<double>::infinity()),
-                     .not_before = not_before,
-                     .correction = rig.correction,
-                     .imu = config.sensors.imu && options.odometry.empty(),
-                     .depth = config.sensors.depth || (mapping && mapping->reads_depth()),
-                     .labels = config.sensors.labels || (mapping && mapping->reads_labels())};
+  FolderOptions folder{
+      .part = {.from_s = options.from_s.value_or(0.0),
+               .to_s = options.to_s.value_or(std::numeric_limits<double>::infinity()),
+               .not_before = not_before},
+      .correction = rig.correction,
+      .imu = config.sensors.imu && options.odometry.empty(),
+      .depth = config.sensors.depth || (mapping && mapping->reads_depth()),
+      .labels = config.sensors.labels || (mapping && mapping->reads_labels())};
   const bool has_correction = layout_of(options.dataset) == FolderLayout::kEuroc;
-  return open_folder(options.dataset, euroc, has_correction ? fs::path() : options.rig);
+  return std::make_unique<FolderReader>(
+      open_folder(options.dataset, folder, has_correction ? fs::path() : options.rig));
 }
 
 // Adds the odometry poses of a file if one is named.

@@ -12,11 +12,10 @@
 #include "modules/images/image_view.hpp"
 #include "modules/recordings/open_bag.hpp"
 #include "modules/recordings/ros_messages.hpp"
-#include "modules/sensors/euroc_reader.hpp"
-#include "modules/sensors/frame_files.hpp"
+#include "modules/sensors/euroc_folder.hpp"
 #include "modules/sensors/node/open_folder.hpp"
 #include "modules/sensors/node/rig_file.hpp"
-#include "modules/sensors/ros_image.hpp"
+#include "modules/sensors/sensor_messages.hpp"
 
 namespace km {
 namespace {
@@ -69,14 +68,14 @@ using Wanted = std::map<Stamp, KeyframeId>;
 using Take = std::function<void(const KeyframeId&, const cv::Mat&)>;
 
 // `problems` receives the reason for each image that cannot be read.
-void read_folder(const RobotPlan& plan, const Wanted& wanted, const Take& take,
+void read_images(const RobotPlan& plan, const Wanted& wanted, const Take& take,
                  std::vector<std::string>& problems) {
   const fs::path rig = argument_of(plan, "--rig");
   const bool is_euroc = layout_of(plan.dataset) == FolderLayout::kEuroc;
   const double offset_s = rig.empty() || !is_euroc ? 0.0 : read_rig_correction(rig).offset_s;
   ReaderReport report;
   for (const StereoPairFile& file : is_euroc ? list_euroc_lefts(find_mav0(plan.dataset), report)
-                                             : read_image_folder(plan.dataset, rig).frames)
+                                             : read_folder(plan.dataset, {}, rig).frames)
     if (const auto at = wanted.find(file.stamp + nanoseconds(offset_s)); at != wanted.end()) {
       try {
         take(at->second, read_pixels(file.left, DecodedPixels::kEightBits));
@@ -134,7 +133,7 @@ ClosureImages closure_images(const std::vector<RobotResult>& robots,
     std::vector<std::string> problems;
     try {
       may_be_bag(robot.plan.dataset) ? read_bag(robot.plan, wanted, take)
-                                     : read_folder(robot.plan, wanted, take, problems);
+                                     : read_images(robot.plan, wanted, take, problems);
     } catch (const std::exception& error) {
       images.notes.push_back(robot.plan.name + ": no images of its closures: " + error.what());
     }

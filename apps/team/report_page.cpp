@@ -14,7 +14,6 @@
 #include <utility>
 
 #include "apps/output_file.hpp"
-#include "apps/robot/pose_holes.hpp"
 #include "apps/team/closure_images.hpp"
 #include "apps/team/team_report.hpp"
 #include "modules/charts/html_page.hpp"

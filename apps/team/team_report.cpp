@@ -103,20 +103,20 @@ std::string closure_table(const TeamResult& team) {
   const auto add = [&](const std::string& name, const RunSummary& summary) {
     const ClosureCounts& closures = summary.closures;
     rows.push_back({name, std::to_string(closures.candidates), std::to_string(closures.verified),
-                    std::to_string(closures.inliers), std::to_string(summary.pgo.rounds),
+                    std::to_string(closures.inliers), std::to_string(summary.pgo.round),
                     fixed(summary.pgo.seconds, 2)});
   };
   RunSummary sum;
   for (const RobotResult& robot : team.robots) {
     const RunSummary summary = robot.summary.value_or(RunSummary{});
-    const OptimizerSummary& pgo = summary.pgo;
+    const OptimizerProgress& pgo = summary.pgo;
     add(robot.plan.name, summary);
-    append(rows.back(), {fixed(pgo.cost, 3), pgo.anchor ? std::to_string(*pgo.anchor) : "-",
+    append(rows.back(), {fixed(pgo.cost, 3), robot.summary ? std::to_string(pgo.anchor) : "-",
                          std::to_string(pgo.members.size()) + " robots"});
     sum.closures.candidates += summary.closures.candidates;
     sum.closures.verified += summary.closures.verified;
     sum.closures.inliers += summary.closures.inliers;
-    sum.pgo.rounds = std::max(sum.pgo.rounds, pgo.rounds);
+    sum.pgo.round = std::max(sum.pgo.round, pgo.round);
     sum.pgo.seconds = std::max(sum.pgo.seconds, pgo.seconds);
   }
   add("team", sum);

@@ -12,7 +12,6 @@
 #include "modules/core/input_file.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
 #include "modules/mesh/mesh_file.hpp"
-#include "modules/sensors/node/euroc_rig.hpp"
 #include "modules/sensors/node/open_folder.hpp"
 
 namespace km {
@@ -87,7 +86,7 @@ std::optional<MeshChange> compare(const LabelledMesh& truth, Meshes before, Mesh
 std::optional<Camera> camera_of(const TeamPlan& plan) {
   for (const RobotPlan& robot : plan.robots)
     if (!robot.dataset.empty())
-      return open_folder(robot.dataset, {}, argument_of(robot, "--rig"))->rig().stereo.cameras[0];
+      return open_folder(robot.dataset, {}, argument_of(robot, "--rig")).rig().stereo.cameras[0];
   return std::nullopt;
 }
 
@@ -243,22 +242,18 @@ fs::path argument_of(const RobotPlan& plan, const std::string& option) {
 
 std::optional<RobotId> frame_of(const RobotResult& robot) {
   if (!robot.summary) return std::nullopt;
-  const OptimizerSummary& pgo = robot.summary->pgo;
+  const OptimizerProgress& pgo = robot.summary->pgo;
   return pgo.members.size() > 1 ? pgo.anchor : robot.plan.id;
 }
 
 std::optional<TimeWindow> recorded_window(const RobotPlan& plan) {
   if (plan.dataset.empty()) return std::nullopt;
-  EurocOptions options;
-  options.from_s = plan.from_s.value_or(options.from_s);
-  options.to_s = plan.to_s.value_or(options.to_s);
-  if (layout_of(plan.dataset) != FolderLayout::kEuroc) {
-    ImageFolder folder = read_image_folder(plan.dataset, argument_of(plan, "--rig"));
-    keep_part({options.from_s, options.to_s, {}}, folder.list, folder.frames);
-    return TimeWindow{folder.frames.front().stamp, folder.frames.back().stamp};
-  }
-  const EurocReader reader = open_euroc(plan.dataset, options);
-  return TimeWindow{reader.first_stamp(), reader.last_stamp()};
+  FolderOptions options;
+  options.part.from_s = plan.from_s.value_or(options.part.from_s);
+  options.part.to_s = plan.to_s.value_or(options.part.to_s);
+  const FolderReader reader = open_folder(plan.dataset, options, argument_of(plan, "--rig"));
+  const std::vector<StereoPairFile>& frames = reader.folder().frames;
+  return TimeWindow{frames.front().stamp, frames.back().stamp};
 }
 
 void find_team_frame(std::vector<RobotResult>& robots) {

@@ -10,11 +10,9 @@
 #include "modules/recordings/bag_reader.hpp"
 #include "modules/sensors/dataset_reader.hpp"
 #include "modules/sensors/frame_joiner.hpp"
-#include "modules/sensors/imu_stream.hpp"
-#include "modules/sensors/missing_images.hpp"
-#include "modules/sensors/pose_stream.hpp"
-#include "modules/sensors/sensor_kind.hpp"
-#include "modules/sensors/stamp_order.hpp"
+#include "modules/sensors/sample_streams.hpp"
+#include "modules/sensors/sensor_messages.hpp"
+#include "modules/sensors/stream_stamps.hpp"
 
 namespace km {
 

@@ -7,8 +7,8 @@
 
 #include "modules/recordings/bag_reader.hpp"
 #include "modules/sensors/dataset_reader.hpp"
-#include "modules/sensors/sensor_kind.hpp"
-#include "modules/sensors/synchrony.hpp"
+#include "modules/sensors/sensor_messages.hpp"
+#include "modules/sensors/stream_stamps.hpp"
 
 namespace km {
 

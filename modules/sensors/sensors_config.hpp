@@ -1,8 +1,22 @@
 #pragma once
 
+#include <limits>
+
 #include "modules/core/config.hpp"
 
 namespace km {
+
+/// How fast a recording is played.
+struct PlaybackPace {
+  double rate = 1.0;  ///< Seconds of the recording per second; infinity: as fast as possible.
+  /// If the robot is too slow, the recording waits for it, and every image is used. Otherwise the
+  /// robot leaves images out, as it does with live cameras. An infinite rate always waits.
+  bool waits = true;
+
+  [[nodiscard]] static PlaybackPace fastest() {
+    return {std::numeric_limits<double>::infinity(), true};
+  }
+};
 
 /// Parameters of reading and playing a recording.
 struct SensorsConfig {

@@ -5,7 +5,7 @@
 
 #include "modules/core/input_file.hpp"
 #include "modules/sensors/dataset_reader.hpp"
-#include "modules/sensors/stamp_order.hpp"
+#include "modules/sensors/stream_stamps.hpp"
 
 namespace km {
 namespace {

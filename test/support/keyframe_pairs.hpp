@@ -4,7 +4,7 @@
 #include <utility>
 #include <vector>
 
-#include "modules/sensors/frame_files.hpp"
+#include "modules/sensors/euroc_folder.hpp"
 #include "modules/sensors/text_file.hpp"
 
 namespace km {

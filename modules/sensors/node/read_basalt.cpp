@@ -1,7 +1,7 @@
 #include <algorithm>
 
 #include "modules/core/calibration_limits.hpp"
-#include "modules/sensors/node/read_camera.hpp"
+#include "modules/sensors/node/calibration_map.hpp"
 #include "modules/sensors/node/rig_calibration.hpp"
 
 namespace km {

@@ -3,7 +3,7 @@
 
 #include "modules/core/calibration_limits.hpp"
 #include "modules/sensors/dataset_reader.hpp"
-#include "modules/sensors/node/read_camera.hpp"
+#include "modules/sensors/node/calibration_map.hpp"
 #include "modules/sensors/node/rig_calibration.hpp"
 
 namespace km {

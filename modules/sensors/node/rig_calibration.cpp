@@ -1,7 +1,7 @@
 #include "modules/sensors/node/rig_calibration.hpp"
 
 #include "modules/core/input_file.hpp"
-#include "modules/sensors/node/euroc_rig.hpp"
+#include "modules/sensors/node/open_folder.hpp"
 
 namespace km {
 namespace {

@@ -13,7 +13,6 @@
 
 #include "modules/core/frame.hpp"
 #include "modules/sensors/dataset_reader.hpp"
-#include "modules/sensors/playback_pace.hpp"
 #include "modules/sensors/sensors_config.hpp"
 #include "runtime/clock.hpp"
 #include "runtime/guarded_thread.hpp"

@@ -98,7 +98,7 @@ struct HalfTeam : Team {
     summary.keyframes = 12;
     summary.frames = 150;
     summary.closures = {9, 5, 4};
-    summary.pgo.rounds = 33;
+    summary.pgo.round = 33;
     summary.traffic = {{"place_recognition", 2000},
                        {"geometric_verification", 3000000},
                        {"pgo", 400},

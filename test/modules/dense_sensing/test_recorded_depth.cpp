@@ -8,8 +8,7 @@
 
 #include "modules/dense_sensing/stereo_depth.hpp"
 #include "modules/images/image_view.hpp"
-#include "modules/sensors/frame_files.hpp"
-#include "modules/sensors/node/euroc_rig.hpp"
+#include "modules/sensors/node/open_folder.hpp"
 #include "test/support/keyframe_pairs.hpp"
 #include "test/support/shared_data.hpp"
 

@@ -11,7 +11,7 @@
 
 #include "modules/diagnosis/examine_sensors.hpp"
 #include "modules/diagnosis/stereo_fit.hpp"
-#include "modules/sensors/node/euroc_rig.hpp"
+#include "modules/sensors/node/open_folder.hpp"
 #include "test/support/demo_world.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/temporary_folder.hpp"
@@ -29,7 +29,7 @@ struct Recorded {
 };
 
 Recorded read(const fs::path& folder, double to_s) {
-  EurocReader reader = open_euroc(folder, {.to_s = to_s});
+  FolderReader reader = open_folder(folder, {.part = {.to_s = to_s}});
   SensorSampler sampler;
   while (const auto packet = reader.next()) sampler.add(*packet);
   return {sampler.sample(), reader.rig(), reader.report()};

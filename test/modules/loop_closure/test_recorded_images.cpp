@@ -8,7 +8,7 @@
 #include "modules/evaluation/trajectory_file.hpp"
 #include "modules/loop_closure/keyframe_features.hpp"
 #include "modules/loop_closure/verifier.hpp"
-#include "modules/sensors/node/euroc_rig.hpp"
+#include "modules/sensors/node/open_folder.hpp"
 #include "test/support/keyframe_pairs.hpp"
 #include "test/support/random_pose.hpp"
 #include "test/support/recorded_kitchen.hpp"

@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "modules/sensors/node/euroc_rig.hpp"
+#include "modules/sensors/node/open_folder.hpp"
 #include "test/support/image_file.hpp"
 #include "test/support/temporary_folder.hpp"
 
@@ -152,8 +152,8 @@ struct Outcome {
   ReaderReport report;
 };
 
-inline Outcome read(const EurocFolder& folder, const EurocOptions& options = {}) {
-  EurocReader reader = open_euroc(folder.root(), options);
+inline Outcome read(const EurocFolder& folder, const FolderOptions& options = {}) {
+  FolderReader reader = open_folder(folder.root(), options);
   Outcome outcome{packets_of(reader), {}};
   outcome.report = reader.report();
   return outcome;

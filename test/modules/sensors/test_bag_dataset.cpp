@@ -7,7 +7,7 @@
 
 #include "modules/images/image_codec.hpp"
 #include "modules/sensors/bag_dataset.hpp"
-#include "modules/sensors/ros_image.hpp"
+#include "modules/sensors/sensor_messages.hpp"
 #include "test/modules/sensors/euroc_folder.hpp"
 #include "test/modules/sensors/listed_bag.hpp"
 

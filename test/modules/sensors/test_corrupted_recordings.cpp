@@ -6,7 +6,7 @@
 
 #include "modules/core/imu_limits.hpp"
 #include "modules/sensors/image_file.hpp"
-#include "modules/sensors/node/euroc_rig.hpp"
+#include "modules/sensors/node/open_folder.hpp"
 #include "test/modules/sensors/euroc_folder.hpp"
 #include "test/support/corrupted_input.hpp"
 #include "test/support/image_file.hpp"
@@ -40,7 +40,7 @@ void check_rig(const SensorRig& rig) {
 }
 
 // Invariants of a reader for any files.
-void check_recording(EurocReader& reader) {
+void check_recording(FolderReader& reader) {
   check_rig(reader.rig());
   Stamp last = 0;
   for (const SensorPacket& packet : packets_of(reader)) {
@@ -114,7 +114,7 @@ TEST_CASE("A bad row is skipped and counted with its line and no other row is", 
   CAPTURE(row.what);
   const EurocFolder folder;
   corrupt_row(folder, row);
-  EurocReader reader = open_euroc(folder.root());
+  FolderReader reader = open_folder(folder.root());
   CHECK(packets_of(reader).size() == row.packets);
   REQUIRE(reader.report().count(row.fault) == 1);
   const ReaderReport report = reader.report();
@@ -184,7 +184,7 @@ TEST_CASE("A corrupted list or calibration is refused or gives valid packets", "
   const std::string good = folder.read(file);
   check_corrupted<DatasetError>(good, folder.root().string(), [&](const std::string& text) {
     folder.write(file, text);
-    EurocReader reader = open_euroc(folder.root());
+    FolderReader reader = open_folder(folder.root());
     check_recording(reader);
   });
 }
@@ -214,7 +214,7 @@ TEST_CASE("A file of a recording that is not a file is refused by name", "[senso
   loop ? fs::create_symlink(place.filename(), place)
        : static_cast<void>(fs::create_directory(place));
   CHECK_THROWS_WITH(
-      open_euroc(folder.root()),
+      open_folder(folder.root()),
       place.string() + (loop ? ": Too many levels of symbolic links" : ": a folder, not a file"));
 }
 

@@ -1,4 +1,4 @@
-#include "modules/sensors/image_folder.hpp"
+#include "modules/sensors/folder_layouts.hpp"
 
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -53,23 +53,23 @@ TEST_CASE("A folder in KITTI's layout is read with its calibration", "[sensors][
   const TemporaryFolder folder;
   write_kitti(folder);
   CHECK(layout_of(folder.path()) == FolderLayout::kKitti);
-  const auto reader = open_folder(folder.path());
-  const StereoRig& rig = reader->rig().stereo;
-  CHECK_FALSE(reader->rig().has_imu);
+  FolderReader reader = open_folder(folder.path());
+  const StereoRig& rig = reader.rig().stereo;
+  CHECK_FALSE(reader.rig().has_imu);
   CHECK(rig.baseline_m() == Approx(0.5));
   CHECK(rig.cameras[0].width == 32);
   CHECK(rig.cameras[1].fx == 30.0);
   CHECK(rig.cameras[0].T_body_cam.isApprox(SE3::Identity()));  // the body is the left camera
   CHECK(rig.cameras[1].T_body_cam.translation().x() == Approx(0.5));
-  const auto packets = packets_of(*reader);
+  const auto packets = packets_of(reader);
   REQUIRE(packets.size() == kFrames);
   CHECK(packets[3].frame->stamp == 300'000'000);
   CHECK(packets[3].frame->left.pixels[0] == 30);
   CHECK(packets[3].frame->right.pixels[0] == 30);
   CHECK(packets[3].imu.empty());
-  CHECK(reader->report().empty());
-  CHECK(open_folder(folder.path(), {.from_s = 0.05, .to_s = 0.25})->pair_count() == 2);
-  CHECK_THROWS_AS(open_folder(folder.path(), {.from_s = 7.0}), DatasetError);
+  CHECK(reader.report().empty());
+  CHECK(open_folder(folder.path(), {.part = {.from_s = 0.05, .to_s = 0.25}}).pair_count() == 2);
+  CHECK_THROWS_AS(open_folder(folder.path(), {.part = {.from_s = 7.0}}), DatasetError);
   CHECK_THROWS_WITH(open_folder(folder.path(), {}, "camera.yaml"),
                     Catch::Contains("leave --rig out"));
 }
@@ -121,13 +121,13 @@ TEST_CASE("Faulty times and images of a folder in KITTI's layout are left out an
   write_kitti(folder);
   folder.write("times.txt", c.times);
   if (*c.missing != 0) fs::remove(folder.path() / c.missing);
-  const auto reader = open_folder(folder.path());
-  const auto packets = packets_of(*reader);
+  FolderReader reader = open_folder(folder.path());
+  const auto packets = packets_of(reader);
   CHECK(packets.size() == c.frames);
   for (const SensorPacket& packet : packets)  // rows stay with their images
     if (c.fault != kUnorderedStamp)
       CHECK(packet.frame->left.pixels[0] == std::lround(1e-7 * double(packet.frame->stamp)));
-  const ReaderReport report = reader->report();
+  const ReaderReport report = reader.report();
   REQUIRE(report.count(c.fault) == 1);
   CHECK_THAT(report.entries().at(c.fault).first, Catch::Contains(c.example));
 }
@@ -139,7 +139,8 @@ TEST_CASE("A folder in the layout of TUM RGB-D has the camera of its name", "[se
   CHECK(layout_of(root) == FolderLayout::kTum);
   CHECK(tum_camera(root / "").value().camera.fx == 520.9);
   // The images of this test are smaller than those of the benchmark.
-  CHECK(packets_of(*open_folder(root)).empty());
+  FolderReader reader = open_folder(root);
+  CHECK(packets_of(reader).empty());
   CHECK_FALSE(tum_camera(folder.path() / "desk"));
 }
 
@@ -153,12 +154,12 @@ TEST_CASE("The camera of a folder in the layout of TUM RGB-D can be described",
       folder.write("camera.yaml",
                    "resolution: [32, 24]\ncamera_model: pinhole\nintrinsics: [30, 30, 16, 12]\n"
                    "distortion_model: none\nmax_range_m: 5\nbaseline_m: 0.075\n");
-  const auto reader = open_folder(root, {}, camera);
-  CHECK_FALSE(reader->rig().has_imu);
-  CHECK(reader->rig().stereo.depth_source == DepthSource::kDepthImage);
-  CHECK(reader->rig().stereo.baseline_m() == Approx(0.075));
-  CHECK(reader->rig().depth->max_m == 5.0);
-  const auto packets = packets_of(*reader);
+  FolderReader reader = open_folder(root, {}, camera);
+  CHECK_FALSE(reader.rig().has_imu);
+  CHECK(reader.rig().stereo.depth_source == DepthSource::kDepthImage);
+  CHECK(reader.rig().stereo.baseline_m() == Approx(0.075));
+  CHECK(reader.rig().depth->max_m == 5.0);
+  const auto packets = packets_of(reader);
   REQUIRE(packets.size() == kFrames);
   for (std::size_t k = 0; k < packets.size(); ++k) {
     CHECK(std::abs(packets[k].frame->stamp -
@@ -167,11 +168,11 @@ TEST_CASE("The camera of a folder in the layout of TUM RGB-D can be described",
     if (k != 2) CHECK(packets[k].frame->depth->millimetres[0] == 2000);  // 10000 / 5000 m
   }
   std::ofstream(root / "rgb.txt") << "1305031102.0 rgb/0.png\n1305031102.1\nnan rgb/2.png\n";
-  const auto faulty = open_folder(root, {}, camera);
-  CHECK(packets_of(*faulty).size() == 1);
-  CHECK_THAT(faulty->report().entries().at(ReaderFault::kMalformedRow).first,
+  FolderReader faulty = open_folder(root, {}, camera);
+  CHECK(packets_of(faulty).size() == 1);
+  CHECK_THAT(faulty.report().entries().at(ReaderFault::kMalformedRow).first,
              Catch::Contains("rgb.txt line 2: 1 fields, expected 2"));
-  CHECK(faulty->report().count(ReaderFault::kMalformedRow) == 2);
+  CHECK(faulty.report().count(ReaderFault::kMalformedRow) == 2);
   std::ofstream(root / "depth.txt") << "1305031109.0 depth/0.png\n";
   CHECK_THROWS_WITH(open_folder(root, {}, camera),
                     Catch::EndsWith("rgb.txt: no depth image for any of 1 images: the stamps of "
@@ -193,8 +194,8 @@ void write_seven_scenes(const TemporaryFolder& folder) {
 TEST_CASE("A folder in the layout of 7-Scenes is read at 30 Hz", "[sensors][folder]") {
   const TemporaryFolder folder;
   write_seven_scenes(folder);
-  const auto reader = open_folder(folder.path());
-  const auto packets = packets_of(*reader);
+  FolderReader reader = open_folder(folder.path());
+  const auto packets = packets_of(reader);
   REQUIRE(packets.size() == 3);
   CHECK(packets[2].frame->stamp == 400'000'000);
   CHECK(packets[2].frame->left.pixels[0] == 12);

@@ -2,8 +2,7 @@
 
 #include "modules/core/lie.hpp"
 #include "modules/core/stamp.hpp"
-#include "modules/sensors/imu_stream.hpp"
-#include "modules/sensors/pose_stream.hpp"
+#include "modules/sensors/sample_streams.hpp"
 #include "test/modules/sensors/euroc_folder.hpp"
 
 namespace km {
@@ -133,7 +132,7 @@ TEST_CASE("Packets get the poses of a file and frames without one are counted",
           "[sensors][poses]") {
   const EurocFolder folder;  // eight frames from 10 s on, at 20 Hz
   folder.write("poses.tum", "10.025 0 0 0 0 0 0 1\n10.075 1 0 0 0 0 0 1\n10.225 4 0 0 0 0 0 1\n");
-  PoseFileReader reader(std::make_unique<EurocReader>(open_euroc(folder.root())),
+  PoseFileReader reader(std::make_unique<FolderReader>(open_folder(folder.root())),
                         folder.mav0() / "poses.tum");
   CHECK(reader.gives_poses());
   std::vector<double> x;

@@ -1,7 +1,7 @@
 #include <catch2/catch.hpp>
 #include <functional>
 
-#include "modules/sensors/node/euroc_rig.hpp"
+#include "modules/sensors/node/open_folder.hpp"
 #include "test/modules/sensors/euroc_folder.hpp"
 
 namespace km {
@@ -11,7 +11,7 @@ namespace fs = std::filesystem;
 
 // Checks that all frames are there, that the frame of index 2 lacks its depth (or labels), and that
 // the report contains only this fault, with `text` in its example.
-void check_image_lost(const EurocFolder& folder, const EurocOptions& options, ReaderFault fault,
+void check_image_lost(const EurocFolder& folder, const FolderOptions& options, ReaderFault fault,
                       const std::string& text) {
   const Outcome outcome = read(folder, options);
   REQUIRE(outcome.packets.size() == EurocFolder::kPairs);
@@ -56,7 +56,7 @@ TEST_CASE("Without a right camera, depth makes an RGB-D rig", "[sensors]") {
     CHECK(packet.frame->depth->height == 24);
     CHECK(packet.frame->depth->millimetres == std::vector<std::uint16_t>(32 * 24, 2000));
   }
-  CHECK(open_euroc(folder.mav0()).pair_count() == EurocFolder::kPairs);
+  CHECK(open_folder(folder.mav0()).pair_count() == EurocFolder::kPairs);
 }
 
 TEST_CASE("Range, scale and baseline of depth have defaults", "[sensors]") {
@@ -88,7 +88,7 @@ TEST_CASE("Depth and labels beside stereo are read on request", "[sensors]") {
   folder.add_labels(2);
   const bool depth = GENERATE(false, true), labels = GENERATE(false, true);
   CAPTURE(depth, labels);
-  EurocReader reader = open_euroc(folder.root(), {.depth = depth, .labels = labels});
+  FolderReader reader = open_folder(folder.root(), {.depth = depth, .labels = labels});
   CHECK(reader.rig().depth.has_value() == depth);
   CHECK(reader.rig().stereo.depth_source == DepthSource::kRightImage);
   const auto first = reader.next(), second = reader.next();
@@ -102,8 +102,8 @@ TEST_CASE("Depth and labels beside stereo are read on request", "[sensors]") {
 
 TEST_CASE("A recording without requested depth or labels is refused", "[sensors]") {
   const EurocFolder folder;
-  const auto refusal_with = [&](const EurocOptions& options, const std::string& end) {
-    CHECK_THROWS_WITH(open_euroc(folder.root(), options), Catch::Contains(end));
+  const auto refusal_with = [&](const FolderOptions& options, const std::string& end) {
+    CHECK_THROWS_WITH(open_folder(folder.root(), options), Catch::Contains(end));
   };
   refusal_with({.depth = true},
                "depth0/sensor.yaml: no such file: a EuRoC folder has the "
@@ -201,7 +201,7 @@ TEST_CASE("Depth that is not aligned with the left camera is refused", "[sensors
   const EurocFolder folder;
   folder.make_rgbd();
   folder.replace("depth0/sensor.yaml", c.from, c.to);
-  CHECK_THROWS_WITH(open_euroc(folder.root()),
+  CHECK_THROWS_WITH(open_folder(folder.root()),
                     Catch::Contains("depth0/sensor.yaml") && Catch::Contains(c.message));
 }
 
@@ -231,9 +231,9 @@ TEST_CASE("The palette maps labels from colours to ids", "[sensors]") {
   CHECK(ids[2] == 0);
   CHECK(ids[3] == 3);
   CHECK(outcome.report.count(ReaderFault::kUnknownColor) == 1);
-  CHECK(open_euroc(folder.root(), {.labels = true}).label_palette().find(7)->name == "tree");
+  CHECK(open_folder(folder.root(), {.labels = true}).folder().palette.find(7)->name == "tree");
   folder.write("label_palette.csv", "name,red,green,blue,alpha,id\nroad,128,64,300,255,3\n");
-  CHECK_THROWS_WITH(open_euroc(folder.root(), {.labels = true}),
+  CHECK_THROWS_WITH(open_folder(folder.root(), {.labels = true}),
                     Catch::Contains("label_palette.csv"));
   CHECK_THAT(outcome.report.entries().begin()->second.first, Catch::EndsWith(".png: 1 pixels"));
 }

@@ -17,7 +17,6 @@
 #include "modules/evaluation/association.hpp"
 #include "modules/evaluation/trajectory_error.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
-#include "modules/sensors/node/euroc_rig.hpp"
 #include "modules/sensors/node/open_folder.hpp"
 #include "modules/sensors/text_file.hpp"
 #include "test/support/temporary_folder.hpp"
@@ -111,20 +110,20 @@ void repeat(std::vector<SensorPacket>& packets, std::size_t count) {
 
 Recording read_recording(const std::filesystem::path& folder, double from_s, double to_s,
                          bool imu) {
-  EurocOptions options;
-  options.from_s = from_s;
-  options.to_s = to_s;
+  FolderOptions options;
+  options.part.from_s = from_s;
+  options.part.to_s = to_s;
   options.imu = imu;
-  const auto reader = open_folder(folder, options);
+  FolderReader reader = open_folder(folder, options);
   Recording result;
-  result.rig = reader->rig();
+  result.rig = reader.rig();
   const auto truth =
       layout_of(folder) == FolderLayout::kEuroc
           ? read_trajectory(folder / "mav0/state_groundtruth_estimate0")
           : read_camera_poses(folder, result.rig.stereo.cameras[0].T_body_cam.inverse());
   const Eigen::Matrix4d unknown =
       Eigen::Matrix4d::Constant(std::numeric_limits<double>::quiet_NaN());
-  while (auto packet = reader->next()) {
+  while (auto packet = reader.next()) {
     result.T_world_body.push_back(
         pose_at(truth, packet->frame->stamp, 0.1, 0.0).value_or(SE3(unknown)));
     result.packets.push_back(std::move(*packet));
@@ -180,7 +179,7 @@ OdometryErrors odometry_errors(std::span<const OdometryState> states, std::span<
 Recording standing_recording(const std::filesystem::path& folder, double duration_s) {
   const TemporaryFolder links;
   link_static_start(folder, links.path());
-  EurocReader reader = open_euroc(links.path());
+  FolderReader reader = open_folder(links.path());
   Recording result;
   result.rig = reader.rig();
   while (auto packet = reader.next()) result.packets.push_back(std::move(*packet));

@@ -6,7 +6,7 @@
 #include <map>
 #include <string>
 
-#include "modules/sensors/node/euroc_rig.hpp"
+#include "modules/sensors/node/open_folder.hpp"
 #include "test/support/command.hpp"
 #include "test/support/temporary_folder.hpp"
 
@@ -62,7 +62,7 @@ TEST_CASE("The ordinary reader reads a recording, and missing images are made ag
   const auto result = simulate(kSmall, output);
   CAPTURE(result.output);
   REQUIRE(result.exit_code == 0);
-  EurocReader reader = open_euroc(output / "robot1");
+  FolderReader reader = open_folder(output / "robot1");
   std::size_t frames = 0;
   std::size_t samples = 0;
   while (const auto packet = reader.next()) {
@@ -105,7 +105,7 @@ TEST_CASE("At the hardest level the reader reads the recording, with any number 
   REQUIRE(simulate(hard + "--threads 1", folder.path() / "b").exit_code == 0);
   check_equal(contents(folder, "a"), contents(folder, "b"));
   const fs::path robot = folder.path() / "a/robot1";
-  EurocReader reader = open_euroc(robot);
+  FolderReader reader = open_folder(robot);
   std::size_t frames = 0;
   while (const auto packet = reader.next()) ++frames;
   CHECK(frames > 0);

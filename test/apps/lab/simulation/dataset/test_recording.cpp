@@ -10,7 +10,7 @@
 #include "apps/lab/simulation/world/scene.hpp"
 #include "modules/core/json.hpp"
 #include "modules/core/lie.hpp"
-#include "modules/sensors/node/euroc_rig.hpp"
+#include "modules/sensors/node/open_folder.hpp"
 #include "test/support/temporary_folder.hpp"
 
 namespace km {

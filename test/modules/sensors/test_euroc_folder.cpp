@@ -1,7 +1,8 @@
 #include <catch2/catch.hpp>
 
-#include "modules/sensors/frame_files.hpp"
-#include "modules/sensors/node/euroc_rig.hpp"
+#include "modules/core/lie.hpp"
+#include "modules/sensors/dataset_reader.hpp"
+#include "modules/sensors/node/open_folder.hpp"
 #include "test/modules/sensors/euroc_folder.hpp"
 #include "test/support/shared_data.hpp"
 
@@ -35,7 +36,7 @@ std::string first_of(const ReaderReport& report, ReaderFault fault) {
 TEST_CASE("A recording without faults gives every pair and every sample between them",
           "[sensors]") {
   const EurocFolder folder(GENERATE(".png", ".jpg"));
-  EurocReader reader = open_euroc(folder.root());
+  FolderReader reader = open_folder(folder.root());
   const auto packets = packets_of(reader);
   REQUIRE(packets.size() == EurocFolder::kPairs);
   CHECK(reader.pair_count() == EurocFolder::kPairs);
@@ -58,8 +59,8 @@ TEST_CASE("A recording without faults gives every pair and every sample between 
 
 TEST_CASE("A window is half open and counts from the recording's first image", "[sensors]") {
   const EurocFolder folder;
-  EurocReader first = open_euroc(folder.root(), {.from_s = 0.0, .to_s = 0.2});
-  EurocReader second = open_euroc(folder.root(), {.from_s = 0.2, .to_s = 100.0});
+  FolderReader first = open_folder(folder.root(), {.part = {.from_s = 0.0, .to_s = 0.2}});
+  FolderReader second = open_folder(folder.root(), {.part = {.from_s = 0.2, .to_s = 100.0}});
   const auto a = packets_of(first);
   const auto b = packets_of(second);
   REQUIRE(a.size() == 4);
@@ -69,11 +70,13 @@ TEST_CASE("A window is half open and counts from the recording's first image", "
   // Samples begin a second before the first frame, and so before the window.
   CHECK(b.front().imu.front().stamp == b.front().frame->stamp - 1'000'000'000);
   CHECK(b.front().imu.size() == 201);
-  CHECK(second.first_stamp() == EurocFolder::image_stamp(4));
-  CHECK(second.last_stamp() == EurocFolder::image_stamp(7));
-  CHECK_THROWS_AS(open_euroc(folder.root(), {.from_s = 1.0, .to_s = 1.0}), std::invalid_argument);
-  CHECK_THROWS_AS(open_euroc(folder.root(), {.from_s = std::nan("")}), std::invalid_argument);
-  CHECK_THROWS_WITH(open_euroc(folder.root(), {.from_s = 1.0}),
+  CHECK(second.folder().frames.front().stamp == EurocFolder::image_stamp(4));
+  CHECK(second.folder().frames.back().stamp == EurocFolder::image_stamp(7));
+  CHECK_THROWS_AS(open_folder(folder.root(), {.part = {.from_s = 1.0, .to_s = 1.0}}),
+                  std::invalid_argument);
+  CHECK_THROWS_AS(open_folder(folder.root(), {.part = {.from_s = std::nan("")}}),
+                  std::invalid_argument);
+  CHECK_THROWS_WITH(open_folder(folder.root(), {.part = {.from_s = 1.0}}),
                     Catch::Contains("from 0 s to 0.35 s"));
 }
 
@@ -85,7 +88,7 @@ TEST_CASE("Blanks, comments, CRLF and a bare header in the lists are accepted", 
     list += "  " + stamp + " ,  " + stamp + ".png  # note\r\n\r\n";
   }
   folder.write("cam0/data.csv", list);
-  EurocReader reader = open_euroc(folder.root());
+  FolderReader reader = open_folder(folder.root());
   CHECK(packets_of(reader).size() == EurocFolder::kPairs);
   CHECK(reader.report().empty());
 }
@@ -93,9 +96,9 @@ TEST_CASE("Blanks, comments, CRLF and a bare header in the lists are accepted", 
 TEST_CASE("Stamps of left and right may differ by the tolerance", "[sensors]") {
   const EurocFolder folder;
   folder.replace("cam1/data.csv", "10100000000,", "10100900000,");
-  CHECK(open_euroc(folder.root()).pair_count() == 8);
+  CHECK(open_folder(folder.root()).pair_count() == 8);
   folder.replace("cam1/data.csv", "10100900000,", "10120000000,");
-  EurocReader strict = open_euroc(folder.root());
+  FolderReader strict = open_folder(folder.root());
   CHECK(strict.pair_count() == 7);
   CHECK(strict.report().count(ReaderFault::kLeftWithoutRight) == 1);
   CHECK(strict.report().count(ReaderFault::kRightWithoutLeft) == 1);
@@ -104,7 +107,7 @@ TEST_CASE("Stamps of left and right may differ by the tolerance", "[sensors]") {
 TEST_CASE("MH_01_easy: 320 pairs in 16 s, one step of 100 ms, covered by samples", "[sensors]") {
   const auto folder = shared_data("euroc/MH_01_easy");
   if (!folder) return;
-  EurocReader reader = open_euroc(*folder, {.from_s = 0.0, .to_s = 16.01});
+  FolderReader reader = open_folder(*folder, {.part = {.from_s = 0.0, .to_s = 16.01}});
   const auto packets = packets_of(reader);
   REQUIRE(packets.size() == 320);
   CHECK(reader.report().empty());
@@ -126,39 +129,39 @@ TEST_CASE("MH_01_easy: 320 pairs in 16 s, one step of 100 ms, covered by samples
 
 TEST_CASE("Missing files and folders are refused by name", "[sensors]") {
   const EurocFolder folder;
-  CHECK_THROWS_WITH(open_euroc("/nowhere/at/all"), "/nowhere/at/all: no such folder");
+  CHECK_THROWS_WITH(open_folder("/nowhere/at/all"), "/nowhere/at/all: no such folder");
   for (const std::string file : {"cam0/data.csv", "cam1/data.csv", "imu0/data.csv",
                                  "cam0/sensor.yaml", "cam1/sensor.yaml", "imu0/sensor.yaml"}) {
     CAPTURE(file);
     const EurocFolder corrupted;
     fs::remove(corrupted.mav0() / file);
-    CHECK_THROWS_WITH(open_euroc(corrupted.root()),
+    CHECK_THROWS_WITH(open_folder(corrupted.root()),
                       Catch::StartsWith((corrupted.mav0() / file).string() + ": no such file"));
   }
   fs::remove_all(folder.mav0() / "cam1");
   for (const fs::path& path : {folder.root(), folder.mav0()})
-    CHECK_THROWS_WITH(open_euroc(path), Catch::Contains("cam1/sensor.yaml: no such file") &&
-                                            Catch::Contains("nor depth0"));
+    CHECK_THROWS_WITH(open_folder(path), Catch::Contains("cam1/sensor.yaml: no such file") &&
+                                             Catch::Contains("nor depth0"));
   fs::remove_all(folder.mav0());
-  CHECK_THROWS_WITH(open_euroc(folder.root()),
+  CHECK_THROWS_WITH(open_folder(folder.root()),
                     Catch::EndsWith("neither a folder mav0 nor cam0 in it: not a recording in the "
                                     "layout of EuRoC, KITTI, TUM RGB-D or 7-Scenes"));
   for (const char* robot : {"robot1", "robot0", "robot2/none"})
     fs::create_directories(folder.root() / robot / (robot[5] < '2' ? "mav0" : "cam0"));
-  CHECK_THROWS_WITH(open_euroc(folder.root()), Catch::EndsWith("in it are robot0, robot1"));
+  CHECK_THROWS_WITH(open_folder(folder.root()), Catch::EndsWith("in it are robot0, robot1"));
 }
 
 TEST_CASE("A recording needs no inertial sensor", "[sensors]") {
   const EurocFolder folder;
-  const EurocOptions options{.imu = false};
-  const SE3 T_imu_left = open_euroc(folder.root()).rig().stereo.cameras[0].T_body_cam;
+  const FolderOptions options{.imu = false};
+  const SE3 T_imu_left = open_folder(folder.root()).rig().stereo.cameras[0].T_body_cam;
   SECTION("an existing inertial sensor defines the body") {}
   SECTION("without an inertial sensor the body is the reference of all poses of sensors") {
     fs::remove_all(folder.mav0() / "imu0");
-    CHECK_FALSE(open_euroc(folder.root()).rig().has_imu);
-    CHECK(open_euroc(folder.mav0()).pair_count() == EurocFolder::kPairs);
+    CHECK_FALSE(open_folder(folder.root()).rig().has_imu);
+    CHECK(open_folder(folder.mav0()).pair_count() == EurocFolder::kPairs);
   }
-  EurocReader reader = open_euroc(folder.root(), options);
+  FolderReader reader = open_folder(folder.root(), options);
   CHECK_FALSE(reader.rig().has_imu);
   CHECK(
       reader.rig().stereo.cameras[0].T_body_cam.isApprox(T_imu_left));  // its T_BS is the identity
@@ -171,10 +174,10 @@ TEST_CASE("A recording needs no inertial sensor", "[sensors]") {
 TEST_CASE("A correction moves the stamps of images and the cameras", "[sensors]") {
   const EurocFolder folder;
   folder.add_depth();
-  EurocReader right = open_euroc(folder.root());
+  FolderReader right = open_folder(folder.root());
   const CameraCalibration correction{0.0125,
                                      make_pose(Eigen::Matrix3d::Identity(), {0.1, 0.2, 0.3})};
-  EurocReader corrected = open_euroc(folder.root(), {.correction = correction, .depth = true});
+  FolderReader corrected = open_folder(folder.root(), {.correction = correction, .depth = true});
   const auto packets = packets_of(corrected), unmoved = packets_of(right);
   REQUIRE(packets.size() == EurocFolder::kPairs);
   for (std::size_t k = 0; k < packets.size(); ++k) {
@@ -186,7 +189,8 @@ TEST_CASE("A correction moves the stamps of images and the cameras", "[sensors]"
   for (const std::size_t c : {0U, 1U})
     CHECK(corrected.rig().stereo.cameras[c].T_body_cam.isApprox(
         correction.T_body_rig * right.rig().stereo.cameras[c].T_body_cam));
-  CHECK(open_euroc(folder.root(), {.from_s = 0.1, .correction = correction}).pair_count() == 6);
+  CHECK(open_folder(folder.root(), {.part = {.from_s = 0.1}, .correction = correction})
+            .pair_count() == 6);
 }
 
 TEST_CASE("Lists without a usable row are refused", "[sensors]") {
@@ -212,7 +216,7 @@ TEST_CASE("Lists without a usable row are refused", "[sensors]") {
   std::string message = c.message;
   for (std::size_t at = 0; (at = message.find("FILE")) != message.npos;)
     message.replace(at, 4, (folder.mav0() / c.file).string());
-  CHECK_THROWS_WITH(open_euroc(folder.root()), Catch::EndsWith(message));
+  CHECK_THROWS_WITH(open_folder(folder.root()), Catch::EndsWith(message));
 }
 
 TEST_CASE("Repeated rows and images without a partner are skipped and counted", "[sensors]") {
@@ -268,6 +272,98 @@ TEST_CASE("Pairs outside the inertial samples are skipped", "[sensors]") {
   const Outcome outcome = read(folder);
   CHECK(outcome.packets.size() == 6);
   CHECK(outcome.report.count(ReaderFault::kPairWithoutImu) == 2);
+}
+
+TEST_CASE("The rig has the numbers of the sensor files", "[sensors]") {
+  const EurocFolder folder;
+  const SensorRig rig = read_euroc_rig(folder.mav0());
+  const Camera& left = rig.stereo.cameras[0];
+  CHECK(left.width == 32);
+  CHECK(left.height == 24);
+  CHECK(left.fx == 30.0);
+  CHECK(left.fy == 31.0);
+  CHECK(left.cx == 16.0);
+  CHECK(left.cy == 12.0);
+  CHECK(left.lens == Lens(LensModel::kRadialTangential, {-0.2, 0.05, 0.001, 0.002}));
+  CHECK(left.T_body_cam.linear() * Eigen::Vector3d::UnitX() == Eigen::Vector3d::UnitY());
+  CHECK(left.T_body_cam.translation() == Eigen::Vector3d(0.0, 0.2, 0.3));
+  CHECK(rig.stereo.baseline_m() == Approx(0.1));
+  CHECK(rig.imu.gyro_noise_density == 1.6e-4);
+  CHECK(rig.imu.gyro_random_walk == 1.9e-5);
+  CHECK(rig.imu.accel_noise_density == 2.0e-3);
+  CHECK(rig.imu.accel_random_walk == 3.0e-3);
+  CHECK(rig.imu.rate_hz == 200.0);
+}
+
+TEST_CASE("The body frame is the inertial sensor's", "[sensors]") {
+  const EurocFolder folder;
+  folder.replace("imu0/sensor.yaml", "1, 0, 0, 0, 0, 1", "1, 0, 0, 0.5, 0, 1");
+  const SensorRig rig = read_euroc_rig(folder.mav0());
+  CHECK(rig.stereo.cameras[0].T_body_cam.translation().isApprox(Eigen::Vector3d(-0.5, 0.2, 0.3)));
+  CHECK(rig.stereo.baseline_m() == Approx(0.1));
+}
+
+TEST_CASE("OpenCV's first line is accepted", "[sensors]") {
+  const EurocFolder folder;
+  folder.write("cam0/sensor.yaml", "%YAML:1.0\n" + EurocFolder::camera_yaml(0.0));
+  CHECK(read_euroc_rig(folder.mav0()).stereo.cameras[0].fx == 30.0);
+}
+
+TEST_CASE("A rotation with rounded digits is made exact", "[sensors]") {
+  const EurocFolder folder;
+  folder.replace("cam0/sensor.yaml", "0, -1, 0,", "0, -1.00003, 0,");
+  const Eigen::Matrix3d R = read_euroc_rig(folder.mav0()).stereo.cameras[0].T_body_cam.linear();
+  CHECK((R * R.transpose() - Eigen::Matrix3d::Identity()).norm() < 1e-14);
+}
+
+TEST_CASE("An impossible calibration is refused with file and line", "[sensors]") {
+  struct Case {
+    std::string sensor, from, to, message;
+  };
+  const Case c = GENERATE(
+      Case{"cam1", "0, -1, 0,", "0, -1.1, 0,",
+           "line 5: T_BS is not a rotation: |R R^T - I| = 0.210000, at most 0.001000"},
+      Case{"cam1", "0, -1, 0,", "0, 1, 0,", "line 5: T_BS is a reflection"},
+      Case{"cam1", "0, 0, 0, 1]", "0, 0, 0, 2]", "line 5: T_BS: last row"},
+      Case{"cam1", "0, 0, 0, 1]", "0, 0, 0]", "line 5: T_BS has 15 numbers, expected 16"},
+      Case{"cam1", "0, 0, 0, 1]", "0, 0, .nan, 1]", "line 7: T_BS contains an element"},
+      Case{"cam0", "0.2, 0", "1e300, 0", "T_BS: a translation of 1e+300 m is outside"},
+      Case{"cam1", "T_BS:", "T_XX:", ": key T_BS is missing"},
+      Case{"cam1", "pinhole", "eucm",
+           "line 10: camera_model 'eucm' is not supported, only pinhole, omni and ds"},
+      Case{"cam1", "pinhole", "omni",
+           "line 11: intrinsics has 4 numbers, expected 5 (xi, fu, fv, cu, cv)"},
+      Case{"cam1", "radial-tangential", "fov",
+           "line 12: distortion_model 'fov' is not supported with"},
+      Case{"cam1", "radial-tangential", "none", "line 13: distortion_coefficients are given, but"},
+      Case{"cam1", "0.001, 0.002]", "0.001, 0.002, 0.1, 0.1]",
+           "line 13: distortion_coefficients has 6 numbers, expected 4, 5 or 8"},
+      Case{"cam0", "[-0.2,", "[1e300,", "line 13: distortion_coefficients: 1e+300 is outside"},
+      Case{"cam1", "[32, 24]", "[32, 0]", "line 9: resolution"},
+      Case{"cam1", "[32, 24]", "[32.5, 24]", "line 9: resolution"},
+      Case{"cam1", "[32, 24]", "32", "line 9: resolution is not a list"},
+      Case{"cam0", "[32, 24]", "[65536, 65536]", "line 9: resolution: more than 1e+08 pixels"},
+      Case{"cam1", "[30.0,", "[-30.0,", "line 11: intrinsics: a focal length"},
+      Case{"cam0", "[30.0,", "[1e300,", "line 11: intrinsics: a focal length of 1e+300 px"},
+      Case{"cam0", "12.0]", "-1e9]", "line 11: intrinsics: a principal point at -1e+09 px"},
+      Case{"cam1", "resolution:", "resolution", "line "},
+      Case{"imu0", "1.6e-04", "0", "line 5: gyroscope_noise_density is not a number within"},
+      Case{"imu0", "1.6e-04", "1e-300", "line 5: gyroscope_noise_density is not a number within"},
+      Case{"imu0", "1.9e-05", "1e300", "line 6: gyroscope_random_walk is not a number within"},
+      Case{"imu0", "2.0e-3", "-1", "line 7: accelerometer_noise_density"},
+      Case{"imu0", "3.0e-3", ".nan", "line 8: accelerometer_random_walk"},
+      Case{"imu0", "rate_hz: 200", "rate_hz: 1e300", "line 4: rate_hz is not a number within 1"});
+  CAPTURE(c.sensor, c.from, c.to);
+  const EurocFolder folder;
+  folder.replace(c.sensor + "/sensor.yaml", c.from, c.to);
+  CHECK_THROWS_WITH(read_euroc_rig(folder.mav0()),
+                    Catch::Contains(c.sensor + "/sensor.yaml") && Catch::Contains(c.message));
+}
+
+TEST_CASE("Two cameras in one place are refused", "[sensors]") {
+  const EurocFolder folder;
+  folder.write("cam1/sensor.yaml", EurocFolder::camera_yaml(0.0));
+  CHECK_THROWS_WITH(read_euroc_rig(folder.mav0()), Catch::Contains("where the left one is"));
 }
 
 }  // namespace km

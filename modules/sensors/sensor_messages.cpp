@@ -1,4 +1,4 @@
-#include "modules/sensors/ros_image.hpp"
+#include "modules/sensors/sensor_messages.hpp"
 
 #include <algorithm>
 #include <bit>
@@ -156,6 +156,20 @@ DepthResult depth_of_message(const BagChannel& channel, const BagMessage& messag
       is_raw(channel) ? raw_image(channel, message, place, size).loaded
                       : compressed_image(channel, message, place, DecodedPixels::kStored, size),
       place, scale_m, range);
+}
+
+bool is_of_kind(const BagChannel& channel, const SensorKind& kind) {
+  return kind.type.empty() ? has_images(channel) : is_of_type(channel, kind.type);
+}
+
+std::vector<SensorTopic> sensor_topics(const SensorTopicNames& names) {
+  std::vector<SensorTopic> topics;
+  for (const SensorKind& kind : kSensorKinds) {
+    const std::string& topic = names.*kind.topic;
+    if (!topic.empty())
+      topics.push_back({&kind, topic, kind.type.empty() ? type_of_images(topic) : kind.type});
+  }
+  return topics;
 }
 
 }  // namespace km

@@ -1,10 +1,15 @@
-#include "modules/sensors/stamp_order.hpp"
+#include "modules/sensors/stream_stamps.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <iterator>
 #include <optional>
+#include <utility>
+#include <vector>
+
+#include "modules/core/text_table.hpp"
+#include "modules/recordings/stamp_statistics.hpp"
 
 namespace km {
 namespace {
@@ -95,6 +100,59 @@ StampVerdict StampOrder::judge(Stamp stamp) {
   good_ = 1;
   jumps_ = 0;
   return StampVerdict::kGood;
+}
+
+ImageGap MissingImages::before(Stamp stamp) {
+  constexpr double kGap = 1.5;  // smallest gap in usual intervals, above the effect of exposure
+  const std::optional<Stamp> last = std::exchange(last_, stamp);
+  if (!last) return {};
+  const Stamp interval = stamp - *last;
+  ImageGap gap;
+  if (intervals_.size() >= kFewest) {
+    std::vector<Stamp> sorted(intervals_.begin(), intervals_.end());
+    const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+    std::ranges::nth_element(sorted, middle);
+    const double share = static_cast<double>(interval) / static_cast<double>(*middle);
+    const double interval_s = seconds_between(*last, stamp);
+    if (share > kGap && interval_s > kPause_s)
+      gap.pause_s = interval_s;
+    else if (share > kGap)
+      gap.missing = static_cast<std::size_t>(std::lround(share)) - 1;
+  }
+  intervals_.push_back(interval);
+  if (intervals_.size() > kIntervals) intervals_.pop_front();
+  return gap;
+}
+
+Synchrony find_synchrony(std::span<const Stamp> left, std::span<const Stamp> other) {
+  Synchrony found;
+  if (left.size() < 2) return found;
+  std::vector<double> intervals_s;
+  for (std::size_t i = 1; i < left.size(); ++i)
+    intervals_s.push_back(seconds_between(left[i - 1], left[i]));
+  std::ranges::nth_element(intervals_s, intervals_s.begin() + std::ssize(intervals_s) / 2);
+  const double interval_s = intervals_s[intervals_s.size() / 2];
+  const StampAgreement agreement = stamp_agreement(left, other, 0.5 * interval_s);
+  if (agreement.pairs == 0) return found;
+  found.offset_s = agreement.median_offset_s;
+  found.is_simultaneous = agreement.largest_deviation_s <= found.tolerance_s;
+  if (!found.is_simultaneous)
+    found.tolerance_s = std::max(found.tolerance_s,
+                                 std::min(2.0 * agreement.largest_deviation_s, 0.25 * interval_s));
+  return found;
+}
+
+bool is_remarkable(const Synchrony& synchrony) {
+  constexpr double kUnremarkable_s = 5e-5;
+  return std::abs(synchrony.offset_s) > kUnremarkable_s || !synchrony.is_simultaneous;
+}
+
+std::string to_string(const Synchrony& synchrony, const char* other) {
+  const double offset_ms = 1e3 * synchrony.offset_s;
+  return std::string("the ") + other + " image is stamped " + fixed(std::abs(offset_ms), 2) +
+         " ms " + (offset_ms < 0.0 ? "before" : "after") + " the left one, within " +
+         fixed(1e3 * synchrony.tolerance_s, 2) + " ms" +
+         (synchrony.is_simultaneous ? "" : ": they are not triggered together");
 }
 
 }  // namespace km

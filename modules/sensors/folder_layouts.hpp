@@ -1,0 +1,62 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "modules/sensors/image_folder.hpp"
+
+namespace km {
+
+/// Layouts of a recording in a folder of images.
+enum class FolderLayout {
+  kEuroc,        ///< EuRoC/ASL, see list_euroc_folder().
+  kKitti,        ///< KITTI odometry: image_0, image_1, calib.txt, times.txt.
+  kTum,          ///< TUM RGB-D: rgb.txt and depth.txt, with the files that they list.
+  kSevenScenes,  ///< Microsoft 7-Scenes: frame-NNNNNN.color and .depth, camera-intrinsics.txt.
+};
+
+/// For messages on a folder that has none of them.
+inline constexpr const char* kKnownLayouts = "the layout of EuRoC, KITTI, TUM RGB-D or 7-Scenes";
+
+/// The layout of `folder`, by the names of its files; kEuroc if it is none of the others.
+[[nodiscard]] FolderLayout layout_of(const std::filesystem::path& folder);
+
+/// Text such as "a folder in KITTI's layout".
+[[nodiscard]] std::string to_string(FolderLayout layout);
+
+/// Usual range of a depth camera with structured light.
+inline constexpr double kStructuredLightRange_m = 8.0;
+
+/// A camera with aligned depth images.
+struct DepthCamera {
+  Camera camera;                ///< Its pose is not used.
+  double depth_scale_m = 1e-3;  ///< Depth of one unit in the images [m].
+  DepthRange range;
+  double baseline_m = 0.1;  ///< Virtual baseline, see rgbd_rig().
+};
+
+/// The layouts below have no inertial sensor. The body is the left camera, to which their true
+/// poses refer.
+///
+/// KITTI odometry. Row k of times.txt is the time [s] of image k in image_0 and image_1, whose name
+/// has six digits (image_2 and image_3 without a folder image_0). Faulty rows count as rows,
+/// blank lines do not. calib.txt has the projections of the rectified cameras: `P0: ` and 12
+/// numbers, row by row. Throws DatasetError with file, line and value for a calibration or list
+/// that cannot be used. Faulty rows of times.txt are counted, and images after the last row.
+[[nodiscard]] ImageFolder read_kitti_folder(const std::filesystem::path& folder);
+
+/// TUM RGB-D. Rows of rgb.txt and depth.txt are `time [s], file`. An image has the depth image that
+/// is nearest in time, at most 0.02 s away. `camera`: as for tum_camera(). Errors as above.
+[[nodiscard]] ImageFolder read_tum_folder(const std::filesystem::path& folder,
+                                          const DepthCamera& camera);
+
+/// The camera of a recording of the TUM RGB-D benchmark, by the freiburg1, freiburg2 or freiburg3
+/// in the name of its folder. nullopt without such a name.
+[[nodiscard]] std::optional<DepthCamera> tum_camera(const std::filesystem::path& folder);
+
+/// Microsoft 7-Scenes. The time of frame N is N / 30 s; frames may be missing. Depth is in
+/// millimetres. camera-intrinsics.txt is a 3x3 matrix. Errors as above.
+[[nodiscard]] ImageFolder read_seven_scenes_folder(const std::filesystem::path& folder);
+
+}  // namespace km
