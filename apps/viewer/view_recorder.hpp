@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "modules/core/label_palette.hpp"
-#include "modules/ros_dds/closure_lines.hpp"
+#include "modules/ros_dds/drawings.hpp"
 #include "modules/view/view_update.hpp"
 #include "runtime/periodic.hpp"
 #include "runtime/worker.hpp"

@@ -8,8 +8,7 @@
 #include "modules/images/image_codec.hpp"
 #include "modules/images/image_view.hpp"
 #include "modules/recordings/ros_messages.hpp"
-#include "modules/ros_dds/mesh_cloud.hpp"
-#include "modules/ros_dds/object_markers.hpp"
+#include "modules/ros_dds/drawings.hpp"
 #include "runtime/clock.hpp"
 #include "runtime/thread.hpp"
 

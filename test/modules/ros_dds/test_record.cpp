@@ -8,8 +8,8 @@
 
 #include "modules/recordings/open_bag.hpp"
 #include "modules/recordings/ros_messages.hpp"
+#include "modules/ros_dds/drawings.hpp"
 #include "modules/ros_dds/mcap_sink.hpp"
-#include "modules/ros_dds/mesh_cloud.hpp"
 #include "modules/ros_dds/node/ros_output_node.hpp"
 #include "runtime/log.hpp"
 #include "test/modules/recordings/bag_contents.hpp"
