@@ -6,9 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 
-#include "apps/doctor/examine_live.hpp"
-#include "apps/doctor/examine_recording.hpp"
-#include "apps/doctor/examine_results.hpp"
+#include "apps/doctor/examine.hpp"
 #include "apps/doctor/network_facts.hpp"
 #include "apps/output_file.hpp"
 #include "apps/program_options.hpp"

@@ -9,13 +9,7 @@
 namespace km {
 namespace {
 
-Finding warning(const char* id, std::string what, const char* means, const char* to_do) {
-  return {.id = id,
-          .severity = Severity::kWarning,
-          .what = std::move(what),
-          .means = means,
-          .to_do = to_do};
-}
+using enum Severity;
 
 std::string name_of(const DiscoveredRobot& robot) {
   return robot.identity ? to_string(*robot.identity) : robot.address;
@@ -29,92 +23,76 @@ std::string joined(const std::set<std::string>& names) {
 
 void examine_interface(const NetworkFacts& facts, Examination& result) {
   if (!facts.chosen) {
-    result.findings.push_back({.id = "network.interface",
-                               .severity = Severity::kError,
-                               .what = facts.no_interface,
-                               .means = "robots cannot reach each other",
-                               .to_do = "name an interface that is up in --interface"});
+    result.add(kError, "network.interface", facts.no_interface, "robots cannot reach each other",
+               "name an interface that is up in --interface");
     return;
   }
   const NetworkInterface& chosen = *facts.chosen;
-  result.figures.push_back({"interface", chosen.name + ", " + chosen.address + ", MTU " +
-                                             (facts.mtu ? std::to_string(*facts.mtu) : "unknown")});
+  result.figure("interface", chosen.name + ", " + chosen.address + ", MTU " +
+                                 (facts.mtu ? std::to_string(*facts.mtu) : "unknown"));
   const auto outward = std::ranges::count(facts.interfaces, false, &NetworkInterface::loopback);
   if (facts.config.interface.empty() && outward > 1)
-    result.findings.push_back(
-        {.id = "network.several_interfaces",
-         .severity = Severity::kNote,
-         .what = std::to_string(outward) + " interfaces are up, " + chosen.name + " is used",
-         .means = "robots that are only on another interface are not received",
-         .to_do = "choose the interface with --interface"});
+    result.add(kNote, "network.several_interfaces",
+               std::to_string(outward) + " interfaces are up, " + chosen.name + " is used",
+               "robots that are only on another interface are not received",
+               "choose the interface with --interface");
   if (chosen.loopback)
-    result.findings.push_back(
-        warning("network.loopback",
-                outward > 0 ? chosen.name + " is loopback" : std::string("only loopback is up"),
-                "robots on other hosts are out of reach",
-                outward > 0 ? "name another --interface; robots on one host need none"
-                            : "connect the host; robots on one host need no network"));
+    result.add(kWarning, "network.loopback",
+               outward > 0 ? chosen.name + " is loopback" : std::string("only loopback is up"),
+               "robots on other hosts are out of reach",
+               outward > 0 ? "name another --interface; robots on one host need none"
+                           : "connect the host; robots on one host need no network");
   constexpr int kLeastMtu = 1280;
   const bool is_wireless = chosen.name.starts_with("wl");
   if (facts.mtu && *facts.mtu < kLeastMtu)
-    result.findings.push_back(
-        warning("network.mtu", "an MTU of " + std::to_string(*facts.mtu) + " B",
-                "every message is split into many packets",
-                "find out why the MTU is so low, for example because of a tunnel"));
+    result.add(kWarning, "network.mtu", "an MTU of " + std::to_string(*facts.mtu) + " B",
+               "every message is split into many packets",
+               "find out why the MTU is so low, for example because of a tunnel");
   if (facts.mtu && is_wireless && facts.config.max_message_bytes > *facts.mtu)
-    result.findings.push_back(
-        warning("network.mtu",
-                "messages of up to " + std::to_string(facts.config.max_message_bytes) +
-                    " B on a radio link with an MTU of " + std::to_string(*facts.mtu) + " B",
-                "a message is lost if one of its up to 45 packets is lost", "use --link wifi"));
+    result.add(kWarning, "network.mtu",
+               "messages of up to " + std::to_string(facts.config.max_message_bytes) +
+                   " B on a radio link with an MTU of " + std::to_string(*facts.mtu) + " B",
+               "a message is lost if one of its up to 45 packets is lost", "use --link wifi");
 }
 
 void examine_own_traffic(const NetworkFacts& facts, Examination& result) {
   if (!facts.chosen) return;
   const bool by_multicast = facts.config.discovery == Discovery::kMulticast;
-  result.figures.push_back(
-      {"multicast", facts.no_multicast ? *facts.no_multicast : "the test datagram was received"});
+  result.figure("multicast",
+                facts.no_multicast ? *facts.no_multicast : "the test datagram was received");
   if (facts.no_multicast && by_multicast)
-    result.findings.push_back(
-        {.id = "network.multicast",
-         .severity = Severity::kError,
-         .what = "multicast to the group of DDS discovery: " + *facts.no_multicast,
-         .means = "robots do not find each other by multicast",
-         .to_do = "open UDP port " + std::to_string(7400 + 250 * facts.config.domain) +
-                  " and group 239.255.0.1, or name the addresses of the robots in --peers"});
+    result.add(kError, "network.multicast",
+               "multicast to the group of DDS discovery: " + *facts.no_multicast,
+               "robots do not find each other by multicast",
+               "open UDP port " + std::to_string(7400 + 250 * facts.config.domain) +
+                   " and group 239.255.0.1, or name the addresses of the robots in --peers");
   if (facts.no_unicast)
-    result.findings.push_back(
-        {.id = "network.firewall",
-         .severity = Severity::kError,
-         .what = "UDP to the own address " + facts.chosen->address + ": " + *facts.no_unicast,
-         .means = "a firewall on this host drops the messages of robots",
-         .to_do = "open UDP ports from " + std::to_string(7400 + 250 * facts.config.domain) +
-                  " upwards"});
+    result.add(
+        kError, "network.firewall",
+        "UDP to the own address " + facts.chosen->address + ": " + *facts.no_unicast,
+        "a firewall on this host drops the messages of robots",
+        "open UDP ports from " + std::to_string(7400 + 250 * facts.config.domain) + " upwards");
   if (facts.config.domain > static_cast<int>(kLastQuietDomain))
-    result.findings.push_back({.id = "network.domain_ports",
-                               .severity = Severity::kNote,
-                               .what = "the ports of domain " +
-                                       std::to_string(facts.config.domain) +
-                                       " are among those that Linux gives to other programs",
-                               .means = "a robot does not start if its port is taken",
-                               .to_do = "use a domain up to " + std::to_string(kLastQuietDomain)});
+    result.add(kNote, "network.domain_ports",
+               "the ports of domain " + std::to_string(facts.config.domain) +
+                   " are among those that Linux gives to other programs",
+               "a robot does not start if its port is taken",
+               "use a domain up to " + std::to_string(kLastQuietDomain));
 }
 
 void examine_buffers(const NetworkFacts& facts, Examination& result) {
   if (!facts.largest_receive_buffer) return;
   const long granted = *facts.largest_receive_buffer, asked = facts.config.receive_buffer_bytes;
-  result.figures.push_back({"receive buffer", bytes_text(static_cast<double>(granted)) +
-                                                  " at most (net.core.rmem_max), asked for " +
-                                                  bytes_text(static_cast<double>(asked))});
+  result.figure("receive buffer", bytes_text(static_cast<double>(granted)) +
+                                      " at most (net.core.rmem_max), asked for " +
+                                      bytes_text(static_cast<double>(asked)));
   constexpr long kUsual = 212992;  // default of Linux
   if (granted >= asked) return;
-  result.findings.push_back(
-      {.id = "network.buffers",
-       .severity = granted < kUsual ? Severity::kWarning : Severity::kNote,
-       .what = "the kernel grants receive buffers of " + bytes_text(static_cast<double>(granted)) +
-               ", dds.receive_buffer_bytes asks for " + bytes_text(static_cast<double>(asked)),
-       .means = "bursts of keyframes, meshes and images are lost and have to be sent again",
-       .to_do = "sysctl -w net.core.rmem_max=" + std::to_string(asked)});
+  result.add(granted < kUsual ? kWarning : kNote, "network.buffers",
+             "the kernel grants receive buffers of " + bytes_text(static_cast<double>(granted)) +
+                 ", dds.receive_buffer_bytes asks for " + bytes_text(static_cast<double>(asked)),
+             "bursts of keyframes, meshes and images are lost and have to be sent again",
+             "sysctl -w net.core.rmem_max=" + std::to_string(asked));
 }
 
 void examine_ids(const std::vector<DiscoveredRobot>& robots, Examination& result) {
@@ -127,12 +105,10 @@ void examine_ids(const std::vector<DiscoveredRobot>& robots, Examination& result
     if (boots.size() < 2) continue;
     std::set<std::string> names;
     for (const auto& [boot, name] : boots) names.insert(name);
-    result.findings.push_back({.id = "network.same_id",
-                               .severity = Severity::kError,
-                               .what = std::to_string(boots.size()) + " robots have id " +
-                                       std::to_string(id) + ": " + joined(names),
-                               .means = "the robot that started last stops",
-                               .to_do = "give every robot its own --robot"});
+    result.add(kError, "network.same_id",
+               std::to_string(boots.size()) + " robots have id " + std::to_string(id) + ": " +
+                   joined(names),
+               "the robot that started last stops", "give every robot its own --robot");
   }
 }
 
@@ -140,20 +116,18 @@ void examine_other_domains(const NetworkFacts& facts, bool is_alone, Examination
   const std::string domain = std::to_string(facts.config.domain);
   for (const auto& [other, addresses] : facts.other_domains)
     if (is_alone)
-      result.findings.push_back(warning(
-          "network.other_domain",
+      result.add(
+          kWarning, "network.other_domain",
           "programs at " + joined(addresses) + " use DDS domain " + std::to_string(other) +
               ", not " + domain,
           "robots of different domains do not receive each other; ROS 2 uses domain 0 by default",
-          "give all robots of the team the same --domain"));
+          "give all robots of the team the same --domain");
   if (facts.ros_topics > 0)
-    result.findings.push_back({.id = "network.other_programs",
-                               .severity = Severity::kNote,
-                               .what = "ROS 2 programs publish " +
-                                       std::to_string(facts.ros_topics) + " topics on domain " +
-                                       domain,
-                               .means = "they share the ports and the traffic of the team",
-                               .to_do = "give the team a domain of its own"});
+    result.add(kNote, "network.other_programs",
+               "ROS 2 programs publish " + std::to_string(facts.ros_topics) + " topics on domain " +
+                   domain,
+               "they share the ports and the traffic of the team",
+               "give the team a domain of its own");
 }
 
 void examine_robots(const NetworkFacts& facts, Examination& result) {
@@ -163,76 +137,67 @@ void examine_robots(const NetworkFacts& facts, Examination& result) {
       names.insert(name_of(robot));
       continue;
     }
-    result.findings.push_back(
-        {.id = "network.protocol",
-         .severity = Severity::kError,
-         .what = name_of(robot) + " at " + robot.address + " uses protocol " +
-                 (robot.identity ? std::to_string(robot.identity->protocol) : "unknown") +
-                 ", this program uses " + std::to_string(kProtocolVersion),
-         .means = "the robots of the team ignore it",
-         .to_do = "install the same version of the programs on all robots"});
+    result.add(kError, "network.protocol",
+               name_of(robot) + " at " + robot.address + " uses protocol " +
+                   (robot.identity ? std::to_string(robot.identity->protocol) : "unknown") +
+                   ", this program uses " + std::to_string(kProtocolVersion),
+               "the robots of the team ignore it",
+               "install the same version of the programs on all robots");
   }
-  result.figures.push_back({"robots received", (names.empty() ? "none" : joined(names)) +
-                                                   " of team " + facts.config.team + " on domain " +
-                                                   std::to_string(facts.config.domain) + ", in " +
-                                                   fixed(facts.listened_s, 1) + " s"});
+  result.figure("robots received", (names.empty() ? "none" : joined(names)) + " of team " +
+                                       facts.config.team + " on domain " +
+                                       std::to_string(facts.config.domain) + ", in " +
+                                       fixed(facts.listened_s, 1) + " s");
   examine_ids(facts.robots, result);
   const bool is_alone = facts.robots.empty();
   examine_other_domains(facts, is_alone, result);
   if (is_alone)
-    result.findings.push_back(
-        {.id = "network.no_peers",
-         .severity = facts.config.peers.empty() ? Severity::kNote : Severity::kWarning,
-         .what = "no robot of team " + facts.config.team + " is received in " +
-                 fixed(facts.listened_s, 1) + " s",
-         .means = "none runs, it has another dds.team, or one of the other findings is the reason",
-         .to_do =
-             "start a robot on another host, or name the address of a running one in --peers"});
+    result.add(facts.config.peers.empty() ? kNote : kWarning, "network.no_peers",
+               "no robot of team " + facts.config.team + " is received in " +
+                   fixed(facts.listened_s, 1) + " s",
+               "none runs, it has another dds.team, or one of the other findings is the reason",
+               "start a robot on another host, or name the address of a running one in --peers");
 }
 
 void examine_echo(const PeerEcho& peer, Examination& result) {
   if (!peer.may_send_icmp) {
-    result.figures.push_back(
-        {"peer " + peer.host,
-         "not determined: this user may not send ICMP (net.ipv4.ping_group_range)"});
+    result.figure("peer " + peer.host,
+                  "not determined: this user may not send ICMP (net.ipv4.ping_group_range)");
     return;
   }
   const double loss = 1.0 - static_cast<double>(peer.received) /
                                 static_cast<double>(std::max<std::size_t>(peer.sent, 1));
-  result.figures.push_back({"peer " + peer.host, "round trip " + fixed(1e3 * peer.median_s, 1) +
-                                                     " ms, at most " +
-                                                     fixed(1e3 * peer.worst_s, 1) + " ms, " +
-                                                     std::to_string(peer.sent - peer.received) +
-                                                     " of " + std::to_string(peer.sent) + " lost"});
+  result.figure("peer " + peer.host, "round trip " + fixed(1e3 * peer.median_s, 1) +
+                                         " ms, at most " + fixed(1e3 * peer.worst_s, 1) + " ms, " +
+                                         std::to_string(peer.sent - peer.received) + " of " +
+                                         std::to_string(peer.sent) + " lost");
   constexpr double kMuchLoss = 0.05, kSlow_s = 0.2;
   if (peer.received == 0)
-    result.findings.push_back(warning(
-        "network.unreachable",
-        peer.host + " answers none of " + std::to_string(peer.sent) + " echo requests",
-        "the host is out of reach, or drops echo requests", "check its address, cable and radio"));
+    result.add(kWarning, "network.unreachable",
+               peer.host + " answers none of " + std::to_string(peer.sent) + " echo requests",
+               "the host is out of reach, or drops echo requests",
+               "check its address, cable and radio");
   else if (loss > kMuchLoss)
-    result.findings.push_back(warning(
-        "network.loss", fixed(100.0 * loss, 0) + " % of the echoes of " + peer.host + " are lost",
-        "lost messages have to be sent again", "use --link wifi or intermittent, and a budget"));
+    result.add(kWarning, "network.loss",
+               fixed(100.0 * loss, 0) + " % of the echoes of " + peer.host + " are lost",
+               "lost messages have to be sent again",
+               "use --link wifi or intermittent, and a budget");
   if (peer.received > 0 && peer.median_s > kSlow_s)
-    result.findings.push_back(warning(
-        "network.slow", "a round trip of " + fixed(1e3 * peer.median_s, 0) + " ms to " + peer.host,
-        "loop closures come late, and requests may be repeated", "use --link intermittent"));
+    result.add(kWarning, "network.slow",
+               "a round trip of " + fixed(1e3 * peer.median_s, 0) + " ms to " + peer.host,
+               "loop closures come late, and requests may be repeated", "use --link intermittent");
 }
 
 void examine_clock(const ClockDifference& clock, Examination& result) {
-  result.figures.push_back(
-      {"clock of " + clock.robot,
-       fixed(clock.ahead_s, 3) + " s ahead, including the time of transmission"});
+  result.figure("clock of " + clock.robot,
+                fixed(clock.ahead_s, 3) + " s ahead, including the time of transmission");
   constexpr double kMuch_s = 1.0;
   if (std::abs(clock.ahead_s) > kMuch_s)
-    result.findings.push_back(
-        {.id = "network.clock",
-         .severity = Severity::kNote,
-         .what = "the clock of " + clock.robot + " is " + fixed(std::abs(clock.ahead_s), 1) +
-                 " s " + (clock.ahead_s > 0.0 ? "ahead of" : "behind") + " this one",
-         .means = "the team does not need equal clocks, but the times in logs of robots differ",
-         .to_do = "set the clocks with NTP or chrony"});
+    result.add(kNote, "network.clock",
+               "the clock of " + clock.robot + " is " + fixed(std::abs(clock.ahead_s), 1) + " s " +
+                   (clock.ahead_s > 0.0 ? "ahead of" : "behind") + " this one",
+               "the team does not need equal clocks, but the times in logs of robots differ",
+               "set the clocks with NTP or chrony");
 }
 
 }  // namespace

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "apps/doctor/examine_recording.hpp"
-#include "modules/diagnosis/examination.hpp"
+#include "apps/doctor/examine.hpp"
+#include "modules/diagnosis/finding.hpp"
 #include "runtime/dds/dds_config.hpp"
 #include "runtime/dds/participant.hpp"
 #include "runtime/dds/robot_identity.hpp"

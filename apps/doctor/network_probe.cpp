@@ -1,19 +1,26 @@
+#include <arpa/inet.h>
 #include <envelope.h>
 #include <net/if.h>
+#include <netdb.h>
+#include <netinet/in.h>
 #include <poll.h>
 #include <sys/ioctl.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cmath>
 #include <cstring>
 #include <limits>
 #include <memory>
 #include <random>
 #include <set>
+#include <system_error>
 
+#include "apps/descriptor.hpp"
 #include "apps/doctor/network_facts.hpp"
-#include "apps/doctor/udp_socket.hpp"
 #include "modules/core/input_file.hpp"
 #include "modules/core/text_rows.hpp"
 #include "runtime/clock.hpp"
@@ -27,6 +34,138 @@ namespace km {
 namespace {
 
 using std::chrono::milliseconds;
+
+std::string last_error() {
+  return std::generic_category().message(errno);
+}
+
+sockaddr_in address_with(in_addr address, std::uint16_t port) {
+  sockaddr_in result{};
+  result.sin_family = AF_INET;
+  result.sin_addr = address;
+  result.sin_port = htons(port);
+  return result;
+}
+
+in_addr parsed(const std::string& dotted) {
+  in_addr address{};
+  inet_pton(AF_INET, dotted.c_str(), &address);
+  return address;
+}
+
+std::string dotted(in_addr address) {
+  std::array<char, INET_ADDRSTRLEN> text{};
+  inet_ntop(AF_INET, &address, text.data(), text.size());
+  return text.data();
+}
+
+template <typename T>
+bool set_option(int socket, int level, int name, const T& value) {
+  return setsockopt(socket, level, name, &value, sizeof value) == 0;
+}
+
+// A received datagram.
+struct Datagram {
+  std::string from;  // address, dotted
+  std::vector<std::uint8_t> bytes;
+};
+
+// An IPv4 socket for datagrams: UDP, or ICMP echoes.
+class DatagramSocket {
+ public:
+  // UDP on `port` (0: any) of all addresses, shared with other programs that listen there. Throws
+  // std::system_error.
+  [[nodiscard]] static DatagramSocket udp(std::uint16_t port) {
+    DatagramSocket made(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
+    const sockaddr_in any = address_with(in_addr{INADDR_ANY}, port);
+    // Shared, as in DDS, because robots on one host use one port of discovery.
+    const bool is_ready =
+        made.handle() >= 0 && set_option(made.handle(), SOL_SOCKET, SO_REUSEADDR, 1) &&
+        bind(made.handle(), reinterpret_cast<const sockaddr*>(&any), sizeof any) == 0;
+    if (!is_ready)
+      throw std::system_error(errno, std::generic_category(), "UDP port " + std::to_string(port));
+    return made;
+  }
+
+  // Socket for ICMP echoes; nullopt if this user has no permission.
+  [[nodiscard]] static std::optional<DatagramSocket> icmp() {
+    const int socket = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, IPPROTO_ICMP);
+    if (socket >= 0) return DatagramSocket(socket);
+    const int raw = ::socket(AF_INET, SOCK_RAW | SOCK_CLOEXEC, IPPROTO_ICMP);
+    if (raw >= 0) return DatagramSocket(raw, true);
+    return std::nullopt;
+  }
+
+  [[nodiscard]] int handle() const { return socket_.get(); }
+  [[nodiscard]] std::uint16_t port() const {
+    sockaddr_in own{};
+    socklen_t size = sizeof own;
+    getsockname(handle(), reinterpret_cast<sockaddr*>(&own), &size);
+    return ntohs(own.sin_port);
+  }
+
+  // Joins `group` on the interface with this address. The socket then receives datagrams of the
+  // group, also its own, and sends to the group through this interface. Returns the reason if this
+  // fails.
+  [[nodiscard]] std::optional<std::string> join(const std::string& group,
+                                                const std::string& interface_address) {
+    ip_mreq request{};
+    request.imr_multiaddr = parsed(group);
+    request.imr_interface = parsed(interface_address);
+    const bool joined = set_option(handle(), IPPROTO_IP, IP_ADD_MEMBERSHIP, request) &&
+                        set_option(handle(), IPPROTO_IP, IP_MULTICAST_IF, request.imr_interface) &&
+                        set_option(handle(), IPPROTO_IP, IP_MULTICAST_LOOP, 1);
+    return joined ? std::nullopt : std::optional("cannot join " + group + ": " + last_error());
+  }
+
+  // Sends a datagram. Returns the reason if this fails.
+  [[nodiscard]] std::optional<std::string> send(const std::string& address, std::uint16_t port,
+                                                const std::vector<std::uint8_t>& bytes) {
+    const sockaddr_in to = address_with(parsed(address), port);
+    const auto sent = sendto(handle(), bytes.data(), bytes.size(), 0,
+                             reinterpret_cast<const sockaddr*>(&to), sizeof to);
+    return sent >= 0 ? std::nullopt : std::optional("cannot send: " + last_error());
+  }
+
+  // The next datagram; nullopt if none arrives within `patience`.
+  [[nodiscard]] std::optional<Datagram> receive(std::chrono::milliseconds patience) {
+    pollfd waiting{.fd = handle(), .events = POLLIN, .revents = 0};
+    if (poll(&waiting, 1, static_cast<int>(patience.count())) <= 0) return std::nullopt;
+    std::vector<std::uint8_t> bytes(65536);
+    sockaddr_in from{};
+    socklen_t size = sizeof from;
+    const auto count = recvfrom(handle(), bytes.data(), bytes.size(), MSG_DONTWAIT,
+                                reinterpret_cast<sockaddr*>(&from), &size);
+    if (count < 0) return std::nullopt;
+    bytes.resize(static_cast<std::size_t>(count));
+    if (has_ip_header_ && !bytes.empty()) {
+      const std::size_t words = bytes[0] & 0x0fU;  // length in words of 4 bytes (RFC 791, Sec. 3.1)
+      bytes.erase(bytes.begin(), bytes.begin() + std::min(std::ptrdiff_t(bytes.size()),
+                                                          std::ptrdiff_t(4 * words)));
+    }
+    return Datagram{dotted(from.sin_addr), std::move(bytes)};
+  }
+
+ private:
+  explicit DatagramSocket(int socket, bool has_ip_header = false)
+      : socket_(socket), has_ip_header_(has_ip_header) {}
+
+  Descriptor socket_;
+  bool has_ip_header_;  // true if received bytes begin with an IP header
+};
+
+// IPv4 address of a host as dotted text; nullopt if unknown. `host` is a name or an address, with
+// or without ":port".
+std::optional<std::string> address_of(const std::string& host) {
+  addrinfo hints{};
+  hints.ai_family = AF_INET;
+  addrinfo* found = nullptr;
+  if (getaddrinfo(host.substr(0, host.find(':')).c_str(), nullptr, &hints, &found) != 0)
+    return std::nullopt;
+  const in_addr address = reinterpret_cast<const sockaddr_in*>(found->ai_addr)->sin_addr;
+  freeaddrinfo(found);
+  return dotted(address);
+}
 
 constexpr const char* kGroup = "239.255.0.1";  // group of DDS discovery (RTPS 2.5, Sec. 9.6.1.4)
 constexpr milliseconds kPatience{500};

@@ -6,7 +6,7 @@
 
 #include "modules/core/lie.hpp"
 #include "modules/core/text_table.hpp"
-#include "modules/diagnosis/figure_text.hpp"
+#include "modules/diagnosis/finding.hpp"
 #include "modules/diagnosis/focal_fit.hpp"
 #include "modules/diagnosis/image_rotation.hpp"
 #include "modules/diagnosis/inertial_fit.hpp"
@@ -15,6 +15,8 @@
 
 namespace km {
 namespace {
+
+using enum Severity;
 
 double angle_between(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b) {
   return so3_log(a.transpose() * b).norm();
@@ -27,15 +29,13 @@ constexpr double kSecondAxis_radps = 0.02;          // least rate about a second
 
 void examine_relation(const InertialFit& fit, Examination& result) {
   if (fit.explained > kRelated) return;
-  result.findings.push_back(
-      {.id = "imu.unrelated",
-       .severity = fit.explained < kUnrelated ? Severity::kError : Severity::kWarning,
-       .what = "the gyroscope explains " + percent(std::max(fit.explained, 0.0)) +
-               " of the rotation in the images (" + fixed(kDegrees * fit.image_rms, 1) +
-               " degrees/s), at any time offset within " + milliseconds(kMaxOffset_s),
-       .means = "the gyroscope is of another device, its stamps are off by more, or its samples "
-                "are wrong",
-       .to_do = "check that camera and gyroscope are on one robot and use one clock"});
+  result.add(fit.explained < kUnrelated ? kError : kWarning, "imu.unrelated",
+             "the gyroscope explains " + percent(std::max(fit.explained, 0.0)) +
+                 " of the rotation in the images (" + fixed(kDegrees * fit.image_rms, 1) +
+                 " degrees/s), at any time offset within " + milliseconds(kMaxOffset_s),
+             "the gyroscope is of another device, its stamps are off by more, or its samples "
+             "are wrong",
+             "check that camera and gyroscope are on one robot and use one clock");
 }
 
 void examine_scale(const InertialFit& fit, Examination& result) {
@@ -43,72 +43,62 @@ void examine_scale(const InertialFit& fit, Examination& result) {
   const double off = std::abs(fit.scale - 1.0);
   if (off < kSlack) return;
   const bool in_degrees = std::abs(fit.scale / kPerDegree - 1.0) < kSlack;
-  result.findings.push_back(
-      {.id = in_degrees ? "imu.gyro_in_degrees" : "imu.gyro_scale",
-       .severity = Severity::kError,
-       .what = "the images rotate " + rounded(fit.scale, 4) +
-               " times as fast as the gyroscope states" +
-               (in_degrees ? ", and 1 degree is 0.01745 rad" : ""),
-       .means = in_degrees ? "the gyroscope states degrees/s, but odometry expects rad/s"
-                           : "the gyroscope or the focal length is wrong by this factor",
-       .to_do = in_degrees ? "divide the samples by 57.2958"
-                           : "check the configured range of the gyroscope"});
+  result.add(
+      kError, in_degrees ? "imu.gyro_in_degrees" : "imu.gyro_scale",
+      "the images rotate " + rounded(fit.scale, 4) + " times as fast as the gyroscope states" +
+          (in_degrees ? ", and 1 degree is 0.01745 rad" : ""),
+      in_degrees ? "the gyroscope states degrees/s, but odometry expects rad/s"
+                 : "the gyroscope or the focal length is wrong by this factor",
+      in_degrees ? "divide the samples by 57.2958" : "check the configured range of the gyroscope");
 }
 
 void examine_direction(const InertialFit& fit, const Camera& left, Examination& result) {
   const Eigen::Matrix3d R_cam_body = left.T_body_cam.linear().transpose();
   constexpr double kClose = 5.0 / kDegrees, kFar = 20.0 / kDegrees, kOff = 2.0 / kDegrees;
   if (fit.Q.determinant() < 0.0) {
-    result.findings.push_back(
-        {.id = "imu.mirrored",
-         .severity = Severity::kError,
-         .what = "the gyroscope's axes are left-handed: with one axis inverted it explains " +
-                 percent(fit.mirror_gain) + " more of the rotation in the images",
-         .means = "no mounting of the camera explains this",
-         .to_do = "invert the mirrored axis; the data sheet of the sensor shows the axes"});
+    result.add(kError, "imu.mirrored",
+               "the gyroscope's axes are left-handed: with one axis inverted it explains " +
+                   percent(fit.mirror_gain) + " more of the rotation in the images",
+               "no mounting of the camera explains this",
+               "invert the mirrored axis; the data sheet of the sensor shows the axes");
     return;
   }
   const double angle = angle_between(R_cam_body, fit.Q);
-  result.figures.push_back(
-      {"camera to inertial sensor",
-       "rotated by " + fixed(kDegrees * angle, 1) + " degrees against T_body_cam"});
+  result.figure("camera to inertial sensor",
+                "rotated by " + fixed(kDegrees * angle, 1) + " degrees against T_body_cam");
   if (angle < kOff) return;
   const bool is_inverse = angle > kFar && angle_between(R_cam_body.transpose(), fit.Q) < kClose;
-  result.findings.push_back(
-      {.id = is_inverse ? "extrinsics.inverted" : "extrinsics.rotation",
-       .severity = angle > kFar ? Severity::kError : Severity::kWarning,
-       .what = is_inverse ? "the rotation of T_body_cam (T_BS) is inverted: it is " +
-                                fixed(kDegrees * angle, 0) + " degrees off, and its inverse " +
-                                fixed(kDegrees * angle_between(R_cam_body.transpose(), fit.Q), 1)
-                          : "the left camera is rotated by " + fixed(kDegrees * angle, 1) +
-                                " degrees against T_body_cam",
-       .means = "odometry rotates in the wrong direction, or drifts",
-       .to_do = is_inverse
-                    ? "replace it by its inverse: T_BS maps points from the camera to the body"
-                    : "calibrate cameras and inertial sensor together (Kalibr); "
-                      "vio.calibrate corrects a few degrees"});
+  result.add(angle > kFar ? kError : kWarning,
+             is_inverse ? "extrinsics.inverted" : "extrinsics.rotation",
+             is_inverse ? "the rotation of T_body_cam (T_BS) is inverted: it is " +
+                              fixed(kDegrees * angle, 0) + " degrees off, and its inverse " +
+                              fixed(kDegrees * angle_between(R_cam_body.transpose(), fit.Q), 1)
+                        : "the left camera is rotated by " + fixed(kDegrees * angle, 1) +
+                              " degrees against T_body_cam",
+             "odometry rotates in the wrong direction, or drifts",
+             is_inverse ? "replace it by its inverse: T_BS maps points from the camera to the body"
+                        : "calibrate cameras and inertial sensor together (Kalibr); "
+                          "vio.calibrate corrects a few degrees");
 }
 
 void examine_offset(const InertialFit& fit, Examination& result) {
   constexpr double kSmall_s = 3e-3, kLarge_s = 5e-3, kSure = 4.0;
   if (fit.offset_at_limit) {
-    result.figures.push_back(
-        {"time offset", "not determined: no best offset within " + milliseconds(kMaxOffset_s)});
+    result.figure("time offset",
+                  "not determined: no best offset within " + milliseconds(kMaxOffset_s));
     return;
   }
-  result.figures.push_back({"time offset", milliseconds(fit.offset_s) + " +- " +
-                                               milliseconds(fit.offset_sigma_s) +
-                                               ", to be added to stamps of images"});
+  result.figure("time offset", milliseconds(fit.offset_s) + " +- " +
+                                   milliseconds(fit.offset_sigma_s) +
+                                   ", to be added to stamps of images");
   if (std::abs(fit.offset_s) < std::max(kSmall_s, kSure * fit.offset_sigma_s)) return;
-  result.findings.push_back(
-      {.id = "imu.time_offset",
-       .severity = std::abs(fit.offset_s) < kLarge_s ? Severity::kNote : Severity::kWarning,
-       .what = "stamps of the inertial sensor are " + milliseconds(std::abs(fit.offset_s)) +
-               " (+- " + milliseconds(fit.offset_sigma_s) +
-               (fit.offset_s > 0.0 ? ") later" : ") earlier") + " than those of the images",
-       .means = "odometry is less accurate until vio.calibrate has estimated the offset",
-       .to_do = "set camera_time_offset_s: " + rounded(fit.offset_s, 3) +
-                " in the rig file, or stamp both sensors by one clock"});
+  result.add(std::abs(fit.offset_s) < kLarge_s ? kNote : kWarning, "imu.time_offset",
+             "stamps of the inertial sensor are " + milliseconds(std::abs(fit.offset_s)) + " (+- " +
+                 milliseconds(fit.offset_sigma_s) + (fit.offset_s > 0.0 ? ") later" : ") earlier") +
+                 " than those of the images",
+             "odometry is less accurate until vio.calibrate has estimated the offset",
+             "set camera_time_offset_s: " + rounded(fit.offset_s, 3) +
+                 " in the rig file, or stamp both sensors by one clock");
 }
 
 void examine_focal(const SensorSample& sample, const StereoRig& rig, const VisualRotations& seen,
@@ -118,23 +108,20 @@ void examine_focal(const SensorSample& sample, const StereoRig& rig, const Visua
   const bool has_depth = 2 * seen.with_depth > seen.steps.size();
   const auto fit = has_depth ? fit_focal(sample.steps, rig, sample.imu, inertial) : std::nullopt;
   if (!fit || !(fit->sigma < kMaxSigma)) {
-    result.figures.push_back({kName, std::string("not determined: ") +
-                                         (has_depth ? "too little rotation across the optical axis"
-                                                    : "no stereo depth that fits")});
+    result.figure(kName, std::string("not determined: ") +
+                             (has_depth ? "too little rotation across the optical axis"
+                                        : "no stereo depth that fits"));
     return;
   }
   const std::string factor = fixed(fit->factor, 3) + " +- " + fixed(fit->sigma, 3);
-  result.figures.push_back({kName, "times " + factor + " of the calibration's"});
+  result.figure(kName, "times " + factor + " of the calibration's");
   if (std::abs(fit->factor - 1.0) < std::max(kSlack, kSure * fit->sigma)) return;
-  result.findings.push_back(
-      {.id = "camera.focal",
-       .severity = Severity::kWarning,
-       .what = "the images agree with the gyroscope if the focal lengths are " + factor +
-               " times those of the calibration",
-       .means = "distances and rotations are wrong by this factor",
-       .to_do =
-           "calibrate the cameras again at the resolution of the images, or check the scale of "
-           "the gyroscope"});
+  result.add(kWarning, "camera.focal",
+             "the images agree with the gyroscope if the focal lengths are " + factor +
+                 " times those of the calibration",
+             "distances and rotations are wrong by this factor",
+             "calibrate the cameras again at the resolution of the images, or check the scale of "
+             "the gyroscope");
 }
 
 void examine_gravity(const SensorSample& sample, Examination& result) {
@@ -143,10 +130,10 @@ void examine_gravity(const SensorSample& sample, Examination& result) {
   for (const ImuSample& measured : sample.imu) norms.push_back(measured.accel.norm());
   constexpr double kGravity = 9.81;
   const double found = quantile(std::move(norms), 0.5);
-  result.figures.push_back({"accelerometer", "median norm " + fixed(found, 2) + " m/s^2"});
+  result.figure("accelerometer", "median norm " + fixed(found, 2) + " m/s^2");
   const auto is_about = [found](double value) { return std::abs(found / value - 1.0) < 0.15; };
   if (is_about(kGravity) || std::isnan(found)) return;
-  Finding finding{.id = "imu.gravity", .severity = Severity::kError};
+  Finding finding{.id = "imu.gravity", .severity = kError};
   finding.what = "the accelerometer measures " + rounded(found, 3) + " in the median, gravity is " +
                  fixed(kGravity, 2) + " m/s^2";
   finding.means = "odometry estimates a wrong direction of gravity";
@@ -176,16 +163,16 @@ Examination examine_inertial(const SensorSample& sample, const StereoRig& rig) {
   const VisualRotations seen = visual_rotations(sample.steps, rig, use_depth);
   const auto fit = fit_inertial(seen.steps, sample.imu);
   if (!fit || !(fit->image_rms >= kMinRate_radps)) {
-    result.figures.push_back({"images against the gyroscope",
-                              fit ? "not determined: the camera turns by only " +
-                                        fixed(kDegrees * fit->image_rms, 2) + " degrees/s"
-                                  : "not determined: " + std::to_string(seen.steps.size()) +
-                                        " pairs of images close in time"});
+    result.figure("images against the gyroscope",
+                  fit ? "not determined: the camera turns by only " +
+                            fixed(kDegrees * fit->image_rms, 2) + " degrees/s"
+                      : "not determined: " + std::to_string(seen.steps.size()) +
+                            " pairs of images close in time");
     return result;
   }
-  result.figures.push_back({"images against the gyroscope",
-                            percent(fit->explained) + " explained, " + std::to_string(fit->steps) +
-                                " steps at " + fixed(kDegrees * fit->image_rms, 1) + " degrees/s"});
+  result.figure("images against the gyroscope",
+                percent(fit->explained) + " explained, " + std::to_string(fit->steps) +
+                    " steps at " + fixed(kDegrees * fit->image_rms, 1) + " degrees/s");
   examine_relation(*fit, result);
   if (!(fit->explained >= kRelated)) return result;
   examine_scale(*fit, result);
@@ -193,8 +180,8 @@ Examination examine_inertial(const SensorSample& sample, const StereoRig& rig) {
   if (fit->gyro_rms[1] * fit->scale > kSecondAxis_radps)
     examine_direction(*fit, rig.cameras[0], result);
   else
-    result.figures.push_back(
-        {"camera to inertial sensor", "not determined: the camera turns about one axis only"});
+    result.figure("camera to inertial sensor",
+                  "not determined: the camera turns about one axis only");
   if (std::abs(fit->scale - 1.0) < 0.1) examine_focal(sample, rig, seen, *fit, result);
   return result;
 }

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "modules/core/camera.hpp"
-#include "modules/diagnosis/examination.hpp"
+#include "modules/diagnosis/finding.hpp"
 #include "modules/diagnosis/sensor_sample.hpp"
 #include "modules/place_recognition/vocabulary.hpp"
 #include "modules/sensors/dataset_reader.hpp"

@@ -5,11 +5,13 @@
 #include <utility>
 
 #include "modules/core/text_table.hpp"
-#include "modules/diagnosis/figure_text.hpp"
+#include "modules/diagnosis/finding.hpp"
 #include "modules/diagnosis/stereo_fit.hpp"
 
 namespace km {
 namespace {
+
+using enum Severity;
 
 // Texts of the finding for a StereoFault.
 struct FaultWords {
@@ -59,12 +61,8 @@ void examine_pair(const StereoAlternative& found, const StereoFit& given, Examin
   if (is_named) what += "; with this fault undone " + percent(found.fit.inlier_ratio);
   if (found.fault == StereoFault::kFocalLength)
     what += ", with the right focal length times " + fixed(found.focal_ratio, 3);
-  result.findings.push_back(
-      {.id = words.id,
-       .severity = Severity::kError,
-       .what = std::move(what),
-       .means = "depth is wrong or missing, so odometry and loop closures fail",
-       .to_do = words.to_do});
+  result.add(kError, words.id, std::move(what),
+             "depth is wrong or missing, so odometry and loop closures fail", words.to_do);
 }
 
 void examine_baseline(const StereoRig& rig, const StereoFit& fit, Examination& result) {
@@ -72,16 +70,14 @@ void examine_baseline(const StereoRig& rig, const StereoFit& fit, Examination& r
   const double baseline_m = rig.baseline_m();
   const std::string depth =
       std::isfinite(fit.depth_m) ? "median depth " + fixed(fit.depth_m, 1) + " m" : "no depth";
-  result.figures.push_back({"baseline", fixed(baseline_m, 3) + " m, " + depth +
-                                            " (images do not determine the length)"});
+  result.figure("baseline",
+                fixed(baseline_m, 3) + " m, " + depth + " (images do not determine the length)");
   if (!(baseline_m >= kLeast_m && baseline_m <= kMost_m))
-    result.findings.push_back(
-        {.id = "stereo.baseline",
-         .severity = Severity::kWarning,
-         .what = "a baseline of " + rounded(baseline_m, 4) + " m, outside of the usual " +
-                 fixed(kLeast_m, 2) + " to " + fixed(kMost_m, 1) + " m; " + depth,
-         .means = "if its unit is wrong, all lengths are wrong by the same factor",
-         .to_do = "state the translation in metres, not in millimetres or inches"});
+    result.add(kWarning, "stereo.baseline",
+               "a baseline of " + rounded(baseline_m, 4) + " m, outside of the usual " +
+                   fixed(kLeast_m, 2) + " to " + fixed(kMost_m, 1) + " m; " + depth,
+               "if its unit is wrong, all lengths are wrong by the same factor",
+               "state the translation in metres, not in millimetres or inches");
 }
 
 }  // namespace
@@ -91,11 +87,11 @@ Examination examine_stereo(const SensorSample& sample, const StereoRig& rig) {
   if (rig.depth_source != DepthSource::kRightImage) return result;
   const StereoFit given = fit_of(sample.stereo, rig);
   if (given.points < kLeastStereoPoints) {
-    result.figures.push_back(
-        {"stereo", "not determined: " + std::to_string(given.points) + " points in both images"});
+    result.figure("stereo",
+                  "not determined: " + std::to_string(given.points) + " points in both images");
     return result;
   }
-  result.figures.push_back({"stereo", fit_text(given)});
+  result.figure("stereo", fit_text(given));
   examine_pair(best_alternative(sample.stereo, rig), given, result);
   examine_baseline(rig, given, result);
   return result;

@@ -1,34 +1,34 @@
 #include "modules/diagnosis/examine_sensors.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <map>
 #include <utility>
 
 #include "modules/core/text_table.hpp"
-#include "modules/diagnosis/figure_text.hpp"
+#include "modules/diagnosis/finding.hpp"
 #include "modules/evaluation/statistics.hpp"
 #include "modules/recordings/stamp_statistics.hpp"
 
 namespace km {
 namespace {
 
-// Id of the finding: "recording.missing_images" for "missing images".
-std::string id_of(ReaderFault fault) {
-  std::string id = std::string("recording.") + to_string(fault);
-  std::ranges::replace(id, ' ', '_');
-  return id;
-}
+using enum Severity;
 
-Finding fault_finding(ReaderFault fault, const ReaderReport::Entry& entry, double of) {
+void examine_fault(ReaderFault fault, const ReaderReport::Entry& entry, double of,
+                   Examination& result) {
   constexpr double kFew = 0.01, kHalf = 0.5;
   const double share = static_cast<double>(entry.count) / std::max(of, 1.0);
-  return {.id = id_of(fault),
-          .severity = share > kHalf  ? Severity::kError
-                      : share > kFew ? Severity::kWarning
-                                     : Severity::kNote,
-          .what = std::to_string(entry.count) + ' ' + to_string(fault) + ", " + percent(share) +
-                  ", first: " + entry.first,
-          .means = "the affected parts are skipped",
-          .to_do = "repair the recording, or record again if there are many"};
+  std::string id = std::string("recording.") + to_string(fault);  // "recording.missing_images"
+  std::ranges::replace(id, ' ', '_');
+  result.add(share > kHalf  ? kError
+             : share > kFew ? kWarning
+                            : kNote,
+             std::move(id),
+             std::to_string(entry.count) + ' ' + to_string(fault) + ", " + percent(share) +
+                 ", first: " + entry.first,
+             "the affected parts are skipped",
+             "repair the recording, or record again if there are many");
 }
 
 // Number of usable items of the kind that a fault counts. Images are counted per camera, lost
@@ -55,33 +55,20 @@ double usable_count(ReaderFault fault, const SensorSample& sample) {
 void examine_rate(const char* sensor, const std::string& id, const std::vector<Stamp>& stamps,
                   double least_hz, double longest_gap_s, Examination& result) {
   const StampStatistics found = stamp_statistics(stamps);
-  result.figures.push_back(
-      {std::string(sensor) + ", rate", fixed(found.rate_hz, 1) + " Hz, largest gap " +
-                                           fixed(found.largest_gap_s, 3) + " s, jitter " +
-                                           milliseconds(found.jitter_s)});
+  result.figure(std::string(sensor) + ", rate", fixed(found.rate_hz, 1) + " Hz, largest gap " +
+                                                    fixed(found.largest_gap_s, 3) + " s, jitter " +
+                                                    milliseconds(found.jitter_s));
   if (!(found.rate_hz >= least_hz))
-    result.findings.push_back({.id = id + ".rate",
-                               .severity = Severity::kWarning,
-                               .what = std::string(sensor) + " at " + fixed(found.rate_hz, 1) +
-                                       " Hz, less than " + fixed(least_hz, 0) + " Hz",
-                               .means = "odometry may lose track in fast motion",
-                               .to_do = "record at a higher rate"});
+    result.add(kWarning, id + ".rate",
+               std::string(sensor) + " at " + fixed(found.rate_hz, 1) + " Hz, less than " +
+                   fixed(least_hz, 0) + " Hz",
+               "odometry may lose track in fast motion", "record at a higher rate");
   if (found.largest_gap_s > longest_gap_s)
-    result.findings.push_back(
-        {.id = id + ".gap",
-         .severity = Severity::kWarning,
-         .what = std::string(sensor) + " with a gap of " + fixed(found.largest_gap_s, 2) + " s",
-         .means = "odometry may lose track in the gap and start again",
-         .to_do = "find out why the driver or the disk stopped; --from and --to choose a part "
-                  "without the gap"});
-}
-
-Finding image_finding(const char* id, std::string what, const char* means, const char* to_do) {
-  return {.id = id,
-          .severity = Severity::kWarning,
-          .what = std::move(what),
-          .means = means,
-          .to_do = to_do};
+    result.add(kWarning, id + ".gap",
+               std::string(sensor) + " with a gap of " + fixed(found.largest_gap_s, 2) + " s",
+               "odometry may lose track in the gap and start again",
+               "find out why the driver or the disk stopped; --from and --to choose a part "
+               "without the gap");
 }
 
 std::vector<double> values_of(const std::vector<ImageQuality>& qualities, const auto& value) {
@@ -96,14 +83,12 @@ std::vector<double> values_of(const std::vector<ImageQuality>& qualities, const 
 Examination examine_streams(const SensorSample& sample, const ReaderReport& report) {
   Examination result;
   if (sample.frames.empty())
-    result.findings.push_back({.id = "recording.no_frames",
-                               .severity = Severity::kError,
-                               .what = "no frame could be read",
-                               .means = "there are no images to estimate motion from",
-                               .to_do = "the other findings state the skipped parts"});
+    result.add(kError, "recording.no_frames", "no frame could be read",
+               "there are no images to estimate motion from",
+               "the other findings state the skipped parts");
   for (const auto& [fault, entry] : report.entries())
-    result.findings.push_back(fault_finding(
-        fault, entry, usable_count(fault, sample) + static_cast<double>(entry.count)));
+    examine_fault(fault, entry, usable_count(fault, sample) + static_cast<double>(entry.count),
+                  result);
   constexpr double kFrames_hz = 8.0, kFrameGap_s = 0.25, kSamples_hz = 80.0, kSampleGap_s = 0.05;
   if (sample.frames.size() > 1)
     examine_rate("images", "frames", sample.frames, kFrames_hz, kFrameGap_s, result);
@@ -126,33 +111,61 @@ Examination examine_images(const SensorSample& sample) {
   const double sharpness = median([](const ImageQuality& image) { return image.sharpness; });
   const double corners = quantile(
       values_of(sample.qualities, [](const ImageQuality& image) { return image.corners; }), 0.2);
-  result.figures.push_back({"exposure", "mean level " + fixed(level, 0) + " of 255, " +
-                                            percent(saturated) + " saturated"});
-  result.figures.push_back({"sharpness", fixed(sharpness, 2) + " (0.5 blurred, 1 sharp)"});
-  result.figures.push_back({"corners", fixed(corners, 0) + " in four images of five, or more"});
+  result.figure("exposure",
+                "mean level " + fixed(level, 0) + " of 255, " + percent(saturated) + " saturated");
+  result.figure("sharpness", fixed(sharpness, 2) + " (0.5 blurred, 1 sharp)");
+  result.figure("corners", fixed(corners, 0) + " in four images of five, or more");
   constexpr double kDark = 25.0, kBright = 225.0, kSaturated = 0.35, kBlurred = 0.58;
   constexpr double kFewCorners = 100.0;
   if (level < kDark)
-    result.findings.push_back(image_finding("images.dark",
-                                            "a mean grey level of " + fixed(level, 0) + " of 255",
-                                            "few features are found, and some of them are noise",
-                                            "use a longer exposure, more gain or more light"));
+    result.add(kWarning, "images.dark", "a mean grey level of " + fixed(level, 0) + " of 255",
+               "few features are found, and some of them are noise",
+               "use a longer exposure, more gain or more light");
   if (level > kBright || saturated > kSaturated)
-    result.findings.push_back(image_finding(
-        "images.bright",
-        percent(saturated) + " of the pixels are saturated, mean level " + fixed(level, 0),
-        "saturated areas have no features", "use a shorter or automatic exposure"));
+    result.add(kWarning, "images.bright",
+               percent(saturated) + " of the pixels are saturated, mean level " + fixed(level, 0),
+               "saturated areas have no features", "use a shorter or automatic exposure");
   if (sharpness < kBlurred)
-    result.findings.push_back(image_finding(
-        "images.blurred", "edges are blurred: sharpness " + fixed(sharpness, 2) + ", below 0.58",
-        "features are less accurate, and fewer are tracked",
-        "focus and clean the lens, or use a shorter exposure"));
+    result.add(kWarning, "images.blurred",
+               "edges are blurred: sharpness " + fixed(sharpness, 2) + ", below 0.58",
+               "features are less accurate, and fewer are tracked",
+               "focus and clean the lens, or use a shorter exposure");
   if (corners < kFewCorners)
-    result.findings.push_back(
-        image_finding("images.few_corners",
-                      "less than " + fixed(corners + 1.0, 0) + " corners in one image of five",
-                      "odometry may lose track in areas without texture",
-                      "add texture or light, or lower tracker.fast_threshold"));
+    result.add(kWarning, "images.few_corners",
+               "less than " + fixed(corners + 1.0, 0) + " corners in one image of five",
+               "odometry may lose track in areas without texture",
+               "add texture or light, or lower tracker.fast_threshold");
+  return result;
+}
+
+Examination examine_words(std::span<const std::vector<BinaryDescriptor>> images,
+                          const Vocabulary& vocabulary) {
+  std::map<std::uint32_t, double> counts;
+  double features = 0.0;
+  for (const std::vector<BinaryDescriptor>& image : images)
+    for (const std::uint32_t word : vocabulary.words(image)) {
+      ++counts[word];
+      ++features;
+    }
+  constexpr double kEnough = 1000.0;
+  if (features < kEnough)
+    return {.figures = {{"vocabulary", "not determined: " + fixed(features, 0) + " features"}},
+            .findings = {}};
+  double entropy = 0.0;
+  for (const auto& [word, count] : counts) entropy -= count / features * std::log(count / features);
+  const double words = std::exp(entropy);
+  const double most = std::min(features, static_cast<double>(vocabulary.size()));
+  Examination result;
+  result.figure("vocabulary", fixed(words, 0) + " words distinguish " + fixed(features, 0) +
+                                  " features, of " + std::to_string(vocabulary.size()));
+  constexpr double kLeastWords = 200.0, kLeastShare = 0.05;
+  if (words < kLeastWords || words < kLeastShare * most)
+    result.add(kWarning, "vocabulary.coverage",
+               "the vocabulary distinguishes " + fixed(features, 0) + " features by only " +
+                   fixed(words, 0) + " words",
+               "different places look alike, so candidates are few or wrong",
+               "train a vocabulary on images like these: kimera_multi_vocabulary "
+               "train");
   return result;
 }
 

@@ -2,9 +2,12 @@
 
 #include <span>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "modules/core/json.hpp"
+#include "modules/core/text_table.hpp"
 
 namespace km {
 
@@ -45,5 +48,47 @@ void to_json(Json& json, const Finding& finding);
 /// Inverse of to_json(). Missing texts become empty, a missing severity kNote. Throws
 /// std::runtime_error for an unknown severity.
 void from_json(const Json& json, Finding& finding);
+
+/// A measured number as text with its unit, or the reason why it is not determined.
+struct Figure {
+  std::string name;
+  std::string value;
+};
+
+/// The figures of an examination and its findings.
+struct Examination {
+  std::vector<Figure> figures;
+  std::vector<Finding> findings;
+
+  void add(const Examination& other) {
+    figures.insert(figures.end(), other.figures.begin(), other.figures.end());
+    findings.insert(findings.end(), other.findings.begin(), other.findings.end());
+  }
+  /// Adds a finding; see Finding.
+  void add(Severity severity, std::string id, std::string what, std::string means,
+           std::string to_do = {}) {
+    findings.push_back(
+        {std::move(id), severity, std::move(what), std::move(means), std::move(to_do)});
+  }
+  void figure(std::string name, std::string value) {
+    figures.push_back({std::move(name), std::move(value)});
+  }
+};
+
+/// One aligned line of text per figure.
+[[nodiscard]] std::string to_text(const std::vector<Figure>& figures);
+
+/// True if a finding has this id.
+[[nodiscard]] bool has(const Examination& examination, std::string_view id);
+
+/// "5.3 %" for 0.053, "12 %" for 0.12.
+[[nodiscard]] inline std::string percent(double share) {
+  return fixed(100.0 * share, share < 0.1 ? 1 : 0) + " %";
+}
+
+/// "1.5 ms" for 0.0015.
+[[nodiscard]] inline std::string milliseconds(double seconds) {
+  return fixed(1e3 * seconds, 1) + " ms";
+}
 
 }  // namespace km

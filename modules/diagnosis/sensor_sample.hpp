@@ -1,13 +1,13 @@
 #pragma once
 
 #include <cstddef>
+#include <opencv2/core.hpp>
 #include <optional>
 #include <vector>
 
 #include "modules/core/frame.hpp"
 #include "modules/core/image_size.hpp"
 #include "modules/core/keyframe.hpp"
-#include "modules/diagnosis/forward_backward.hpp"
 
 namespace km {
 
@@ -55,6 +55,12 @@ struct SensorSample {
       descriptors;  ///< ORB descriptors of each left image in `qualities`.
   std::vector<Stamp> frames;
   std::vector<ImuSample> imu;
+};
+
+/// An image with the pyramid for OpenCV's KLT tracker: window 21 px, 4 levels.
+struct KltImage {
+  cv::Mat image;                 ///< 8-bit grey.
+  std::vector<cv::Mat> pyramid;  ///< With borders and derivatives.
 };
 
 /// Collects a SensorSample, deterministic for equal packets. Not thread-safe.

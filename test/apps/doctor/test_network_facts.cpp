@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "apps/doctor/network_facts.hpp"
-#include "modules/diagnosis/examination.hpp"
+#include "modules/diagnosis/finding.hpp"
 #include "test/support/process.hpp"
 
 namespace km {

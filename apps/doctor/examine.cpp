@@ -1,0 +1,277 @@
+#include "apps/doctor/examine.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <condition_variable>
+#include <limits>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <variant>
+#include <vector>
+
+#include "apps/result_files.hpp"
+#include "apps/robot/robot_config.hpp"
+#include "apps/robot/robot_input.hpp"
+#include "apps/robot/run_findings.hpp"
+#include "modules/core/input_file.hpp"
+#include "modules/core/text_table.hpp"
+#include "modules/diagnosis/examine_sensors.hpp"
+#include "modules/evaluation/closure_truth.hpp"
+#include "modules/place_recognition/vocabulary_file.hpp"
+#include "modules/recordings/ros_messages.hpp"
+#include "modules/sensors/node/rig_file.hpp"
+#include "runtime/clock.hpp"
+#include "runtime/dds/ros_subscription.hpp"
+
+namespace km {
+namespace {
+
+namespace fs = std::filesystem;
+
+using enum Severity;
+
+Examination refused(const std::string& why) {
+  return {
+      .figures = {},
+      .findings = {
+          {.id = "recording.refused",
+           .severity = kError,
+           .what = why,
+           .means = "no robot can play this input",
+           .to_do = "correct the stated fault; kimera_multi_robot --inspect lists the contents"}}};
+}
+
+// Stops a live reader after some seconds, also while the reader waits for silent sensors.
+class Stopper {
+ public:
+  Stopper(DatasetReader& reader, double seconds)
+      : thread_([this, &reader, seconds](const std::stop_token& stop) {
+          std::unique_lock lock(mutex_);
+          ended_.wait_for(lock, stop, steady_duration(seconds), [] { return false; });
+          reader.stop();
+        }) {}
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable_any ended_;
+  std::jthread thread_;  // last member: stops first
+};
+
+SensorSample sample_of(DatasetReader& reader, double live_s,
+                       const ReportProgress& report_progress) {
+  std::optional<Stopper> stopper;
+  if (live_s > 0.0) stopper.emplace(reader, live_s);
+  SensorSampler sampler;
+  const auto total = static_cast<double>(reader.pair_count());
+  for (double done = 0.0; const auto packet = reader.next(); ++done) {
+    report_progress("looking at images", total > 0.0 ? done / total : 0.0);
+    sampler.add(*packet);
+  }
+  return sampler.sample();
+}
+
+std::string last_name(const std::string& topic) {
+  return topic.substr(topic.rfind('/') + 1);
+}
+
+// Name of a type in ROS 1: "sensor_msgs/Imu" for "sensor_msgs/msg/Imu" too.
+std::string plain(const std::string& type) {
+  return type.substr(0, type.find('/')) + '/' + last_name(type);
+}
+
+Finding silent(const ListenedTopic& wanted, const std::vector<ListenedTopic>& topics,
+               const std::vector<TopicPublisher>& publishers) {
+  Finding finding{.id = "live.silent", .severity = kError};
+  const auto same = std::ranges::find(publishers, wanted.topic, &TopicPublisher::topic);
+  // Similarity of a topic to the wanted topic: length of the common prefix, plus 1. It is 0 for
+  // another type, and for a topic that the rig file names.
+  const auto alike = [&](const TopicPublisher& other) {
+    if (std::ranges::find(topics, other.topic, &ListenedTopic::topic) != topics.end()) return 0L;
+    const auto [end, rest] = std::ranges::mismatch(wanted.topic, other.topic);
+    return plain(other.type) == plain(wanted.type) ? 1 + (end - wanted.topic.begin()) : 0;
+  };
+  const auto similar = std::ranges::max_element(publishers, {}, alike);
+  finding.what = "no message on " + wanted.topic + " (" + wanted.type + ')';
+  finding.means = "the robot waits for this topic";
+  if (same != publishers.end() && plain(same->type) != plain(wanted.type)) {
+    finding.id = "live.other_type";
+    finding.what += ": its publisher sends " + same->type;
+    finding.to_do =
+        "name a topic of " + wanted.type + ": those of compressed images end with /compressed";
+  } else if (same != publishers.end()) {
+    finding.what += ", although a program publishes it";
+    finding.to_do =
+        "check that the driver has data; large images need a net.core.rmem_max of several "
+        "megabytes";
+  } else if (similar != publishers.end() && alike(*similar) > 0) {
+    finding.id = "live.similar_name";
+    finding.what += ": no program publishes it, but " + similar->topic + " is of that type";
+    finding.to_do = "name the topic in the rig file as the driver does";
+  } else {
+    finding.what += ": no program publishes it";
+    finding.to_do = "start the driver; check ROS_DOMAIN_ID (ros.domain) and ros.interface";
+  }
+  return finding;
+}
+
+Finding unfinished_run(const fs::path& folder) {
+  return {.id = "run.unfinished",
+          .severity = kWarning,
+          .what = unfinished(folder),
+          .means =
+              "trajectory, closures and map are not written yet; run.journal holds them up to the "
+              "last second",
+          .to_do = way_on(folder)};
+}
+
+// Note on a missing or invalid file, which need not be a fault of the run.
+Finding missing(const char* file, const std::string& why) {
+  return {.id = std::string("results.") + file,
+          .severity = kNote,
+          .what = why,
+          .means = "this file is not examined"};
+}
+
+std::map<RobotId, ClosureTally> tallies_in(const fs::path& folder, RobotId self) {
+  std::map<RobotId, ClosureTally> tallies;
+  for (const ClosureRecord& closure : read_closures(folder / "loop_closures.csv"))
+    tallies[closure.id.from.robot == self ? closure.id.to.robot : closure.id.from.robot].add(
+        closure.stage, closure.reason);
+  return tallies;
+}
+
+RunFacts facts_in(const fs::path& folder, std::vector<Finding>& findings) {
+  RunFacts facts{
+      .summary = read_summary(folder / kSummary), .closures = {}, .names = {}, .pcm = {}};
+  try {
+    facts.closures = tallies_in(folder, facts.summary.robot);
+  } catch (const InputFileError& error) {
+    findings.push_back(missing("loop_closures", error.what()));
+  }
+  try {
+    RobotOptions options;
+    options.configs = {folder / "config.yaml"};
+    facts.pcm = load_robot_config(options).pcm;
+  } catch (const ConfigError& error) {
+    findings.push_back(missing("config", error.what()));
+  }
+  for (const auto& [robot, tally] : facts.closures)
+    if (robot != facts.summary.robot) facts.names.emplace(robot, "");
+  return facts;
+}
+
+std::vector<Figure> figures_of(const RunFacts& facts) {
+  ClosureTally all;
+  for (const auto& [robot, tally] : facts.closures) all += tally;
+  const RunSummary& run = facts.summary;
+  return {{run.name, std::to_string(run.frames) + " frames, " + std::to_string(run.keyframes) +
+                         " keyframes, closures " + std::to_string(all.candidates) + " > " +
+                         std::to_string(all.verified) + " > " + std::to_string(all.inliers) +
+                         ", in one frame with " +
+                         std::to_string(run.pgo.members.empty() ? 0 : run.pgo.members.size() - 1) +
+                         ", " + fixed(run.seconds, 1) + " s: " + run.exit_reason}};
+}
+
+}  // namespace
+
+Examination examine_packets(DatasetReader& reader, const RobotConfig& config, double live_s,
+                            const ReportProgress& report_progress) {
+  const SensorSample sample = sample_of(reader, live_s, report_progress);
+  report_progress("comparing", 0.0);
+  Examination result = examine_streams(sample, reader.report());
+  for (const std::string& remark : reader.remarks())
+    result.add(kNote, "recording.remark", remark, "the reader takes this into account");
+  if (sample.frames.empty()) return result;
+  const StereoRig& rig = reader.rig().stereo;
+  result.add(examine_images(sample));
+  result.add(examine_stereo(sample, rig));
+  result.add(examine_inertial(sample, rig));
+  result.add(examine_words(sample.descriptors, load_vocabulary(find_shipped_file(
+                                                   config.run.vocabulary, "run.vocabulary"))));
+  sort_by_severity(result.findings);
+  return result;
+}
+
+Examination examine_recording(const RobotOptions& options, const RobotConfig& config, double live_s,
+                              const ReportProgress& report_progress) try {
+  const auto input = [&] {
+    SignalWatch signals;  // interrupts the wait for a live calibration
+    return open_robot_input(options, config, std::nullopt, read_rig_input(options), signals);
+  }();
+  if (!input) return refused("interrupted before the calibration was complete");
+  return examine_packets(*std::get<std::unique_ptr<DatasetReader>>(input->source), config,
+                         options.is_live ? live_s : 0.0, report_progress);
+} catch (const DatasetError& error) {
+  return refused(error.what());
+} catch (const ConfigError& error) {
+  return refused(error.what());
+} catch (const InputFileError& error) {
+  return refused(error.what());
+}
+
+Examination examine_topics(const std::vector<ListenedTopic>& topics,
+                           const std::vector<TopicPublisher>& publishers, double listened_s,
+                           int domain) {
+  Examination result;
+  for (const ListenedTopic& topic : topics)
+    result.figure(topic.topic, std::to_string(topic.messages) + " messages of " + topic.type +
+                                   " in " + fixed(listened_s, 1) + " s");
+  const auto is_silent = [](const ListenedTopic& topic) { return topic.messages == 0; };
+  if (publishers.empty() && std::ranges::all_of(topics, is_silent)) {
+    result.add(kError, "live.no_publishers",
+               "no program publishes a topic on domain " + std::to_string(domain) + " of ROS",
+               "no driver runs, or the drivers use another domain or interface",
+               "set ros.domain to the ROS_DOMAIN_ID of the drivers; check ros.interface and "
+               "ros.peers");
+    return result;
+  }
+  for (const ListenedTopic& topic : topics)
+    if (is_silent(topic)) result.findings.push_back(silent(topic, topics, publishers));
+  return result;
+}
+
+Examination examine_live_topics(const SensorTopicNames& names, const RosConfig& config,
+                                double listen_s, const ReportProgress& report_progress) {
+  const auto network = std::make_shared<const RosNetwork>(config);
+  RosDiscovery discovery(*network);
+  RosSubscription subscription(network, live_topics(names));
+  std::vector<ListenedTopic> topics;
+  for (const RosTopic& topic : subscription.topics()) topics.push_back({topic.topic, topic.type});
+  const double start_s = steady_now_s();
+  subscription.give_up_after(listen_s);
+  while (const auto message = subscription.next()) {
+    report_progress("listening", (steady_now_s() - start_s) / listen_s);
+    ++topics[message->topic].messages;
+  }
+  return examine_topics(topics, discovery.publishers(), listen_s, config.domain);
+}
+
+bool are_results(const fs::path& folder) {
+  return is_folder(folder) && !robot_folders(folder).empty();
+}
+
+Examination examine_results(const fs::path& folder) {
+  Examination result;
+  std::vector<RunFacts> runs;
+  for (const fs::path& robot : robot_folders(folder)) {
+    if (!is_file(robot / kSummary)) {
+      result.findings.push_back(unfinished_run(robot));
+      continue;
+    }
+    runs.push_back(facts_in(robot, result.findings));
+    for (const Figure& figure : figures_of(runs.back())) result.figures.push_back(figure);
+    for (const Finding& finding : runs.back().summary.findings)
+      if (finding.id == kFailedRun) result.findings.push_back(finding);
+  }
+  // The findings in the summary of a single robot include the links to other robots.
+  const bool is_alone = runs.size() == 1 && !runs.front().summary.findings.empty();
+  const std::vector<Finding> found = is_alone ? runs.front().summary.findings : findings_of(runs);
+  for (const Finding& finding : found)
+    if (!is_alone || finding.id != kFailedRun) result.findings.push_back(finding);
+  sort_by_severity(result.findings);
+  return result;
+}
+
+}  // namespace km
