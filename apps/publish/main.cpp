@@ -6,13 +6,12 @@
 #include <thread>
 
 #include "apps/program_options.hpp"
-#include "apps/publish/euroc_messages.hpp"
-#include "apps/publish/fix_messages.hpp"
 #include "apps/publish/message_player.hpp"
+#include "apps/publish/recorded_messages.hpp"
 #include "modules/absolute_fixes/fix_reader.hpp"
 #include "modules/core/text_table.hpp"
 #include "modules/recordings/open_bag.hpp"
-#include "modules/sensors/node/euroc_rig.hpp"
+#include "modules/sensors/node/open_folder.hpp"
 #include "runtime/clock.hpp"
 #include "runtime/log.hpp"
 #include "runtime/signal_watch.hpp"
@@ -50,7 +49,7 @@ struct Options {
   std::size_t wait = 0;
   double patience_s = 300.0;
   std::filesystem::path fixes;
-  std::string fix_topic = "/fix", fix_type = FixMessages::kGnssType;
+  std::string fix_topic = "/fix", fix_type = kGnssType;
 };
 
 Options options_of(int argc, char** argv) {
@@ -82,7 +81,7 @@ Options options_of(int argc, char** argv) {
       ->check(CLI::ExistingFile);
   app.add_option("--fix-topic", options.fix_topic, "Topic of --fixes")->capture_default_str();
   app.add_option("--fix-type", options.fix_type, "Message type of --fixes")
-      ->check(CLI::IsMember({FixMessages::kGnssType, FixMessages::kMotionCaptureType}))
+      ->check(CLI::IsMember({kGnssType, kMotionCaptureType}))
       ->capture_default_str();
   app.add_flag("--reliable", options.play.reliable,
                "Send lost messages again; otherwise best effort, as drivers of sensors do");
@@ -117,8 +116,8 @@ std::unique_ptr<BagReader> open_recording(const std::filesystem::path& recording
   if (may_be_bag(recording)) return open_bag(recording);
   const std::filesystem::path mav0 = find_mav0(recording);
   const bool has_depth = std::filesystem::is_directory(mav0 / "depth0");
-  return std::make_unique<EurocMessages>(
-      std::make_unique<EurocReader>(open_euroc(recording, {.depth = has_depth})));
+  return euroc_messages(
+      std::make_unique<FolderReader>(open_folder(recording, {.depth = has_depth})));
 }
 
 std::unique_ptr<BagReader> open(const Options& options) {
@@ -128,8 +127,8 @@ std::unique_ptr<BagReader> open(const Options& options) {
   if (rows.malformed > 0)
     log::warn("publish") << options.fixes.string() << ": " << rows.malformed
                          << " rows without a stamp and three coordinates are left out";
-  return std::make_unique<FixMessages>(std::move(recording), std::move(rows.fixes),
-                                       options.fix_topic, options.fix_type);
+  return with_fixes(std::move(recording), std::move(rows.fixes), options.fix_topic,
+                    options.fix_type);
 }
 
 std::string table(const std::vector<PlayedTopic>& topics) {

@@ -6,7 +6,7 @@
 
 #include "modules/core/text_rows.hpp"
 #include "modules/recordings/ros_messages.hpp"
-#include "modules/sensors/ros_image.hpp"
+#include "modules/sensors/sensor_messages.hpp"
 
 namespace km {
 namespace {

@@ -4,9 +4,8 @@
 #include <random>
 #include <thread>
 
-#include "apps/publish/euroc_messages.hpp"
-#include "apps/publish/fix_messages.hpp"
 #include "apps/publish/message_player.hpp"
+#include "apps/publish/recorded_messages.hpp"
 #include "modules/recordings/ros_messages.hpp"
 #include "runtime/dds/ros_subscription.hpp"
 #include "test/modules/sensors/euroc_folder.hpp"
@@ -129,19 +128,19 @@ TEST_CASE("Waiting for readers ends with the topics that have too few", "[publis
 
 TEST_CASE("Fixes are played in the order of time with the messages of the recording", "[publish]") {
   constexpr Stamp kLast = kFirst + (kMessages - 1) * kPeriod;
-  const auto [type, gnss] = GENERATE(std::pair(FixMessages::kGnssType, true),
-                                     std::pair(FixMessages::kMotionCaptureType, false));
-  FixMessages messages(samples("/i"),
-                       {{kFirst + 5, {47.0, 8.0, 500.0}},
-                        {kFirst - 1, {1.0, 1.0, 1.0}},
-                        {kLast - 5, {48.0, 9.0, 600.0}},
-                        {kLast + 1, {2.0, 2.0, 2.0}}},
-                       "/fix", type);
-  REQUIRE(messages.channels().size() == 2);
+  const auto [type, gnss] =
+      GENERATE(std::pair(kGnssType, true), std::pair(kMotionCaptureType, false));
+  const auto messages = with_fixes(samples("/i"),
+                                   {{kFirst + 5, {47.0, 8.0, 500.0}},
+                                    {kFirst - 1, {1.0, 1.0, 1.0}},
+                                    {kLast - 5, {48.0, 9.0, 600.0}},
+                                    {kLast + 1, {2.0, 2.0, 2.0}}},
+                                   "/fix", type);
+  REQUIRE(messages->channels().size() == 2);
   Stamp last = 0;
   int count = 0;
   std::vector<Eigen::Vector3d> fixes;
-  for (; const auto message = messages.next(); ++count) {
+  for (; const auto message = messages->next(); ++count) {
     CHECK(message->log_time >= last);
     last = message->log_time;
     if (message->channel != 1) continue;
@@ -158,16 +157,16 @@ TEST_CASE("Fixes are played in the order of time with the messages of the record
   REQUIRE(fixes.size() == 2);
   CHECK(fixes[0] == Eigen::Vector3d(47.0, 8.0, 500.0));
   CHECK(fixes[1] == Eigen::Vector3d(48.0, 9.0, 600.0));
-  CHECK_THROWS_WITH(FixMessages(samples("/i"), {}, "/i", type), Catch::Contains("--fix-topic"));
+  CHECK_THROWS_WITH(with_fixes(samples("/i"), {}, "/i", type), Catch::Contains("--fix-topic"));
 }
 
 TEST_CASE("A EuRoC folder becomes the messages of its drivers", "[publish]") {
   const EurocFolder folder;
-  EurocMessages messages(std::make_unique<EurocReader>(open_euroc(folder.root())));
+  const auto messages = euroc_messages(std::make_unique<FolderReader>(open_folder(folder.root())));
   std::map<std::string, int> counts;
   Stamp last = 0;
-  while (const auto message = messages.next()) {
-    ++counts[messages.channels()[message->channel].topic];
+  while (const auto message = messages->next()) {
+    ++counts[messages->channels()[message->channel].topic];
     CHECK(message->log_time >= last);
     last = message->log_time;
     CHECK(decode_ros<RosHeader>("cdr", message->bytes).value->stamp == message->log_time);
