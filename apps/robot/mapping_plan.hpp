@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "apps/robot/mapping_config.hpp"
+#include "apps/robot/robot_config.hpp"
 #include "modules/core/camera.hpp"
 #include "modules/core/label_palette.hpp"
 #include "modules/dense_sensing/dense_sensor.hpp"

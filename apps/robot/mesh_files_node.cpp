@@ -3,9 +3,13 @@
 #include <utility>
 
 #include "apps/result_files.hpp"
-#include "apps/robot/map_results.hpp"
+#include "modules/core/write_file.hpp"
+#include "modules/map_2d/map_2d.hpp"
+#include "modules/map_2d/map_server_files.hpp"
 #include "modules/mesh/map_file.hpp"
 #include "modules/mesh/mesh_file.hpp"
+#include "modules/objects/object_file.hpp"
+#include "runtime/log.hpp"
 #include "runtime/thread.hpp"
 
 namespace km {
@@ -13,6 +17,25 @@ namespace {
 
 // The newest message of each kind is kept beside the queue, so one queued tick stands for all.
 constexpr std::size_t kMeshQueue = 1;
+
+// Writes a 2D map as Nav2's map_server reads it: the YAML file `name`, and its image.
+void write_map_2d(const std::filesystem::path& folder, const char* name, const char* image,
+                  const OccupancyGrid& map, ResultWriter& results) {
+  results.write(folder / image, [&](const auto& file) { write_file(file, map_image(map)); });
+  results.write(folder / name, [&](const auto& file) { write_file(file, map_yaml(map, image)); });
+}
+
+// The 2D map of the team is made of the fused mesh alone, so that all robots have the same.
+void write_team_map_2d(const std::filesystem::path& folder, const Map2dConfig& config,
+                       const TeamMap& team, const LabelPalette& palette, ResultWriter& results) {
+  Map2dResult map = make_map_2d(config, {team.mesh, palette});
+  map.grid.anchor = team.anchor;
+  if (map.status == Map2dStatus::kMade)
+    return write_map_2d(folder, kTeamMap2d, kTeamMap2dImage, map.grid, results);
+  log::warn("robot") << "no 2D map of the team: its mesh "
+                     << (map.status == Map2dStatus::kEmpty ? "has no floor"
+                                                           : "needs more than 16 million cells");
+}
 
 }  // namespace
 
@@ -37,53 +60,55 @@ MeshFilesNode::MeshFilesNode(std::filesystem::path folder, ResultWriter& results
 }
 
 void MeshFilesNode::handle(const Tick& /*tick*/) {
-  if (const auto keyframe = first_keyframe_.take()) step(*keyframe);
-  if (const auto trajectory = trajectory_.take()) step(*trajectory);
+  if (const auto keyframe = first_keyframe_.take()) T_odom_first_ = keyframe->T_odom_kf;
+  if (const auto trajectory = trajectory_.take()) follow_first_pose(*trajectory);
   if (const auto map = latest_map_.take()) {
-    step(*map);
     map_ = map;
+    write_map();
+    write(kMapFile, [&](const auto& file) { write_map_file(file, *map); });
   }
-  if (const auto optimized = optimized_.take()) step(*optimized);
-  if (const auto map = map_2d_.take()) step(*map);
-  if (const auto slice = slice_.take()) step(*slice);
+  if (const auto mesh = optimized_.take())
+    write("mesh_optimized.ply", [&](const auto& file) { write_mesh(file, mesh->mesh); });
+  if (const auto map = map_2d_.take()) write_map_2d(folder_, kMap2d, kMap2dImage, *map, results_);
+  if (const auto slice = slice_.take())
+    write(kDistanceSlice, [&](const auto& file) { write_mesh(file, slice->points); });
 }
 
-void MeshFilesNode::step(const KeyframeOdometry& keyframe) {
-  if (keyframe.id.index == 0) T_odom_first_ = keyframe.T_odom_kf;
-}
-
-void MeshFilesNode::step(const Trajectory& trajectory) {
+void MeshFilesNode::follow_first_pose(const Trajectory& trajectory) {
   if (!trajectory.T_world_kf.empty()) T_world_first_ = trajectory.T_world_kf.front();
 }
 
-void MeshFilesNode::step(const MapMesh& map) {
-  write_map(map.mesh);
-  results_.write(folder_ / kMapFile, [&map](const auto& file) { write_map_file(file, map); });
-}
-
-void MeshFilesNode::step(const OptimizedMesh& mesh) {
-  results_.write(folder_ / "mesh_optimized.ply",
-                 [&mesh](const auto& file) { write_mesh(file, mesh.mesh); });
-}
-
-void MeshFilesNode::step(const OccupancyGrid& map) {
-  write_map_2d(folder_, kMap2d, kMap2dImage, map, results_);
-}
-
-void MeshFilesNode::step(const DistanceSlice& slice) {
-  results_.write(folder_ / kDistanceSlice,
-                 [&slice](const auto& file) { write_mesh(file, slice.points); });
-}
-
 void MeshFilesNode::finish(const std::optional<Trajectory>& trajectory) {
-  if (trajectory) step(*trajectory);
-  if (map_) write_map(map_->mesh);
+  if (trajectory) follow_first_pose(*trajectory);
+  if (map_) write_map();
 }
 
-void MeshFilesNode::write_map(const LabelledMesh& map) {
-  LabelledMesh mesh = map;
+void MeshFilesNode::write_map() {
+  LabelledMesh mesh = map_->mesh;
   if (T_world_first_ && T_odom_first_) mesh.transform(*T_world_first_ * T_odom_first_->inverse());
-  results_.write(folder_ / "mesh.ply", [&mesh](const auto& file) { write_mesh(file, mesh); });
+  write("mesh.ply", [&](const auto& file) { write_mesh(file, mesh); });
+}
+
+void write_objects(const std::filesystem::path& folder, const ObjectList& objects,
+                   const LabelPalette& palette, ResultWriter& results) {
+  results.write(folder / kObjectsFile,
+                [&](const auto& file) { write_file(file, objects_json(objects, palette)); });
+}
+
+void write_team_map(const std::filesystem::path& folder, const Map2dConfig& config,
+                    const TeamMapNode& node, ResultWriter& results) {
+  log::info("robot") << "fusing the map of the team";
+  const TeamMap map = node.fuse();
+  results.write(folder / kTeamMesh, [&](const auto& file) { write_mesh(file, map.mesh); });
+  if (config.enabled) write_team_map_2d(folder, config, map, node.palette(), results);
+  log::info("robot") << "map of the team: " << map.mesh.faces.size()
+                     << " faces, in the frame of robot " << map.anchor;
+  if (map.other_frames > 0)
+    log::warn("robot") << "the map of the team lacks " << map.other_frames
+                       << " chunks in frames of robots that have not joined";
+  if (map.left_out > 0)
+    log::warn("robot") << "the map of the team lacks " << map.left_out << " boxes of "
+                       << kMaxMapBoxes + map.left_out << ": its voxels are too small";
 }
 
 }  // namespace km

@@ -9,8 +9,11 @@
 #include "modules/core/odometry.hpp"
 #include "modules/core/pose_graph.hpp"
 #include "modules/distance_field/distance_slice.hpp"
+#include "modules/map_2d/map_2d_config.hpp"
 #include "modules/mesh/map_mesh.hpp"
 #include "modules/mesh_deformation/mesh_corrector.hpp"
+#include "modules/objects/map_object.hpp"
+#include "modules/team_map/node/team_map_node.hpp"
 #include "runtime/latest.hpp"
 #include "runtime/worker_node.hpp"
 
@@ -40,14 +43,6 @@ class MeshFilesNode final : public WorkerNode<Tick> {
   MeshFilesNode(std::filesystem::path folder, ResultWriter& results, const MeshFilesTopics& topics);
   ~MeshFilesNode() override { stop(); }
 
-  /// Handles one input synchronously. The thread calls these functions; tests can call them too.
-  void step(const KeyframeOdometry& keyframe);
-  void step(const Trajectory& trajectory);
-  void step(const MapMesh& map);
-  void step(const OptimizedMesh& mesh);
-  void step(const OccupancyGrid& map);
-  void step(const DistanceSlice& slice);
-
   /// Writes mesh.ply again, with the last trajectory of the robot. Call after stop().
   void finish(const std::optional<Trajectory>& trajectory);
 
@@ -62,7 +57,9 @@ class MeshFilesNode final : public WorkerNode<Tick> {
       post(Tick());
     });
   }
-  void write_map(const LabelledMesh& map);
+  void write(const char* file, const auto& writer) { results_.write(folder_ / file, writer); }
+  void follow_first_pose(const Trajectory& trajectory);
+  void write_map();
 
   const std::filesystem::path folder_;
   ResultWriter& results_;
@@ -76,5 +73,14 @@ class MeshFilesNode final : public WorkerNode<Tick> {
   Latest<OccupancyGrid> map_2d_;
   Latest<DistanceSlice> slice_;
 };
+
+/// Writes objects.json to `folder`.
+void write_objects(const std::filesystem::path& folder, const ObjectList& objects,
+                   const LabelPalette& palette, ResultWriter& results);
+
+/// Writes the fused mesh of the team, of the chunks that were received until now. If 2D maps are
+/// enabled, also writes its 2D map.
+void write_team_map(const std::filesystem::path& folder, const Map2dConfig& config,
+                    const TeamMapNode& node, ResultWriter& results);
 
 }  // namespace km

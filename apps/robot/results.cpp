@@ -8,7 +8,6 @@
 
 #include "apps/output_file.hpp"
 #include "apps/result_files.hpp"
-#include "apps/robot/pose_holes.hpp"
 #include "modules/core/covariance.hpp"
 #include "modules/core/lie.hpp"
 #include "modules/core/text_table.hpp"
@@ -137,19 +136,6 @@ CamerasSummary cameras_of(const UncertainCalibration& known) {
           .readout_sigma_s = std::sqrt(known.covariance(7, 7))};
 }
 
-OdometrySummary odometry_of(const VioStatistics& met) {
-  const auto count = [](int value) { return static_cast<std::uint64_t>(value); };
-  return {.inertial_sensor = met.has_imu,
-          .starts = count(met.starts),
-          .divergences = count(met.divergences),
-          .inertial_gaps = count(met.gaps),
-          .refused_images = count(met.refused_images),
-          .refused_samples = count(met.refused_samples),
-          .images_without_pose = count(met.images_without_pose),
-          .vision_losses = count(met.vision_losses),
-          .blind_seconds = met.blind_s};
-}
-
 std::optional<HolesSummary> holes_of(const std::vector<StampedPose>& path) {
   HolesSummary summary;
   for (const PoseHole& hole : pose_holes(path)) {
@@ -236,20 +222,8 @@ RunSummary summary_of(const RunRecord& record) {
     summary.closures.verified += counts.verified;
     summary.closures.inliers += counts.inliers;
   }
-  const OptimizerProgress& progress = record.progress();
-  summary.pgo = {.rounds = progress.round,
-                 .seconds = progress.seconds,
-                 .cost = progress.cost,
-                 .gradient_norm = progress.gradient_norm,
-                 .anchor = progress.anchor,
-                 .settled = progress.settled,
-                 .members = progress.members,
-                 .tentative = progress.tentative,
-                 .not_joined = progress.not_joined,
-                 .odometry_rotation_noise = progress.odometry_rotation_noise,
-                 .odometry_translation_noise = progress.odometry_translation_noise,
-                 .odometry_breaks = progress.odometry_breaks};
-  if (record.odometry_statistics()) summary.odometry = odometry_of(*record.odometry_statistics());
+  summary.pgo = record.progress();
+  summary.odometry = record.odometry_statistics();
   summary.holes = holes_of(record.odometry());
   if (record.calibration()) summary.cameras = cameras_of(*record.calibration());
   if (record.dense_sensing()) summary.mapping = map_counts(record);

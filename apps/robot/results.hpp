@@ -4,7 +4,7 @@
 
 #include "apps/result_writer.hpp"
 #include "apps/robot/run_record.hpp"
-#include "modules/ros_dds/closure_lines.hpp"
+#include "modules/ros_dds/drawings.hpp"
 
 namespace km {
 

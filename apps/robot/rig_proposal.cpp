@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "modules/recordings/ros_messages.hpp"
-#include "modules/sensors/depth_alignment.hpp"
+#include "modules/sensors/rig_completion.hpp"
 
 namespace km {
 namespace {

@@ -6,10 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "apps/robot/mapping_config.hpp"
-#include "apps/robot/run_config.hpp"
 #include "modules/absolute_fixes/absolute_fixes_config.hpp"
 #include "modules/constellations/constellations_config.hpp"
+#include "modules/core/config.hpp"
 #include "modules/core/ids.hpp"
 #include "modules/dense_sensing/segmentation_config.hpp"
 #include "modules/dense_sensing/stereo_depth_config.hpp"
@@ -24,7 +23,6 @@
 #include "modules/pose_graph/pose_graph_config.hpp"
 #include "modules/recorded_graph/graph_playback_config.hpp"
 #include "modules/semantic_mapping/semantic_mapping_config.hpp"
-#include "modules/sensors/playback_pace.hpp"
 #include "modules/sensors/sensors_config.hpp"
 #include "modules/view/view_config.hpp"
 #include "modules/vio/tracker_config.hpp"
@@ -68,6 +66,86 @@ struct RobotOptions {
   bool view = false;             ///< Send the state of the robot to viewers in the domain.
   double serve_limit_s = 120.0;  ///< Longest time to serve peers after the input has ended.
   std::string log_level = "info";
+};
+
+/// Parameters of a robot that belong to no module.
+struct RunConfig {
+  static constexpr const char* kSection = "run";
+
+  std::string vocabulary = "vocabulary/indoor.kmvoc";
+  std::string link = "wired";
+  double settle_s = 3.0;
+  double patience = 1.0;
+
+  void visit_fields(auto& visitor) {
+    visitor.field("vocabulary", vocabulary,
+                  "vocabulary of place recognition: a file, or one that comes with the program");
+    visitor.field("link", link,
+                  "link profile, see config/qos: wired, wifi, intermittent, or a file");
+    visitor.field(
+        "settle_s", settle_s, {0.1, 600.0},
+        "[s] the robot leaves when it and all present peers have been idle for this time");
+    visitor.field(
+        "patience", patience, {0.1, 100.0},
+        "increase on slow computers: factor on the time limit for one step of a module "
+        "(30 s; pose graph, map, journal, network and viewers: 120 s; files of meshes and "
+        "of the record: 300 s); a module that exceeds its limit counts as hung, and the "
+        "robot ends without it");
+  }
+};
+
+/// Map that a robot builds from its images.
+enum class MappingMode {
+  kOff,       ///< Nothing.
+  kMetric,    ///< A mesh.
+  kSemantic,  ///< A mesh with labels.
+};
+
+/// Source of the depths, or labels, of all pixels.
+enum class DenseSource {
+  kAuto,      ///< Images of the recording if it has them, else computed.
+  kRecorded,  ///< Images of the recording.
+  kComputed,  ///< Stereo matching; the network of `segmentation:`.
+};
+
+/// Parameters of a robot's map that belong to no module.
+struct MappingConfig {
+  static constexpr const char* kSection = "mapping";
+
+  MappingMode mode = MappingMode::kOff;
+  DenseSource depth = DenseSource::kAuto;
+  DenseSource labels = DenseSource::kAuto;
+  double rate_hz = 5.0;
+  double max_depth_error_m = 0.2;
+  double mesh_interval_s = 3.0;
+
+  void visit_fields(auto& visitor) {
+    visitor.field("mode", mode,
+                  {{"off", MappingMode::kOff},
+                   {"metric", MappingMode::kMetric},
+                   {"semantic", MappingMode::kSemantic}},
+                  "map to build from the images: none, a mesh, or a mesh with labels");
+    visitor.field("depth", depth,
+                  {{"auto", DenseSource::kAuto},
+                   {"recorded", DenseSource::kRecorded},
+                   {"stereo", DenseSource::kComputed}},
+                  "auto: the recording's images if it has them, else computed");
+    visitor.field("labels", labels,
+                  {{"auto", DenseSource::kAuto},
+                   {"recorded", DenseSource::kRecorded},
+                   {"network", DenseSource::kComputed}},
+                  "auto: the recording's images if it has them, else computed; network: the one of "
+                  "segmentation");
+    visitor.field("rate_hz", rate_hz, {0.01, 100.0},
+                  "[1/s] frames that go into the map, by their stamps; a mapper that is too slow "
+                  "skips frames, except at --rate auto and max, where the recording waits for it");
+    visitor.field("max_depth_error_m", max_depth_error_m, {0.001, 100.0},
+                  "[m] largest expected standard deviation of depths that are used; beyond half of "
+                  "semantic_mapping's truncation surfaces have holes and steps; the standard "
+                  "deviation follows from a quarter of a pixel of disparity, see usable_range_m()");
+    visitor.field("mesh_interval_s", mesh_interval_s, {0.1, 3600.0},
+                  "[s] interval between meshes, which are corrected and written to files");
+  }
 };
 
 /// The configuration of every module of a robot.

@@ -17,7 +17,6 @@
 #include "apps/result_files.hpp"
 #include "apps/result_writer.hpp"
 #include "apps/robot/growing_file.hpp"
-#include "apps/robot/map_results.hpp"
 #include "apps/robot/process_usage.hpp"
 #include "apps/robot/results.hpp"
 #include "apps/robot/run_end.hpp"

@@ -7,7 +7,7 @@
 
 #include "modules/core/geometry.hpp"
 #include "modules/core/text_table.hpp"
-#include "modules/diagnosis/figure_text.hpp"
+#include "modules/diagnosis/finding.hpp"
 
 namespace km {
 namespace {
@@ -114,7 +114,7 @@ void add_apart(std::span<const RunFacts> runs, const Names& names, std::vector<F
   std::set<std::pair<RobotId, RobotId>> reported;
   for (const RunFacts& run : runs) {
     const RobotId self = run.summary.robot;
-    const OptimizerSummary& pgo = run.summary.pgo;
+    const OptimizerProgress& pgo = run.summary.pgo;
     const auto is_joined = [&](RobotId robot) {
       return std::ranges::find(pgo.members, robot) != pgo.members.end() &&
              std::ranges::find(pgo.not_joined, robot) == pgo.not_joined.end();
@@ -152,104 +152,6 @@ void add_tentative(std::span<const RunFacts> runs, const Names& names,
     }
 }
 
-// Consequence and advice of the findings on one run. `id` is stable, for programs.
-struct RunFinding {
-  const char* id;
-  const char* means;
-  const char* to_do;
-};
-
-constexpr RunFinding kNotLocalised = {
-    "localization.not", "the poses in optimized.tum are those of odometry, not of the map's frame",
-    "let the robot see two places of the map from where the former run saw them"};
-constexpr RunFinding kNoFrames = {
-    "frames.none", "odometry did not start: the results have nothing of this robot",
-    "see sensor_faults in summary.json; for live topics kimera_multi_doctor --live RIG names the "
-    "silent one"};
-constexpr RunFinding kSkipped = {
-    "frames.skipped",
-    "the processors were too slow: images were left out of odometry at even intervals",
-    "use --rate auto, which waits, a lower tracker.max_features or vio.window_keyframes, or a "
-    "faster computer"};
-constexpr RunFinding kPausedAllUsed = {
-    "frames.paused",
-    "the processors were too slow, and the recording waited: every image was used, but a live "
-    "robot would have left images out",
-    "nothing for a recording; for a live robot run fewer programs on its computer, or use a faster "
-    "one"};
-constexpr RunFinding kPausedSkipped = {
-    "frames.paused",
-    "the processors were too slow, also without the images that odometry can do without",
-    "use --rate auto, which waits, or run fewer robots or programs on this computer"};
-constexpr RunFinding kMapLeftOut = {
-    "map.dropped_under_load",
-    "the processors were too slow, and odometry has priority: the map may have holes",
-    "use --rate auto, which waits, a lower mapping.rate_hz, a higher stereo_depth.downscale, or a "
-    "faster computer"};
-constexpr RunFinding kNoisyOdometry = {
-    "odometry.noisy",
-    "loop closures of this robot contradict its odometry to this extent: the pose graph uses the "
-    "larger noise",
-    "check calibration and stamps with kimera_multi_doctor on the recording; vio.drift_rotation "
-    "and vio.drift_translation are the stated noise"};
-constexpr RunFinding kBrokenOdometry = {
-    "odometry.broken",
-    "loop closures of this robot agree on a jump there, as after lost tracking; the optimised "
-    "trajectory is corrected, odometry.tum is not",
-    "see the log for the keyframes, and odometry in summary.json"};
-constexpr RunFinding kImagesAlone = {
-    "odometry.images_alone",
-    "z of poses and maps is the upward direction of the camera at the first image, not the "
-    "vertical (map.yaml needs a level camera there); no pose is known while vision is lost for "
-    "more than a second",
-    ""};
-constexpr RunFinding kSensorFaults = {
-    "sensors.faults", "odometry and map do not use the affected data",
-    "kimera_multi_doctor on the recording, or --live on the topics, names the first fault of each "
-    "kind"};
-constexpr RunFinding kHoleSkipped = {
-    "trajectory.hole",
-    "the motion in this time is unknown: charts show a gap, and later poses are less certain",
-    "frames were skipped: use --rate auto, which waits, or run fewer robots on this computer"};
-constexpr RunFinding kHole = {kHoleSkipped.id, kHoleSkipped.means,
-                              "see sensor_faults in summary.json for missing images, and the log "
-                              "for new starts of odometry"};
-constexpr RunFinding kRejected = {
-    "closures.rejected",
-    "other measurements contradict them: places look alike, or odometry is worse than its "
-    "covariances",
-    "check odometry; see loop_closures.csv"};
-constexpr RunFinding kCameraOffset = {
-    "cameras.offset", "the offset was estimated and corrected, except at the start of the run",
-    "set camera_time_offset_s in the rig file"};
-constexpr RunFinding kRollingShutter = {
-    "cameras.rolling",
-    "a rolling shutter; odometry has estimated and corrected it, except at the start of the run",
-    "if the readout time is known, set tracker.readout_s and lower vio.calibration_readout_s"};
-constexpr RunFinding kCamerasTurned = {
-    "cameras.turned", "odometry has estimated and corrected the rotation, the map has not",
-    "calibrate cameras and inertial sensor again"};
-constexpr RunFinding kLost = {
-    "link.lost", "that robot was out of reach or had died: its last closures are missing",
-    "see its log; kimera_multi_doctor --network examines the link"};
-constexpr RunFinding kOtherVocabulary = {
-    "vocabulary.other", "none of them can be compared: these robots never join", kSameVocabulary};
-constexpr RunFinding kOtherNetwork = {
-    "network.other",
-    "their keypoints are described by another network or by none: fewer closures are found",
-    "use one keyframe_features.network on all robots"};
-constexpr RunFinding kDelayed = {"budget.held_back", "the other robots received them later", ""};
-constexpr RunFinding kDropped = {"budget.held_back", "the other robots did not receive all of them",
-                                 "raise budget.bytes_per_s or budget.bytes_per_run"};
-constexpr RunFinding kMemory = {
-    "memory.grows", "the memory may not suffice for a longer run",
-    "lower semantic_mapping.max_blocks or window_m, or build a map without labels (mapping.mode)"};
-constexpr RunFinding kMapFull = {"map.full", "the mesh has holes there",
-                                 "raise semantic_mapping.max_blocks"};
-constexpr RunFinding kMapLate = {"map.frames_late",
-                                 "the map has fewer frames than mapping.rate_hz requests",
-                                 "use a lower mapping.rate_hz"};
-
 // Adds the findings on one run.
 class FindingsOfRun {
  public:
@@ -267,38 +169,50 @@ class FindingsOfRun {
   static constexpr auto kNote = Severity::kNote, kWarning = Severity::kWarning,
                         kError = Severity::kError;
 
-  void add(Severity severity, const RunFinding& finding, const std::string& what) {
-    findings_.push_back({.id = finding.id,
+  // `id` is stable, for programs.
+  void add(Severity severity, const char* id, const std::string& what, const char* means,
+           const char* to_do) {
+    findings_.push_back({.id = id,
                          .severity = severity,
                          .what = run_.name + ": " + what,
-                         .means = finding.means,
-                         .to_do = finding.to_do});
+                         .means = means,
+                         .to_do = to_do});
   }
 
   void add_team() {
     for (const auto& [name, keyframes] : run_.other_vocabulary)
-      add(kError, kOtherVocabulary,
-          std::to_string(keyframes) + " keyframes of " + name + " have another vocabulary");
+      add(kError, "vocabulary.other",
+          std::to_string(keyframes) + " keyframes of " + name + " have another vocabulary",
+          "none of them can be compared: these robots never join", kSameVocabulary);
     for (const auto& [name, keyframes] : run_.other_network)
-      add(kWarning, kOtherNetwork,
-          std::to_string(keyframes) + " keyframes of " + name + " were matched by ORB");
+      add(kWarning, "network.other",
+          std::to_string(keyframes) + " keyframes of " + name + " were matched by ORB",
+          "their keypoints are described by another network or by none: fewer closures are found",
+          "use one keyframe_features.network on all robots");
     for (const auto& [name, seconds] : run_.lost_peers)
-      add(kWarning, kLost,
-          name + " was not received in the last " + fixed(seconds, 1) + " s of the run");
+      add(kWarning, "link.lost",
+          name + " was not received in the last " + fixed(seconds, 1) + " s of the run",
+          "that robot was out of reach or had died: its last closures are missing",
+          "see its log; kimera_multi_doctor --network examines the link");
     if (run_.localization && !run_.localization->localised)
-      add(kWarning, kNotLocalised,
+      add(kWarning, "localization.not",
           "not localised in " + run_.localization->map + ": " +
               std::to_string(run_.localization->matched) + " of " +
-              std::to_string(run_.localization->compared) + " keyframes match it");
+              std::to_string(run_.localization->compared) + " keyframes match it",
+          "the poses in optimized.tum are those of odometry, not of the map's frame",
+          "let the robot see two places of the map from where the former run saw them");
     ClosureTally all;
     for (const auto& [other, tally] : facts_.closures) all += tally;
     constexpr double kMany = 0.3;
     if (all.rejected > 0) {
       const bool are_many =
           static_cast<double>(all.rejected) >= kMany * static_cast<double>(all.verified);
-      add(are_many ? kWarning : kNote, kRejected,
+      add(are_many ? kWarning : kNote, "closures.rejected",
           "the optimiser rejected " + std::to_string(all.rejected) + " of " +
-              std::to_string(all.verified) + " verified closures");
+              std::to_string(all.verified) + " verified closures",
+          "other measurements contradict them: places look alike, or odometry is worse than its "
+          "covariances",
+          "check odometry; see loop_closures.csv");
       if (!are_many) findings_.back().to_do.clear();
     }
   }
@@ -306,17 +220,32 @@ class FindingsOfRun {
   void add_input() {
     const auto frames = static_cast<double>(run_.frames);
     if (run_.frames + run_.frames_skipped + run_.keyframes == 0)
-      add(kError, kNoFrames, "0 frames, 0 keyframes");
+      add(kError, "frames.none", "0 frames, 0 keyframes",
+          "odometry did not start: the results have nothing of this robot",
+          "see sensor_faults in summary.json; for live topics kimera_multi_doctor --live RIG names "
+          "the silent one");
     constexpr double kFew = 0.01;
     if (run_.frames_skipped > 0) {
       const double skipped = static_cast<double>(run_.frames_skipped),
                    share = skipped / (skipped + frames);
-      add(share < kFew ? kNote : kWarning, kSkipped,
-          std::to_string(run_.frames_skipped) + " frames skipped, " + percent(share));
+      add(share < kFew ? kNote : kWarning, "frames.skipped",
+          std::to_string(run_.frames_skipped) + " frames skipped, " + percent(share),
+          "the processors were too slow: images were left out of odometry at even intervals",
+          "use --rate auto, which waits, a lower tracker.max_features or vio.window_keyframes, or "
+          "a faster computer");
     }
+    const bool all_used = run_.frames_skipped == 0;
     if (run_.paused_s >= kNoticedPause_s)
-      add(kNote, run_.frames_skipped == 0 ? kPausedAllUsed : kPausedSkipped,
-          "the recording was paused for " + fixed(run_.paused_s, 1) + " s in all");
+      add(kNote, "frames.paused",
+          "the recording was paused for " + fixed(run_.paused_s, 1) + " s in all",
+          all_used ? "the processors were too slow, and the recording waited: every image was "
+                     "used, but a live robot would have left images out"
+                   : "the processors were too slow, also without the images that odometry can do "
+                     "without",
+          all_used
+              ? "nothing for a recording; for a live robot run fewer programs on its computer, or "
+                "use a faster one"
+              : "use --rate auto, which waits, or run fewer robots or programs on this computer");
     // There are more samples and messages than frames. A share of the frames keeps their faults
     // visible.
     const auto is_frequent = [&](const auto& fault) {
@@ -326,7 +255,11 @@ class FindingsOfRun {
     std::string faults;
     for (const auto& [fault, count] : run_.sensor_faults)
       faults += (faults.empty() ? "" : ", ") + std::to_string(count) + ' ' + fault;
-    add(kWarning, kSensorFaults, faults + "; " + std::to_string(run_.frames) + " complete frames");
+    add(kWarning, "sensors.faults",
+        faults + "; " + std::to_string(run_.frames) + " complete frames",
+        "odometry and map do not use the affected data",
+        "kimera_multi_doctor on the recording, or --live on the topics, names the first fault of "
+        "each kind");
   }
 
   void add_odometry() {
@@ -334,22 +267,38 @@ class FindingsOfRun {
     const double rotation = run_.pgo.odometry_rotation_noise,
                  translation = run_.pgo.odometry_translation_noise;
     if (std::max(rotation, translation) >= kNoisy)
-      add(kWarning, kNoisyOdometry,
+      add(kWarning, "odometry.noisy",
           "the noise of odometry is " + fixed(rotation, 1) + " times the stated one in rotation, " +
-              fixed(translation, 1) + " times in translation");
+              fixed(translation, 1) + " times in translation",
+          "loop closures of this robot contradict its odometry to this extent: the pose graph uses "
+          "the larger noise",
+          "check calibration and stamps with kimera_multi_doctor on the recording; "
+          "vio.drift_rotation and vio.drift_translation are the stated noise");
     if (run_.pgo.odometry_breaks > 0)
-      add(kWarning, kBrokenOdometry,
-          std::to_string(run_.pgo.odometry_breaks) + " steps of odometry are wrong");
-    if (run_.odometry && !run_.odometry->inertial_sensor)
-      add(kNote, kImagesAlone, "odometry by images alone, without an inertial sensor");
+      add(kWarning, "odometry.broken",
+          std::to_string(run_.pgo.odometry_breaks) + " steps of odometry are wrong",
+          "loop closures of this robot agree on a jump there, as after lost tracking; the "
+          "optimised trajectory is corrected, odometry.tum is not",
+          "see the log for the keyframes, and odometry in summary.json");
+    if (run_.odometry && !run_.odometry->has_imu)
+      add(kNote, "odometry.images_alone", "odometry by images alone, without an inertial sensor",
+          "z of poses and maps is the upward direction of the camera at the first image, not the "
+          "vertical (map.yaml needs a level camera there); no pose is known while vision is lost "
+          "for more than a second",
+          "");
     if (!run_.holes) return;
     const HolesSummary& holes = *run_.holes;
-    add(kWarning, run_.frames_skipped > 0 ? kHoleSkipped : kHole,
+    add(kWarning, "trajectory.hole",
         "no pose for " + fixed(holes.longest_s, 1) + " s, from " + fixed(holes.longest_from_s, 1) +
             " s on" +
             (holes.count == 1 ? ""
                               : ", the longest of " + std::to_string(holes.count) + " holes of " +
-                                    fixed(holes.seconds, 1) + " s in all"));
+                                    fixed(holes.seconds, 1) + " s in all"),
+        "the motion in this time is unknown: charts show a gap, and later poses are less certain",
+        run_.frames_skipped > 0 ? "frames were skipped: use --rate auto, which waits, or run fewer "
+                                  "robots on this computer"
+                                : "see sensor_faults in summary.json for missing images, and the "
+                                  "log for new starts of odometry");
   }
 
   void add_cameras() {
@@ -362,19 +311,27 @@ class FindingsOfRun {
       return fixed(1e3 * value_s, 1) + " ms (+- " + fixed(1e3 * sigma_s, 1) + ')';
     };
     if (std::abs(found.offset_s) > std::max(kOffset_s, kSure * found.offset_sigma_s))
-      add(std::abs(found.offset_s) < kLargeOffset_s ? kNote : kWarning, kCameraOffset,
+      add(std::abs(found.offset_s) < kLargeOffset_s ? kNote : kWarning, "cameras.offset",
           "offset of the stamps of images to those of the inertial sensor: " +
-              ms(found.offset_s, found.offset_sigma_s));
+              ms(found.offset_s, found.offset_sigma_s),
+          "the offset was estimated and corrected, except at the start of the run",
+          "set camera_time_offset_s in the rig file");
     if (found.readout_s > std::max(kReadout_s, kSure * found.readout_sigma_s))
-      add(kNote, kRollingShutter,
+      add(kNote, "cameras.rolling",
           "the readout of an image takes longer than tracker.readout_s: by " +
-              ms(found.readout_s, found.readout_sigma_s));
+              ms(found.readout_s, found.readout_sigma_s),
+          "a rolling shutter; odometry has estimated and corrected it, except at the start of the "
+          "run",
+          "if the readout time is known, set tracker.readout_s and lower "
+          "vio.calibration_readout_s");
     const double rotation_rad =
         Eigen::Vector3d(found.rotation_x_rad, found.rotation_y_rad, found.rotation_z_rad).norm();
     if (rotation_rad > std::max(kRotation_rad, kSure * found.rotation_sigma_rad))
-      add(kWarning, kCamerasTurned,
+      add(kWarning, "cameras.turned",
           "the cameras are turned by " + fixed(kDegrees * rotation_rad, 2) + " degrees (+- " +
-              fixed(kDegrees * found.rotation_sigma_rad, 2) + ") relative to their calibration");
+              fixed(kDegrees * found.rotation_sigma_rad, 2) + ") relative to their calibration",
+          "odometry has estimated and corrected the rotation, the map has not",
+          "calibrate cameras and inertial sensor again");
   }
 
   void add_resources() {
@@ -391,15 +348,21 @@ class FindingsOfRun {
       const auto& [delayed, superseded, dropped] = *run_.held_back;
       const bool is_lost = sum(dropped.messages) > 0;
       if (is_lost || sum(delayed.messages) > 0)
-        add(is_lost ? kWarning : kNote, is_lost ? kDropped : kDelayed,
-            "the budget delayed " + text(delayed) + " and dropped " + text(dropped));
+        add(is_lost ? kWarning : kNote, "budget.held_back",
+            "the budget delayed " + text(delayed) + " and dropped " + text(dropped),
+            is_lost ? "the other robots did not receive all of them"
+                    : "the other robots received them later",
+            is_lost ? "raise budget.bytes_per_s or budget.bytes_per_run" : "");
     }
     constexpr double kMuch = 20e6;
     const double growth = run_.process.memory_growth_bytes_per_minute.value_or(0.0);
     if (growth > kMuch)
-      add(kWarning, kMemory,
+      add(kWarning, "memory.grows",
           "memory grows by " + bytes_text(growth) + " a minute, to at most " +
-              bytes_text(static_cast<double>(run_.process.peak_memory_bytes)) + " so far");
+              bytes_text(static_cast<double>(run_.process.peak_memory_bytes)) + " so far",
+          "the memory may not suffice for a longer run",
+          "lower semantic_mapping.max_blocks or window_m, or build a map without labels "
+          "(mapping.mode)");
   }
 
   void add_map() {
@@ -409,17 +372,22 @@ class FindingsOfRun {
     if (map.dropped_under_load > 0) {
       const auto left_out = static_cast<double>(map.dropped_under_load);
       const double share = left_out / (left_out + static_cast<double>(map.frames));
-      add(share < kFew ? kNote : kWarning, kMapLeftOut,
+      add(share < kFew ? kNote : kWarning, "map.dropped_under_load",
           std::to_string(map.dropped_under_load) + " frames were left out of the map, " +
-              percent(share));
+              percent(share),
+          "the processors were too slow, and odometry has priority: the map may have holes",
+          "use --rate auto, which waits, a lower mapping.rate_hz, a higher stereo_depth.downscale, "
+          "or a faster computer");
     }
     if (map.blocks_refused > 0)
-      add(kWarning, kMapFull,
-          std::to_string(map.blocks_refused) + " blocks did not fit into the map");
+      add(kWarning, "map.full",
+          std::to_string(map.blocks_refused) + " blocks did not fit into the map",
+          "the mesh has holes there", "raise semantic_mapping.max_blocks");
     if (map.skipped_too_late > map.frames)
-      add(kWarning, kMapLate,
+      add(kWarning, "map.frames_late",
           std::to_string(map.skipped_too_late) + " frames were too late for the map, which has " +
-              std::to_string(map.frames));
+              std::to_string(map.frames),
+          "the map has fewer frames than mapping.rate_hz requests", "use a lower mapping.rate_hz");
   }
 
   const RunFacts& facts_;

@@ -1,5 +1,6 @@
 #include "apps/robot/run_summary.hpp"
 
+#include <algorithm>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
@@ -10,9 +11,22 @@ namespace km {
 namespace {
 
 template <typename T>
-concept HasFields = requires(T& record, int& visitor) {
+concept VisitsFields = requires(T& record, int& visitor) {
   record.visit_fields(visitor);
 };
+
+template <typename T>
+concept HasFields = VisitsFields<T> || requires(T& record, int& visitor) {
+  visit_fields(record, visitor);
+};
+
+template <HasFields T>
+void visit_record(T& record, auto& visitor) {
+  if constexpr (VisitsFields<T>)
+    record.visit_fields(visitor);
+  else
+    visit_fields(record, visitor);
+}
 
 class FieldWriter {
  public:
@@ -26,7 +40,8 @@ class FieldWriter {
   void field(const char* name, const T& value) {
     if constexpr (HasFields<T>) {
       FieldWriter part(json_[name]);
-      T(value).visit_fields(part);
+      T copy = value;
+      visit_record(copy, part);
     } else {
       json_[name] = value;
     }
@@ -52,7 +67,7 @@ class FieldReader {
     if (found == json_.end()) return;
     if constexpr (HasFields<T>) {
       FieldReader part(*found);
-      value.visit_fields(part);
+      visit_record(value, part);
     } else if constexpr (std::is_floating_point_v<T>) {
       value = found->is_null() ? std::numeric_limits<T>::quiet_NaN() : found->get<T>();
     } else {
@@ -67,6 +82,23 @@ class FieldReader {
 };
 
 }  // namespace
+
+std::vector<PoseHole> pose_holes(std::span<const StampedPose> path) {
+  if (path.size() < 2) return {};
+  std::vector<double> intervals_s;
+  intervals_s.reserve(path.size() - 1);
+  for (std::size_t i = 1; i < path.size(); ++i)
+    intervals_s.push_back(seconds_between(path[i - 1].stamp, path[i].stamp));
+  const auto middle =
+      intervals_s.begin() + static_cast<std::ptrdiff_t>((intervals_s.size() - 1) / 2);
+  std::ranges::nth_element(intervals_s, middle);
+  const double longest_s = std::max(kHole_s, kHoleIntervals * *middle);
+  std::vector<PoseHole> holes;
+  for (std::size_t i = 1; i < path.size(); ++i)
+    if (seconds_between(path[i - 1].stamp, path[i].stamp) > longest_s)
+      holes.push_back({path[i - 1].stamp, path[i].stamp});
+  return holes;
+}
 
 void to_json(Json& json, const RunSummary& summary) {
   FieldWriter writer(json);

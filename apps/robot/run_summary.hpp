@@ -4,12 +4,16 @@
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "modules/core/ids.hpp"
 #include "modules/core/json.hpp"
+#include "modules/core/pose_graph.hpp"
+#include "modules/core/stamped_pose.hpp"
 #include "modules/diagnosis/finding.hpp"
+#include "modules/vio/vio_statistics.hpp"
 
 namespace km {
 
@@ -42,28 +46,14 @@ struct PeerKeyframeCounts {
   bool operator==(const PeerKeyframeCounts&) const = default;
 };
 
-/// State of the team's optimiser, as this robot knows it.
-struct OptimizerSummary {
-  std::uint64_t rounds = 0;
-  double seconds = 0.0;  ///< Time of this robot's work.
-  double cost = 0.0;
-  double gradient_norm = 0.0;
-  std::optional<RobotId> anchor;  ///< Robot whose frame the poses are in.
-  bool settled = false;
-  std::vector<RobotId> members;
-  std::vector<RobotId> tentative = {}, not_joined = {};  ///< Members; see OptimizerProgress.
-  /// Ratio of the actual noise of odometry to the stated one.
-  double odometry_rotation_noise = 1.0, odometry_translation_noise = 1.0;
-  std::uint64_t odometry_breaks = 0;  ///< Wrong steps of odometry that closures corrected.
-
-  void visit_fields(auto& visitor) {
-    visit_each(visitor, "rounds", rounds, "seconds", seconds, "cost", cost, "gradient_norm",
-               gradient_norm, "anchor", anchor, "settled", settled, "members", members, "tentative",
-               tentative, "not_joined", not_joined, "odometry_rotation_noise",
-               odometry_rotation_noise, "odometry_translation_noise", odometry_translation_noise,
-               "odometry_breaks", odometry_breaks);
-  }
-};
+/// The state of the team's optimiser, as this robot knows it.
+void visit_fields(OptimizerProgress& pgo, auto& visitor) {
+  visit_each(visitor, "rounds", pgo.round, "seconds", pgo.seconds, "cost", pgo.cost,
+             "gradient_norm", pgo.gradient_norm, "anchor", pgo.anchor, "settled", pgo.settled,
+             "members", pgo.members, "tentative", pgo.tentative, "not_joined", pgo.not_joined,
+             "odometry_rotation_noise", pgo.odometry_rotation_noise, "odometry_translation_noise",
+             pgo.odometry_translation_noise, "odometry_breaks", pgo.odometry_breaks);
+}
 
 /// Frames that went into the map, reasons for skipped ones, and size of the final mesh.
 struct MappingSummary {
@@ -150,24 +140,14 @@ struct CamerasSummary {
   }
 };
 
-/// Events of the odometry by cameras and, if there is one, inertial sensor.
-struct OdometrySummary {
-  bool inertial_sensor = true;      ///< False: z of all poses and maps is not the vertical.
-  std::uint64_t starts = 0;         ///< Larger than one if odometry restarted during the run.
-  std::uint64_t divergences = 0;    ///< New starts because the estimate was impossible.
-  std::uint64_t inertial_gaps = 0;  ///< Times without samples for more than vio.max_imu_gap_s.
-  std::uint64_t refused_images = 0, refused_samples = 0;
-  std::uint64_t images_without_pose = 0;
-  std::uint64_t vision_losses = 0;  ///< Periods with too few features to hold the pose.
-  double blind_seconds = 0.0;       ///< Total time of these periods.
-
-  void visit_fields(auto& visitor) {
-    visit_each(visitor, "inertial_sensor", inertial_sensor, "starts", starts, "divergences",
-               divergences, "inertial_gaps", inertial_gaps, "refused_images", refused_images,
-               "refused_samples", refused_samples, "images_without_pose", images_without_pose,
-               "vision_losses", vision_losses, "blind_seconds", blind_seconds);
-  }
-};
+/// Events of the odometry by cameras and, if there is one, inertial sensor. More than one start:
+/// odometry restarted during the run.
+void visit_fields(VioStatistics& met, auto& visitor) {
+  visit_each(visitor, "inertial_sensor", met.has_imu, "starts", met.starts, "divergences",
+             met.divergences, "inertial_gaps", met.gaps, "refused_images", met.refused_images,
+             "refused_samples", met.refused_samples, "images_without_pose", met.images_without_pose,
+             "vision_losses", met.vision_losses, "blind_seconds", met.blind_s);
+}
 
 /// Result of --localize.
 struct LocalizationSummary {
@@ -219,6 +199,19 @@ struct HolesSummary {
   }
 };
 
+/// A time without a pose between two poses of a trajectory.
+struct PoseHole {
+  Stamp from = 0, to = 0;
+};
+
+/// Holes longer than kHole_s and than kHoleIntervals times the median interval, in the order of
+/// time: times in which the motion of the robot is unknown. `path` ascends by time. O(n).
+[[nodiscard]] std::vector<PoseHole> pose_holes(std::span<const StampedPose> path);
+
+/// The page of the viewer (Robot in model.js) uses the same values.
+inline constexpr double kHole_s = 1.0;
+inline constexpr double kHoleIntervals = 5.0;
+
 /// Shorter pauses of a recording are not reported: an ordinary computer has them, too.
 inline constexpr double kNoticedPause_s = 1.0;
 
@@ -239,8 +232,8 @@ struct RunSummary {
   std::map<std::string, std::uint64_t> sensor_faults;
   PeerKeyframeCounts peer_keyframes;
   ClosureCounts closures;  ///< Closures found by this robot.
-  OptimizerSummary pgo;
-  std::optional<OdometrySummary> odometry;          ///< Absent with an external odometry.
+  OptimizerProgress pgo;
+  std::optional<VioStatistics> odometry;            ///< Absent with an external odometry.
   std::optional<LocalizationSummary> localization;  ///< Absent without --localize.
   std::optional<FixesSummary> fixes;                ///< Absent without absolute fixes.
   std::optional<HolesSummary> holes;      ///< Holes of the live trajectory; absent without any.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <map>
 #include <memory>
@@ -10,7 +11,6 @@
 #include <vector>
 
 #include "apps/robot/diagnostics.hpp"
-#include "apps/robot/input_time.hpp"
 #include "apps/robot/journal_node.hpp"
 #include "apps/robot/mapping_plan.hpp"
 #include "apps/robot/mesh_files_node.hpp"
@@ -146,6 +146,27 @@ class IncarnationsMet {
  private:
   mutable std::mutex mutex_;  // guards boots_
   std::map<RobotId, std::uint64_t> boots_;
+};
+
+/// Progress of a robot in its input: time from the first stamp to the latest. Thread-safe.
+class InputTime {
+ public:
+  void reach(Stamp stamp) {
+    const std::lock_guard lock(mutex_);
+    if (!first_) first_ = last_ = stamp;
+    last_ = std::max(last_, stamp);
+  }
+
+  /// [s]; 0 before the first stamp.
+  [[nodiscard]] double seconds() const {
+    const std::lock_guard lock(mutex_);
+    return first_ ? seconds_between(*first_, last_) : 0.0;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  std::optional<Stamp> first_;
+  Stamp last_ = 0;
 };
 
 /// All nodes of one robot and their connections: the system on one page (wiring.cpp).

@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "apps/robot/map_results.hpp"
 #include "apps/robot/wiring.hpp"
 #include "modules/dense_sensing/node/dense_sensing_node.hpp"
 #include "modules/semantic_mapping/node/semantic_mapping_node.hpp"

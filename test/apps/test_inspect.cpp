@@ -1,11 +1,15 @@
 #include <catch2/catch.hpp>
+
 #include <iterator>
 #include <sstream>
 #include <string>
 #include <vector>
 
 #include "apps/robot/inspect.hpp"
+#include "apps/robot/rig_proposal.hpp"
 #include "modules/core/input_file.hpp"
+#include "modules/recordings/open_bag.hpp"
+#include "modules/recordings/ros_messages.hpp"
 #include "test/support/corrupted_input.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/temporary_folder.hpp"
@@ -89,6 +93,103 @@ TEST_CASE("A file that is no recording is refused with its name", "[robot]") {
                         ": neither .db3 or .mcap files nor a recording in the layout of EuRoC, "
                         "KITTI, TUM RGB-D or 7-Scenes");
   CHECK_THROWS_AS(inspect_recording(folder.path() / "missing.bag"), InputFileError);
+}
+
+namespace {
+
+TopicSummary topic(const std::string& name, std::string_view type, double rate_hz,
+                   const std::string& image = "") {
+  TopicSummary summary{.topic = name,
+                       .type = std::string(type),
+                       .encoding = "ros1",
+                       .has_sensor_stamps = true,
+                       .stamps = {},
+                       .is_image = !image.empty(),
+                       .image = {}};
+  if (summary.is_image) summary.image = TopicImage{{640, 480}, image};
+  for (int k = 0; k < 100; ++k) summary.stamps.push_back(nanoseconds(k / rate_hz));
+  return summary;
+}
+
+}  // namespace
+
+TEST_CASE("A rig is proposed by types, rates and names", "[robot]") {
+  const auto image = RosImage::kType, imu = RosImu::kType;
+  RigFile rig = propose_rig(
+      {topic("/thermal", image, 9.0, "mono8"), topic("/cam1/image_raw", image, 20.0, "mono8"),
+       topic("/cam0/image_raw", image, 20.0, "mono8"), topic("/imu0", imu, 200.0)});
+  CHECK(rig.left.topic == "/cam0/image_raw");
+  CHECK(rig.right.topic == "/cam1/image_raw");
+  CHECK(rig.imu.topic == "/imu0");
+  CHECK(rig.depth.topic.empty());
+
+  // As a RealSense's driver names them: left and right infrared, colour, gyroscope apart.
+  rig = propose_rig({topic("/camera/color/image_raw", image, 30.0, "rgb8"),
+                     topic("/camera/infra1/image_rect_raw", image, 30.0, "mono8"),
+                     topic("/camera/infra2/image_rect_raw", image, 30.0, "mono8"),
+                     topic("/camera/gyro/sample", imu, 400.0),
+                     topic("/camera/accel/sample", imu, 250.0)});
+  CHECK(rig.left.topic == "/camera/infra1/image_rect_raw");
+  CHECK(rig.right.topic == "/camera/infra2/image_rect_raw");
+  CHECK(rig.imu.topic.empty());
+  CHECK(rig.imu.gyro_topic == "/camera/gyro/sample");
+  CHECK(rig.imu.accel_topic == "/camera/accel/sample");
+
+  rig = propose_rig({topic("/camera/rgb/image_color", image, 30.0, "rgb8"),
+                     topic("/camera/depth/image", image, 30.0, "32FC1"), topic("/imu", imu, 100)});
+  CHECK(rig.left.topic == "/camera/rgb/image_color");
+  CHECK(rig.right.topic.empty());
+  CHECK(rig.depth.topic == "/camera/depth/image");
+}
+
+TEST_CASE("Aligned depth is proposed, or depth is reported as not aligned", "[robot]") {
+  const auto framed = [](const std::string& name, const std::string& encoding,
+                         const std::string& frame) {
+    TopicSummary summary = topic(name, RosImage::kType, 30.0, encoding);
+    summary.image->frame = frame;
+    return summary;
+  };
+  std::vector<TopicSummary> topics = {framed("/camera/depth/image_rect_raw", "16UC1", "depth"),
+                                      framed("/camera/color/image_raw", "rgb8", "color"),
+                                      topic("/imu", RosImu::kType, 200.0)};
+  CHECK_THAT(depth_problem(topics, propose_rig(topics)),
+             Catch::Contains("its frame is depth, not color") &&
+                 Catch::Contains("align_depth.enable:=true"));
+  topics.push_back(framed("/camera/aligned_depth_to_color/image_raw", "16UC1", "color"));
+  const RigFile rig = propose_rig(topics);
+  CHECK(rig.left.topic == "/camera/color/image_raw");
+  CHECK(rig.depth.topic == "/camera/aligned_depth_to_color/image_raw");
+  CHECK(depth_problem(topics, rig).empty());
+}
+
+TEST_CASE("Topics with the calibration of cameras are proposed if they exist", "[robot]") {
+  const auto image = RosImage::kType;
+  std::vector<TopicSummary> topics = {topic("/left/image_raw", image, 20.0, "mono8"),
+                                      topic("/right/image_raw", image, 20.0, "mono8"),
+                                      topic("/imu0", RosImu::kType, 200.0),
+                                      topic("/left/camera_info", RosCameraInfo::kType, 20.0),
+                                      topic("/right/camera_info", image, 20.0)};
+  const RigFile rig = propose_rig(topics);
+  CHECK(rig.left.info_topic == "/left/camera_info");
+  CHECK(rig.right.info_topic.empty());
+}
+
+TEST_CASE("A rig file is written for a recording, once", "[robot]") {
+  const auto bag = shared_data("ros_recordings/rosbag2/s3e_playground_2");
+  if (!bag) return;
+  const TemporaryFolder folder;
+  const auto file = folder.path() / "rig.yaml";
+  CHECK_THAT(inspect_recording(*bag, file), Catch::Contains("written: " + file.string()));
+  const std::string text = read_input_file(file);
+  CHECK_THAT(text, Catch::Contains("topic: \"/Alpha/left_camera/compressed\"") &&
+                       Catch::Contains("topic: \"/Alpha/right_camera/compressed\"") &&
+                       Catch::Contains("topic: \"/Alpha/imu/data\""));
+  CHECK_THROWS_WITH(inspect_recording(*bag, file),
+                    file.string() + ": is there already: name another file");
+  // Topics have the rest of the calibration.
+  const PartialRig rig = read_rig_file(file);
+  CHECK(!rig.is_complete());
+  CHECK(rig.info_topics[0] == "/Alpha/camera_info");
 }
 
 }  // namespace km

@@ -172,7 +172,7 @@ TEST_CASE("A finding on a run is reported with its severity and its number", "[r
       {"odometry.broken", kWarning, "2 steps of odometry are wrong",
        of([](auto& s) { s.pgo.odometry_breaks = 2; })},
       {"odometry.images_alone", kNote, "without an inertial sensor",
-       of([](auto& s) { s.odometry = OdometrySummary{.inertial_sensor = false}; })},
+       of([](auto& s) { s.odometry = VioStatistics{.has_imu = false}; })},
       {"map.dropped_under_load", kWarning, "25 frames were left out of the map, 25 %",
        of([](auto& s) { s.mapping = {.frames = 75, .dropped_under_load = 25}; })},
       {"map.dropped_under_load", kNote, "1 frames",

@@ -276,7 +276,7 @@ TEST_CASE("Five processes over DDS reach the cost that one process reaches",
     CHECK(summary.closures.inliers > 0);
     CHECK(summary.closures.inliers <= summary.closures.verified);
     CHECK(summary.closures.verified <= summary.closures.candidates);
-    CHECK(summary.pgo.rounds > 0);
+    CHECK(summary.pgo.round > 0);
     CHECK(summary.pgo.anchor == RobotId{0});
     CHECK(summary.pgo.members == std::vector<RobotId>{0, 1, 2, 3, 4});
     CHECK(summary.pgo.settled);

@@ -280,7 +280,7 @@ TEST_CASE("A chunk with another checksum than it states is lost with its place",
 TEST_CASE("Chunks that decompress to far more than the file are left out and reported",
           "[recordings]") {
   McapWriter writer({});
-  const auto channel = writer.add_channel({.topic = "a", .message_encoding = "b"}, {.name = "c"});
+  const auto channel = writer.add_channel({.topic = "a", .message_encoding = "b"}, {});
   const std::vector<std::uint8_t> zeros(std::size_t{40} << 20U);
   for (const Stamp stamp : {1, 2}) writer.add({.channel_id = channel, .log_time = stamp}, zeros);
   writer.finish();
