@@ -8,7 +8,7 @@
 #include "modules/core/text_table.hpp"
 #include "modules/diagnosis/finding.hpp"
 #include "modules/evaluation/statistics.hpp"
-#include "modules/recordings/stamp_statistics.hpp"
+#include "modules/recordings/bag_summary.hpp"
 
 namespace km {
 namespace {

@@ -7,9 +7,8 @@
 #include <utility>
 
 #include "modules/core/input_file.hpp"
-#include "modules/recordings/decompress.hpp"
+#include "modules/recordings/chunked_file.hpp"
 #include "modules/recordings/open_bag.hpp"
-#include "modules/recordings/random_access_file.hpp"
 
 namespace km {
 namespace {

@@ -6,7 +6,6 @@
 #include "modules/core/bytes.hpp"
 #include "modules/core/input_file.hpp"
 #include "modules/recordings/chunked_file.hpp"
-#include "modules/recordings/decompress.hpp"
 #include "modules/recordings/mcap_records.hpp"
 #include "modules/recordings/open_bag.hpp"
 

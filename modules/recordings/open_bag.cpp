@@ -8,8 +8,8 @@
 
 #include "modules/core/input_file.hpp"
 #include "modules/recordings/channel_table.hpp"
+#include "modules/recordings/chunked_file.hpp"
 #include "modules/recordings/mcap_records.hpp"
-#include "modules/recordings/random_access_file.hpp"
 
 namespace km {
 namespace {

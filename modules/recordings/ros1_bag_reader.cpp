@@ -8,7 +8,6 @@
 #include "modules/core/bytes.hpp"
 #include "modules/core/input_file.hpp"
 #include "modules/recordings/chunked_file.hpp"
-#include "modules/recordings/decompress.hpp"
 #include "modules/recordings/open_bag.hpp"
 
 namespace km {

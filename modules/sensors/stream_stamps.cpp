@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "modules/core/text_table.hpp"
-#include "modules/recordings/stamp_statistics.hpp"
+#include "modules/recordings/bag_summary.hpp"
 
 namespace km {
 namespace {

@@ -3,7 +3,6 @@
 #include <cmath>
 
 #include "modules/recordings/bag_summary.hpp"
-#include "modules/recordings/stamp_statistics.hpp"
 #include "test/modules/sensors/listed_bag.hpp"
 
 namespace km {
@@ -125,5 +124,4 @@ TEST_CASE("Stamps of two cameras that are one agree", "[recordings]") {
 }
 
 }  // namespace
-
 }  // namespace km

@@ -7,8 +7,7 @@
 #include <random>
 #include <string>
 
-#include "modules/recordings/chunk_merge.hpp"
-#include "modules/recordings/decompress.hpp"
+#include "modules/recordings/chunked_file.hpp"
 #include "test/modules/recordings/bag_contents.hpp"
 
 namespace km {
@@ -142,5 +141,4 @@ TEST_CASE("Messages are dropped if their chunk begins earlier than stated", "[re
 }
 
 }  // namespace
-
 }  // namespace km

@@ -34,34 +34,25 @@ class BagFile {
     std::array<std::uint32_t, 2> counts{};
     std::uint32_t first = messages.front().seconds;
     for (const std::uint32_t id : kConnections) put_connection(records, id);
-    for (const Message& message : messages) {
-      ByteWriter header;
-      field(header, "op", Bytes{2});
-      field(header, "conn", u32(message.connection));
-      field(header, "time", time(message.seconds));
-      put(records, header, message.bytes);
-      ++counts[message.connection];
-      first = std::min(first, message.seconds);
+    for (const auto& [connection, seconds, bytes] : messages) {
+      put(records, fields({{"op", {2}}, {"conn", u32(connection)}, {"time", time(seconds)}}),
+          bytes);
+      ++counts[connection];
+      first = std::min(first, seconds);
     }
     const Bytes data = records.release();
-    ByteWriter header;
-    field(header, "op", Bytes{5});
-    field(header, "compression", octets("none"));
-    field(header, "size", u32(static_cast<std::uint32_t>(data.size())));
     chunks_.push_back({chunk_bytes_.size(), first, counts});
-    put(chunk_bytes_, header, data);
+    put(chunk_bytes_,
+        fields({{"op", {5}}, {"compression", octets("none")}, {"size", u32(data.size())}}), data);
   }
 
   [[nodiscard]] std::string finish(bool has_index) {
     const Bytes chunks = chunk_bytes_.release();
     const std::uint64_t begin = file_.size() + kHeaderRecord_bytes;
-    ByteWriter header;
-    field(header, "op", Bytes{3});
-    ByteWriter position;
-    position.u64(has_index ? begin + chunks.size() : 0);
-    field(header, "index_pos", position.release());
-    field(header, "conn_count", u32(2));
-    field(header, "chunk_count", u32(static_cast<std::uint32_t>(chunks_.size())));
+    const Bytes header = fields({{"op", {3}},
+                                 {"index_pos", u64(has_index ? begin + chunks.size() : 0)},
+                                 {"conn_count", u32(2)},
+                                 {"chunk_count", u32(chunks_.size())}});
     put(file_, header, Bytes(kHeaderRecord_bytes - 8 - header.size(), ' '));
     file_.bytes(chunks);
     if (has_index) put_index(begin);
@@ -80,56 +71,53 @@ class BagFile {
   };
 
   static Bytes octets(const std::string& text) { return {text.begin(), text.end()}; }
-  static Bytes u32(std::uint32_t value) {
+  static Bytes u64(std::uint64_t value) {
     ByteWriter out;
-    out.u32(value);
+    out.u64(value);
     return out.release();
   }
-  static Bytes time(std::uint32_t seconds) {
+  static Bytes u32(std::uint64_t value) {
+    Bytes bytes = u64(value);
+    bytes.resize(4);
+    return bytes;
+  }
+  static Bytes time(std::uint32_t seconds) { return u64(seconds); }  // and no nanoseconds
+  static Bytes fields(const std::vector<std::pair<std::string, Bytes>>& all) {
     ByteWriter out;
-    out.u32(seconds);
-    out.u32(0);
+    for (const auto& [name, value] : all) {
+      out.bytes(u32(name.size() + 1 + value.size()));
+      out.bytes(octets(name + '='));
+      out.bytes(value);
+    }
     return out.release();
   }
-  static void field(ByteWriter& out, const std::string& name, const Bytes& value) {
-    out.u32(static_cast<std::uint32_t>(name.size() + 1 + value.size()));
-    out.bytes(octets(name + '='));
-    out.bytes(value);
-  }
-  static void put(ByteWriter& out, ByteWriter& header, const Bytes& data) {
-    out.u32(static_cast<std::uint32_t>(header.size()));
-    out.bytes(header.release());
-    out.u32(static_cast<std::uint32_t>(data.size()));
-    out.bytes(data);
+  static void put(ByteWriter& out, const Bytes& header, const Bytes& data) {
+    for (const Bytes* part : {&header, &data}) {
+      out.bytes(u32(part->size()));
+      out.bytes(*part);
+    }
   }
   static void put_connection(ByteWriter& out, std::uint32_t id) {
-    ByteWriter header;
-    field(header, "op", Bytes{7});
-    field(header, "conn", u32(id));
-    field(header, "topic", octets("/imu" + std::to_string(id)));
-    ByteWriter description;
-    field(description, "topic", octets("/imu"));
-    field(description, "type", octets("sensor_msgs/Imu"));
-    put(out, header, description.release());
+    put(out,
+        fields({{"op", {7}}, {"conn", u32(id)}, {"topic", octets("/imu" + std::to_string(id))}}),
+        fields({{"topic", octets("/imu")}, {"type", octets("sensor_msgs/Imu")}}));
   }
   void put_index(std::uint64_t chunks_begin) {
     for (const std::uint32_t id : kConnections) put_connection(file_, id);
     for (const ChunkPlaced& chunk : chunks_) {
-      ByteWriter position;
-      position.u64(chunks_begin + chunk.begin);
-      ByteWriter header;
-      field(header, "op", Bytes{6});
-      field(header, "ver", u32(1));
-      field(header, "chunk_pos", position.release());
-      field(header, "start_time", time(chunk.first));
-      field(header, "end_time", time(chunk.first));
-      field(header, "count", u32(2));
       ByteWriter counts;
       for (const std::uint32_t id : kConnections) {
         counts.u32(id);
         counts.u32(chunk.counts[id]);
       }
-      put(file_, header, counts.release());
+      put(file_,
+          fields({{"op", {6}},
+                  {"ver", u32(1)},
+                  {"chunk_pos", u64(chunks_begin + chunk.begin)},
+                  {"start_time", time(chunk.first)},
+                  {"end_time", time(chunk.first)},
+                  {"count", u32(2)}}),
+          counts.release());
     }
   }
 

@@ -446,5 +446,4 @@ TEST_CASE("A CameraInfo that is no calibration is refused by frame and field", "
 }
 
 }  // namespace
-
 }  // namespace km

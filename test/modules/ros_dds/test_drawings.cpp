@@ -135,5 +135,4 @@ TEST_CASE("A mesh with too many faces is coarsened and covers the same area", "[
 }
 
 }  // namespace
-
 }  // namespace km

@@ -6,8 +6,7 @@
 #include <thread>
 
 #include "modules/recordings/ros_messages.hpp"
-#include "modules/ros_dds/node/live_bag.hpp"
-#include "modules/ros_dds/node/live_sink.hpp"
+#include "modules/ros_dds/node/live_topics.hpp"
 #include "modules/ros_dds/node/ros_output_node.hpp"
 #include "runtime/dds/ros_discovery.hpp"
 #include "runtime/dds/ros_publisher.hpp"

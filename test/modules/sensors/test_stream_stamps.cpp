@@ -128,5 +128,4 @@ TEST_CASE("A new stream or a new rate reports missing images only briefly", "[se
 }
 
 }  // namespace
-
 }  // namespace km

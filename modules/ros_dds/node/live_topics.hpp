@@ -4,6 +4,8 @@
 #include <vector>
 
 #include "modules/recordings/bag_reader.hpp"
+#include "modules/ros_dds/ros_sink.hpp"
+#include "runtime/dds/ros_publisher.hpp"
 #include "runtime/dds/ros_subscription.hpp"
 
 namespace km {
@@ -27,6 +29,31 @@ class LiveBag final : public BagReader {
  private:
   RosSubscription subscription_;
   std::vector<BagChannel> channels_;
+};
+
+/// Publishes messages on ROS 2 topics.
+class LiveSink final : public RosSink {
+ public:
+  explicit LiveSink(std::shared_ptr<const RosNetwork> network) : network_(std::move(network)) {}
+
+  /// Throws DdsError, and std::invalid_argument for a type that RosNetwork does not know.
+  std::size_t open(const PublishedTopic& topic) override {
+    publishers_.push_back(std::make_unique<RosPublisher>(
+        network_, topic.name, topic.type, topic.is_state ? RosQos::kLatched : RosQos::kReliable,
+        topic.depth));
+    return publishers_.size() - 1;
+  }
+  void put(std::size_t topic, std::optional<Stamp> /*time*/,
+           std::span<const std::uint8_t> message) override {
+    publishers_.at(topic)->publish(message);
+  }
+  [[nodiscard]] std::size_t readers(std::size_t topic) const override {
+    return publishers_.at(topic)->reader_count();
+  }
+
+ private:
+  std::shared_ptr<const RosNetwork> network_;
+  std::vector<std::unique_ptr<RosPublisher>> publishers_;
 };
 
 }  // namespace km

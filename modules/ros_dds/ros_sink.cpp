@@ -1,4 +1,4 @@
-#include "modules/ros_dds/mcap_sink.hpp"
+#include "modules/ros_dds/ros_sink.hpp"
 
 #include <algorithm>
 #include <exception>

@@ -1,4 +1,4 @@
-#include "modules/ros_dds/node/live_bag.hpp"
+#include "modules/ros_dds/node/live_topics.hpp"
 
 #include <utility>
 
