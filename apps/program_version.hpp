@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <string>
 
 namespace km {
@@ -14,5 +15,10 @@ namespace km {
 /// Output of --version: the program's name and version, the commit, the compiler, the build type,
 /// and the versions of the libraries.
 [[nodiscard]] std::string version_text(const std::string& program);
+
+/// Folder of the running program; other programs are beside it, and its configuration is near.
+[[nodiscard]] inline std::filesystem::path program_folder() {
+  return std::filesystem::read_symlink("/proc/self/exe").parent_path();
+}
 
 }  // namespace km

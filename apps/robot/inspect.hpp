@@ -2,7 +2,10 @@
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
+#include "modules/recordings/bag_summary.hpp"
+#include "modules/sensors/node/rig_file.hpp"
 #include "runtime/dds/ros_config.hpp"
 
 namespace km {
@@ -22,5 +25,16 @@ namespace km {
 /// Description of the topics that programs publish on ROS 2 now, as above. If `rig` is not empty,
 /// also writes the rig file. Further errors as for summarise_live_topics().
 [[nodiscard]] std::string inspect_live(const RosConfig& config, const std::filesystem::path& rig);
+
+/// Topics that are most likely the cameras and the inertial sensor of a robot, judged by types,
+/// rates and names. A person should check them: of several rigs in a recording the first one is
+/// taken. Topics that are not found are empty. The calibration is unknown, except for topics of
+/// CameraInfo.
+[[nodiscard]] RigFile propose_rig(const std::vector<TopicSummary>& topics);
+
+/// Reason why depth of a proposed RGB-D rig is not aligned with its camera, and the remedy; "" if
+/// sizes and frames of the images are equal.
+[[nodiscard]] std::string depth_problem(const std::vector<TopicSummary>& topics,
+                                        const RigFile& rig);
 
 }  // namespace km

@@ -3,7 +3,7 @@
 #include <array>
 #include <type_traits>
 
-#include "apps/program_folder.hpp"
+#include "apps/program_version.hpp"
 #include "modules/core/input_file.hpp"
 #include "runtime/config_layers.hpp"
 

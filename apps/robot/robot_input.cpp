@@ -14,7 +14,7 @@
 #include "modules/mesh/map_file.hpp"
 #include "modules/recordings/open_bag.hpp"
 #include "modules/recordings/ros_messages.hpp"
-#include "modules/ros_dds/node/live_bag.hpp"
+#include "modules/ros_dds/node/live_topics.hpp"
 #include "modules/sensors/bag_dataset.hpp"
 #include "modules/sensors/node/open_folder.hpp"
 #include "modules/sensors/node/rig_file.hpp"

@@ -5,9 +5,9 @@
 #include <utility>
 
 #include "apps/result_files.hpp"
-#include "apps/robot/diagnostics.hpp"
-#include "apps/robot/process_usage.hpp"
+#include "apps/robot/growing_files.hpp"
 #include "apps/robot/results.hpp"
+#include "apps/robot/status.hpp"
 #include "apps/robot/team_keys_node.hpp"
 #include "modules/core/text_table.hpp"
 #include "modules/loop_closure/node/keyframe_features_node.hpp"
@@ -23,8 +23,8 @@
 #include "modules/pose_graph/node/team_codec.hpp"
 #include "modules/pose_graph/node/team_node.hpp"
 #include "modules/rbcd/solver_choice.hpp"
-#include "modules/ros_dds/mcap_sink.hpp"
-#include "modules/ros_dds/node/live_sink.hpp"
+#include "modules/ros_dds/node/live_topics.hpp"
+#include "modules/ros_dds/ros_sink.hpp"
 #include "modules/vio/node/vio_node.hpp"
 #include "runtime/dds/robot_status.hpp"
 
@@ -34,11 +34,6 @@ namespace {
 constexpr std::string_view kRecordNode = "record";
 constexpr int kMeshPoints = 200000, kMeshFaces = 50000;  // largest mesh for viewers
 constexpr double kMeshBytesPerS = 2e6;                   // average rate of its faces
-
-template <typename T>
-void forward(In<T> from, Out<T> to) {
-  from.subscribe([to](const auto& message) { to.publish(message); });
-}
 
 // True if keyframe 0 is the origin of the frame of a map or of fixes, and not of this run.
 bool begins_at_origin(RestoredFrom from) {
@@ -84,7 +79,8 @@ Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput 
   else if (auto* graph = std::get_if<RecordedGraph>(&input.source))
     add_playback(config, options.pace.rate, std::move(*graph));
   else
-    add_past();
+    add_restore();
+  source_ended_ = std::holds_alternative<PastRun>(input.source);
   if (!std::holds_alternative<RecordedGraph>(input.source)) add_place_recognition(config);
   if (input.localize_in) {
     map_id_ = input.localize_in->id();
@@ -128,11 +124,6 @@ RunResult Robot::run(const Supervisor::Finished& finished) {
   RunResult result = supervisor_.run(finished);
   if (!result.is_left_behind(journal_->name())) journal_->write();
   return result;
-}
-
-void Robot::add_past() {
-  add_restore();
-  source_ended_ = true;
 }
 
 // Call after the source is added: the supervisor starts nodes in reverse order, so this one starts

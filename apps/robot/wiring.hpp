@@ -10,15 +10,14 @@
 #include <variant>
 #include <vector>
 
-#include "apps/robot/diagnostics.hpp"
 #include "apps/robot/journal_node.hpp"
 #include "apps/robot/mapping_plan.hpp"
 #include "apps/robot/mesh_files_node.hpp"
-#include "apps/robot/restore_node.hpp"
 #include "apps/robot/robot_config.hpp"
 #include "apps/robot/robot_input.hpp"
 #include "apps/robot/run_end.hpp"
 #include "apps/robot/run_record.hpp"
+#include "apps/robot/status.hpp"
 #include "modules/absolute_fixes/node/fixes_node.hpp"
 #include "modules/constellations/node/constellations_node.hpp"
 #include "modules/core/closure_verdicts.hpp"
@@ -126,6 +125,11 @@ struct Topics {
   Crossing<RobotObjects> objects;
   Crossing<RobotStatus> status;
 };
+
+template <typename T>
+void forward(In<T> from, Out<T> to) {
+  from.subscribe([to](const auto& message) { to.publish(message); });
+}
 
 /// For each other robot, the incarnation with which this robot has closures. Thread-safe.
 class IncarnationsMet {
@@ -249,7 +253,6 @@ class Robot {
   void add_place_recognition(const RobotConfig& config);
   void add_localization(const RobotConfig& config, FinishedMap map);
   void add_fixes(FixInput input);
-  void add_past();
   void publish(const JournalEntry& event);
   void add_team(RobotSample& sample) const;
   /// True if a former process left a solution of the pose graph.

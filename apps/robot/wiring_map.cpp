@@ -85,10 +85,8 @@ CrossingEnds Robot::share_meshes(const RobotConfig& robot, const LabelPalette& p
                                               .own_poses = topics_.sent_mesh_poses,
                                               .received_poses = topics_.mesh_poses.from_peers()});
   if (mesh_deformation_ == nullptr) return {.send = false, .receive = true};
-  topics_.sent_chunks.subscribe(
-      [to_peers = topics_.chunks.to_peers()](const auto& chunk) { to_peers.publish(chunk); });
-  topics_.sent_mesh_poses.subscribe(
-      [to_peers = topics_.mesh_poses.to_peers()](const auto& poses) { to_peers.publish(poses); });
+  forward<MeshChunk>(topics_.sent_chunks, topics_.chunks.to_peers());
+  forward<MeshPoses>(topics_.sent_mesh_poses, topics_.mesh_poses.to_peers());
   MeshChunksNode::Reduction reduction;
   if (coarse) reduction = [voxel_m](const LabelledMesh& mesh) { return resampled(mesh, voxel_m); };
   chunks_ = &add<MeshChunksNode>(false, config, identity_.robot,
@@ -112,8 +110,7 @@ void Robot::add_objects(const ObjectsConfig& config, const LabelPalette& palette
                                              .received = topics_.objects.from_peers(),
                                              .own = topics_.sent_objects,
                                              .joint = topics_.joint_objects});
-  topics_.sent_objects.subscribe(
-      [to_peers = topics_.objects.to_peers()](const auto& sent) { to_peers.publish(sent); });
+  forward<RobotObjects>(topics_.sent_objects, topics_.objects.to_peers());
   topics_.joint_objects.subscribe([this, folder, &results](const auto& objects) {
     write_objects(folder, *objects, objects_->palette(), results);
   });

@@ -8,8 +8,8 @@
 #include <utility>
 
 #include "apps/output_file.hpp"
-#include "apps/program_folder.hpp"
 #include "apps/program_options.hpp"
+#include "apps/program_version.hpp"
 #include "apps/result_files.hpp"
 #include "apps/result_writer.hpp"
 #include "apps/team/links_file.hpp"
@@ -21,7 +21,7 @@
 #include "modules/mesh/mesh_file.hpp"
 #include "modules/recordings/open_bag.hpp"
 #include "modules/recordings/ros_messages.hpp"
-#include "modules/ros_dds/mcap_sink.hpp"
+#include "modules/ros_dds/ros_sink.hpp"
 #include "runtime/dds/dds_config.hpp"
 #include "runtime/dds/domain_draw.hpp"
 #include "runtime/unblocked_output.hpp"

@@ -10,8 +10,8 @@
 #include "modules/core/text_table.hpp"
 #include "modules/mesh/team_mesh.hpp"
 #include "modules/recordings/ros_messages.hpp"
-#include "modules/ros_dds/mcap_sink.hpp"
 #include "modules/ros_dds/node/ros_output_node.hpp"
+#include "modules/ros_dds/ros_sink.hpp"
 #include "runtime/clock.hpp"
 #include "runtime/log.hpp"
 

@@ -1,6 +1,6 @@
 #include <catch2/catch.hpp>
 
-#include "apps/robot/diagnostics.hpp"
+#include "apps/robot/status.hpp"
 
 namespace km {
 namespace {

@@ -11,8 +11,7 @@
 #include <vector>
 
 #include "apps/result_files.hpp"
-#include "apps/robot/growing_file.hpp"
-#include "apps/robot/process_usage.hpp"
+#include "apps/robot/growing_files.hpp"
 #include "test/support/captured_log.hpp"
 #include "test/support/temporary_folder.hpp"
 
@@ -228,5 +227,4 @@ TEST_CASE("optimizer.csv has a row for each round, and continues the numbers", "
 }
 
 }  // namespace
-
 }  // namespace km

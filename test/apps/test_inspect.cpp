@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "apps/robot/inspect.hpp"
-#include "apps/robot/rig_proposal.hpp"
 #include "modules/core/input_file.hpp"
 #include "modules/recordings/open_bag.hpp"
 #include "modules/recordings/ros_messages.hpp"
@@ -103,9 +102,7 @@ TopicSummary topic(const std::string& name, std::string_view type, double rate_h
                        .type = std::string(type),
                        .encoding = "ros1",
                        .has_sensor_stamps = true,
-                       .stamps = {},
-                       .is_image = !image.empty(),
-                       .image = {}};
+                       .is_image = !image.empty()};
   if (summary.is_image) summary.image = TopicImage{{640, 480}, image};
   for (int k = 0; k < 100; ++k) summary.stamps.push_back(nanoseconds(k / rate_hz));
   return summary;

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "apps/result_files.hpp"
-#include "apps/robot/restore_node.hpp"
+#include "apps/robot/journal_node.hpp"
 #include "apps/robot/wiring.hpp"
 #include "test/support/inbox.hpp"
 #include "test/support/temporary_folder.hpp"
@@ -195,5 +195,4 @@ TEST_CASE("A restored closure follows the last keyframe on which it ends", "[rob
 }
 
 }  // namespace
-
 }  // namespace km

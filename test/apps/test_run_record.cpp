@@ -15,6 +15,17 @@ Closure closure_between(const ClosureId& id) {
   return closure;
 }
 
+void add_verified(const ClosureId& id, RunRecord& record) {
+  record.add(closure_between(id));
+  record.add(ClosureOutcome{.id = id, .stage = ClosureStage::kVerified, .reason = {}});
+}
+
+PeerEvent event_of(PeerEventKind kind, RobotId robot) {
+  PeerEvent event{kind, {}, {}};
+  event.identity.robot = robot;
+  return event;
+}
+
 }  // namespace
 
 TEST_CASE("a closure that the optimiser rejects is no inlier, until it is accepted again",
@@ -23,10 +34,7 @@ TEST_CASE("a closure that the optimiser rejects is no inlier, until it is accept
   const ClosureId doubted{{1, 4}, {2, 5}};
   const ClosureId inconsistent{{1, 6}, {2, 7}};
   RunRecord record(1);
-  for (const ClosureId& id : {kept, doubted, inconsistent}) {
-    record.add(closure_between(id));
-    record.add(ClosureOutcome{.id = id, .stage = ClosureStage::kVerified, .reason = {}});
-  }
+  for (const ClosureId& id : {kept, doubted, inconsistent}) add_verified(id, record);
   record.add(InlierSet{1, 2, 1, {kept, doubted}});
   record.add(ClosureVerdicts{{{kept, true}, {doubted, false}}});
 
@@ -170,9 +178,7 @@ TEST_CASE("keyframes that another vocabulary keeps from being compared are count
   record.add(PlaceQuery{{2, 3}, PlaceQueryStatus::kSearched});
   record.add(PlaceQuery{{3, 0}, PlaceQueryStatus::kRepeated});
   CHECK(record.other_vocabulary() == std::map<RobotId, std::uint64_t>{{2, 3}});
-  PeerEvent event{PeerEventKind::kRestarted, {}, {}};
-  event.identity.robot = 2;
-  record.add(event);
+  record.add(event_of(PeerEventKind::kRestarted, 2));
   CHECK(record.other_vocabulary().empty());
 }
 
@@ -193,9 +199,7 @@ TEST_CASE("keyframes that were compared by ORB because of another network are co
   record.add(by_orb);
   record.add(by_network);
   CHECK(record.other_network() == std::map<RobotId, std::uint64_t>{{2, 1}});
-  PeerEvent event{PeerEventKind::kRestarted, {}, {}};
-  event.identity.robot = 2;
-  record.add(event);
+  record.add(event_of(PeerEventKind::kRestarted, 2));
   CHECK(record.other_network().empty());
 }
 
@@ -213,16 +217,11 @@ TEST_CASE("closures with a robot that restarts are dropped, those with a resumed
   const auto kind = GENERATE(PeerEventKind::kRestarted, PeerEventKind::kResumed);
   const ClosureId with_it{{1, 2}, {2, 3}}, doubted{{1, 4}, {2, 5}}, with_other{{1, 4}, {3, 5}};
   RunRecord record(1);
-  for (const ClosureId& id : {with_it, doubted, with_other}) {
-    record.add(closure_between(id));
-    record.add(ClosureOutcome{.id = id, .stage = ClosureStage::kVerified, .reason = {}});
-  }
+  for (const ClosureId& id : {with_it, doubted, with_other}) add_verified(id, record);
   record.add(InlierSet{1, 2, 7, {with_it, doubted}});
   record.add(InlierSet{1, 3, 7, {with_other}});
   record.add(ClosureVerdicts{{{doubted, false}}});
-  PeerEvent event{kind, {}, {}};
-  event.identity.robot = 2;
-  record.add(event);
+  record.add(event_of(kind, 2));
   if (kind == PeerEventKind::kResumed) {
     CHECK(record.inlier_closures().size() == 2);
     return;

@@ -8,7 +8,7 @@
 
 #include "modules/core/json.hpp"
 #include "modules/recordings/ros_messages.hpp"
-#include "modules/ros_dds/mcap_sink.hpp"
+#include "modules/ros_dds/ros_sink.hpp"
 #include "test/modules/sensors/euroc_folder.hpp"
 #include "test/support/command.hpp"
 #include "test/support/euroc_copy.hpp"
