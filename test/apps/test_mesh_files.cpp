@@ -42,16 +42,6 @@ struct Bench {
   }
 };
 
-TEST_CASE("A mesh is written in the odometry frame until the team's is known", "[robot][mapping]") {
-  Bench bench;
-  bench.node.start();
-  bench.maps.publish(triangle());
-  bench.node.stop();
-  CHECK(bench.written("mesh.ply").vertices == triangle().mesh.vertices);
-  CHECK(bench.written("mesh.ply").labels == triangle().mesh.labels);
-  CHECK_FALSE(std::filesystem::exists(bench.folder.path() / "mesh_optimized.ply"));
-}
-
 TEST_CASE("A mesh is moved to the optimised pose of its first keyframe", "[robot][mapping]") {
   Bench bench;
   bench.node.start();

@@ -88,15 +88,11 @@ TEST_CASE("Later sources have priority: profile, files, settings, options", "[ro
   CHECK(config.dds.lease_s == 33.0);
   CHECK(config.dds.interface == "eth9");
   CHECK(config.dds.domain == 9);
-  options.peers = {"10.0.0.2"};
-  CHECK(load_robot_config(options).dds.discovery == Discovery::kPeers);
-}
-
-TEST_CASE("A robot can be watched only if its owner asks for it", "[robot]") {
-  RobotOptions options;
-  CHECK_FALSE(load_robot_config(options).view.on);
+  CHECK_FALSE(config.view.on);  // only if the owner asks for it
   options.view = true;
   CHECK(load_robot_config(options).view.on);
+  options.peers = {"10.0.0.2"};
+  CHECK(load_robot_config(options).dds.discovery == Discovery::kPeers);
 }
 
 TEST_CASE("Every shipped configuration loads", "[robot]") {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <set>
 #include <sstream>
 #include <stdexcept>
 #include <string>
@@ -105,5 +106,26 @@ class EurocCopy {
 
   std::filesystem::path mav0_;
 };
+
+/// Makes a EuRoC folder of links to the images of a recording at rest, in static_start, which are
+/// apart from their calibration.
+inline void link_static_start(const std::filesystem::path& recording,
+                              const std::filesystem::path& folder) {
+  namespace fs = std::filesystem;
+  const fs::path source = fs::absolute(recording);
+  fs::create_directories(folder / "mav0");
+  fs::create_directory_symlink(source / "mav0/imu0", folder / "mav0/imu0");
+  for (const char* const camera : {"cam0", "cam1"}) {
+    const fs::path made = folder / "mav0" / camera;
+    fs::create_directories(made);
+    fs::create_symlink(source / "mav0" / camera / "sensor.yaml", made / "sensor.yaml");
+    fs::create_directory_symlink(source / "static_start" / camera, made / "data");
+    std::set<std::string> names;
+    for (const auto& file : fs::directory_iterator(made / "data"))
+      names.insert(file.path().filename());
+    std::ofstream list(made / "data.csv");
+    for (const std::string& name : names) list << name.substr(0, 19) << ',' << name << '\n';
+  }
+}
 
 }  // namespace km

@@ -31,24 +31,6 @@ std::string record_command(const fs::path& dataset, const std::string& options) 
                             dataset.string() + ' ' + options);
 }
 
-struct Record {
-  explicit Record(const fs::path& file)
-      : reader(open_mcap(file)), messages(topic_messages_of(*reader)) {
-    for (const TopicMessage& message : messages) ++counts[message.topic];
-  }
-  template <typename Message>
-  [[nodiscard]] Message last(const std::string& topic) const {
-    for (std::size_t k = messages.size(); k-- > 0;)
-      if (messages[k].topic == topic)
-        return decode_ros<Message>("cdr", messages[k].bytes).value.value();
-    throw std::out_of_range(topic);
-  }
-
-  const std::unique_ptr<BagReader> reader;
-  std::vector<TopicMessage> messages;
-  std::map<std::string, std::size_t> counts;
-};
-
 // Text has nine digits behind the point.
 void check_equal(const RosPath& path, const std::vector<StampedPose>& poses) {
   constexpr double kDigits = 0.51e-9;
@@ -201,14 +183,7 @@ TEST_CASE("Two robots on the halves of a recording localise together, and their 
   }
   CHECK(team.messages.size() == messages);
   // For two joined robots, the frame of one is a child of the other's, which is a child of `map`.
-  std::set<std::pair<std::string, std::string>> links;
-  for (const TopicMessage& message : team.messages)
-    if (message.topic == "/tf" || message.topic == "/tf_static") {
-      const auto transforms = decode_ros<RosTFMessage>("cdr", message.bytes);
-      REQUIRE(transforms.value);
-      for (const RosTransformStamped& link : transforms.value->transforms)
-        links.emplace(link.header.frame_id, link.child_frame_id);
-    }
+  const auto links = team.links();
   CHECK(links.contains({"map", "a/map"}));
   CHECK(links.contains({"a/map", "b/map"}));
   CHECK(links.contains({"b/map", "b/odom"}));

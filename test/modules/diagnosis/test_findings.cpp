@@ -40,14 +40,6 @@ TEST_CASE("A finding is three lines for people", "[diagnosis]") {
   CHECK(to_text(std::vector<Finding>()).empty());
 }
 
-TEST_CASE("A finding is equal after writing and reading JSON", "[diagnosis]") {
-  const Finding finding = finding_of("a.b", Severity::kError);
-  CHECK(Json(finding).get<Finding>() == finding);
-  CHECK(Json(finding).dump() ==
-        R"({"id":"a.b","severity":"error","what":"7 of 9","means":"m","to_do":"t"})");
-  CHECK_THROWS_WITH((Json{{"severity", "fatal"}}.get<Finding>()), Catch::Contains("fatal"));
-}
-
 namespace {
 
 std::string ids_of(const Examination& result) {

@@ -1,7 +1,6 @@
 #include <catch2/catch.hpp>
 
 #include <filesystem>
-#include <fstream>
 #include <functional>
 #include <iostream>
 #include <optional>
@@ -13,6 +12,7 @@
 #include "modules/diagnosis/stereo_fit.hpp"
 #include "modules/sensors/node/open_folder.hpp"
 #include "test/support/demo_world.hpp"
+#include "test/support/euroc_copy.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/temporary_folder.hpp"
 
@@ -69,24 +69,6 @@ void rotate_gyro(SensorSample& sample, const std::function<void(Eigen::Vector3d&
 void swap_images(SensorSample& sample) {
   for (StereoMatches& image : sample.stereo)
     for (PixelPair& pair : image.pairs) std::swap(pair.a, pair.b);
-}
-
-// A EuRoC folder of links to the images of V1_01 at rest, which are apart from their calibration.
-void link_v1(const fs::path& recording, const fs::path& folder) {
-  fs::create_directories(folder / "mav0");
-  fs::create_directory_symlink(fs::absolute(recording / "mav0/imu0"), folder / "mav0/imu0");
-  for (const char* const camera : {"cam0", "cam1"}) {
-    const fs::path made = folder / "mav0" / camera;
-    fs::create_directories(made);
-    fs::create_symlink(fs::absolute(recording / "mav0" / camera / "sensor.yaml"),
-                       made / "sensor.yaml");
-    fs::create_directory_symlink(fs::absolute(recording / "static_start" / camera), made / "data");
-    std::set<std::string> names;
-    for (const auto& file : fs::directory_iterator(made / "data"))
-      if (file.path().extension() == ".jpg") names.insert(file.path().filename());
-    std::ofstream list(made / "data.csv");
-    for (const std::string& name : names) list << name.substr(0, 19) << ',' << name << '\n';
-  }
 }
 
 }  // namespace
@@ -157,7 +139,7 @@ TEST_CASE("V1_01 at rest gives no findings and no figures that need motion", "[d
   const auto data = shared_data("euroc/V1_01_easy");
   if (!data) return;
   const TemporaryFolder folder;
-  link_v1(*data, folder.path());
+  link_static_start(*data, folder.path());
   const Recorded recorded = read(folder.path(), 10.0);
   CHECK(found_in(recorded) == Ids{"frames.rate"});  // 5 Hz: every fourth image
   const Examination inertial = examine_inertial(recorded.sample, recorded.rig.stereo);

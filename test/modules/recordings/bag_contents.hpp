@@ -2,9 +2,17 @@
 
 #include <algorithm>
 #include <catch2/catch.hpp>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <set>
+#include <stdexcept>
+#include <string>
+#include <utility>
 #include <vector>
 
-#include "modules/recordings/bag_reader.hpp"
+#include "modules/recordings/open_bag.hpp"
+#include "modules/recordings/ros_messages.hpp"
 
 namespace km {
 
@@ -37,5 +45,36 @@ inline std::vector<TopicMessage> topic_messages_of(BagReader& reader) {
   }
   return messages;
 }
+
+/// An MCAP file with messages of ROS 2, read to its end.
+struct Record {
+  explicit Record(const std::filesystem::path& file)
+      : reader(open_mcap(file)), messages(topic_messages_of(*reader)) {
+    for (const TopicMessage& message : messages) ++counts[message.topic];
+  }
+  /// The newest message of a topic; throws std::out_of_range without one.
+  template <typename Message>
+  [[nodiscard]] Message last(const std::string& topic) const {
+    for (std::size_t k = messages.size(); k-- > 0;)
+      if (messages[k].topic == topic)
+        return decode_ros<Message>("cdr", messages[k].bytes).value.value();
+    throw std::out_of_range(topic);
+  }
+  /// The frames that transforms join: parent and child.
+  [[nodiscard]] std::set<std::pair<std::string, std::string>> links() const {
+    std::set<std::pair<std::string, std::string>> all;
+    for (const TopicMessage& message : messages) {
+      if (message.topic != "/tf" && message.topic != "/tf_static") continue;
+      const auto transforms = decode_ros<RosTFMessage>("cdr", message.bytes);
+      for (const RosTransformStamped& link : transforms.value.value().transforms)
+        all.emplace(link.header.frame_id, link.child_frame_id);
+    }
+    return all;
+  }
+
+  const std::unique_ptr<BagReader> reader;
+  std::vector<TopicMessage> messages;
+  std::map<std::string, std::size_t> counts;
+};
 
 }  // namespace km

@@ -11,12 +11,7 @@ namespace {
 constexpr Stamp kSecond = 1'000'000'000;
 
 std::vector<std::uint8_t> image_at(Stamp stamp) {
-  RosImage image;
-  image.header.stamp = stamp;
-  image.height = 2;
-  image.width = 3;
-  image.encoding = "mono8";
-  return encode_ros(image);
+  return encode_ros(mono_image({stamp, "camera"}, 3, 2));
 }
 
 TEST_CASE("Topics are summed up by the stamps of their sensors", "[recordings]") {

@@ -82,32 +82,6 @@ TEST_CASE("Bags of ROS 2 give the same messages as SQLite's own program", "[reco
   CHECK(to_string(reader->report()) == "");
 }
 
-TEST_CASE("Images and inertial samples in a bag of ROS 2 are decoded", "[recordings]") {
-  const auto folder = shared_data("ros_recordings/rosbag2/s3e_playground_2");
-  if (!folder) return;
-  const auto reader = open_bag(*folder);
-  std::vector<Stamp> stamps;  // left camera
-  std::size_t samples = 0;
-  while (const auto message = reader->next()) {
-    const BagChannel& channel = reader->channels()[message->channel];
-    if (is_of_type(channel, RosCompressedImage::kType)) {
-      const auto image = decode_ros<RosCompressedImage>(channel.encoding, message->bytes);
-      REQUIRE(image.value);
-      CHECK(image.value->data.at(0) == 0xFF);  // as JPEG begins
-      if (channel.topic.find("left") != std::string::npos)
-        stamps.push_back(image.value->header.stamp);
-    }
-    if (is_of_type(channel, RosImu::kType)) {
-      const auto imu = decode_ros<RosImu>(channel.encoding, message->bytes);
-      REQUIRE(imu.value);
-      ++samples;
-      CHECK(std::abs(imu.value->linear_acceleration.norm() - 9.8) < 2.0);  // [m/s^2], about g
-    }
-  }
-  CHECK(samples == 14);
-  CHECK(stamps == std::vector<Stamp>{1661164286639000000, 1661164286739000000});
-}
-
 TEST_CASE("Messages of a database come in order of time and id", "[recordings]") {
   const TemporaryFolder folder;
   const bool has_index = GENERATE(true, false);

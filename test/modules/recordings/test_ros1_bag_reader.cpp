@@ -173,26 +173,6 @@ TEST_CASE("Bags of ROS 1 give the same messages as ROS' own reader", "[recording
     CHECK(counts[i] == reader->channels()[i].message_count);
 }
 
-TEST_CASE("Poses in a bag of ROS 1 are decoded", "[recordings]") {
-  const auto file = shared_data("ros_recordings/rosbag1/ROS_example.bag");
-  if (!file) return;
-  const auto reader = open_ros1_bag(*file);
-  for (auto message = reader->next(); message; message = reader->next()) {
-    const BagChannel& channel = reader->channels()[message->channel];
-    REQUIRE(is_of_type(channel, RosPoseStamped::kType));
-    const auto pose = decode_ros<RosPoseStamped>(channel.encoding, message->bytes);
-    REQUIRE(pose.value);
-    if (channel.topic != "groundtruth") continue;
-    // The first, as python3-rosbag shows it.
-    CHECK(pose.value->header.stamp == 1502792570283404827);
-    CHECK(pose.value->header.frame_id == "groundtruth");
-    CHECK(pose.value->pose.position.x() == -0.004899939787714927);
-    CHECK(pose.value->pose.orientation.w() == 0.9999926388911098);
-    return;
-  }
-  FAIL("no such topic");
-}
-
 TEST_CASE("A bag is read the same with and without an index", "[recordings]") {
   const bool has_index = GENERATE(true, false);
   const TemporaryFolder folder;

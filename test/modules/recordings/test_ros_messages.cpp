@@ -11,6 +11,7 @@
 #include "modules/core/lie.hpp"
 #include "modules/recordings/ros_camera.hpp"
 #include "modules/recordings/ros_messages.hpp"
+#include "test/modules/sensors/listed_bag.hpp"
 #include "test/support/corrupted_input.hpp"
 
 namespace km {
@@ -325,47 +326,21 @@ TEST_CASE("Types are known by their names in ROS 1 and 2", "[recordings]") {
 
 namespace {
 
-RosCameraInfo some_info() {
-  RosCameraInfo info;
-  info.header.frame_id = "left_optical";
-  info.width = 640;
-  info.height = 480;
-  info.distortion_model = "plumb_bob";
-  info.d = {-0.28, 0.07, 2e-4, 1e-5, 0.0};
-  info.k = {458.0, 0, 320.5, 0, 457.0, 240.5, 0, 0, 1};
-  info.r = {1, 0, 0, 0, 1, 0, 0, 0, 1};
-  info.p = {430.0, 0, 318.0, 0, 0, 430.0, 239.0, 0, 0, 0, 1, 0};
-  return info;
-}
-
-// The other half of a pair with a baseline of 0.1 m.
-RosCameraInfo right_of(RosCameraInfo left) {
-  left.header.frame_id = "right_optical";
-  left.p[3] = -43.0;
-  return left;
-}
-
-TEST_CASE("A raw image's camera is that of K and D", "[recordings]") {
-  const Camera camera = camera_of(some_info(), RosImages::kRaw);
+TEST_CASE("A raw image's camera is that of K and D, a rectified one's that of P", "[recordings]") {
+  const Camera camera = camera_of(camera_info("left_optical"), RosImages::kRaw);
   CHECK(camera.width == 640);
   CHECK(camera.height == 480);
-  CHECK(camera.fx == 458.0);
-  CHECK(camera.fy == 457.0);
-  CHECK(camera.cx == 320.5);
-  CHECK(camera.cy == 240.5);
+  CHECK(Eigen::Vector4d(camera.fx, camera.fy, camera.cx, camera.cy) ==
+        Eigen::Vector4d(458.0, 457.0, 320.5, 240.5));
   CHECK(camera.lens == Lens(LensModel::kRadialTangential, {-0.28, 0.07, 2e-4, 1e-5}));
-}
-
-TEST_CASE("A rectified image's camera is that of P", "[recordings]") {
-  const Camera camera = camera_of(some_info(), RosImages::kRectified);
-  CHECK(camera.fx == 430.0);
-  CHECK(camera.cx == 318.0);
-  CHECK(camera.cy == 239.0);
-  CHECK(camera.lens.is_ideal());
+  const Camera rectified = camera_of(camera_info("left_optical"), RosImages::kRectified);
+  CHECK(Eigen::Vector4d(rectified.fx, rectified.fy, rectified.cx, rectified.cy) ==
+        Eigen::Vector4d(430.0, 430.0, 318.0, 239.0));
+  CHECK(rectified.lens.is_ideal());
 }
 
 TEST_CASE("ROS's models of distortion are lenses", "[recordings]") {
-  RosCameraInfo info = some_info();
+  RosCameraInfo info = camera_info("left_optical");
   const auto lens = [&] { return camera_of(info, RosImages::kRaw).lens; };
   info.d = {-0.28, 0.07, 2e-4, 1e-5, 0.03};
   CHECK(lens() == Lens(LensModel::kRadialTangential, info.d));
@@ -387,9 +362,9 @@ TEST_CASE("ROS's models of distortion are lenses", "[recordings]") {
 }
 
 TEST_CASE("The baseline is computed from P of the right camera", "[recordings]") {
-  CHECK(baseline_m(right_of(some_info())).value() == Approx(0.1));
-  CHECK(!baseline_m(some_info()));
-  RosCameraInfo info = right_of(some_info());
+  CHECK(baseline_m(camera_info("right_optical", -43.0)).value() == Approx(0.1));
+  CHECK(!baseline_m(camera_info("left_optical")));
+  RosCameraInfo info = camera_info("right_optical", -43.0);
   info.p[3] = 43.0;  // a camera to the left
   CHECK(!baseline_m(info));
   info.p.fill(0.0);
@@ -397,7 +372,7 @@ TEST_CASE("The baseline is computed from P of the right camera", "[recordings]")
 }
 
 TEST_CASE("The frame of a CameraInfo is the rectified camera's", "[recordings]") {
-  RosCameraInfo info = some_info();
+  RosCameraInfo info = camera_info("left_optical");
   const Eigen::Matrix3d R = so3_exp({0.01, -0.03, 0.02});
   Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(info.r.data()) = R;
   // By the message's documentation R takes what the camera sees to the rectified camera.
@@ -439,7 +414,7 @@ TEST_CASE("A CameraInfo that is no calibration is refused by frame and field", "
            }},
       Case{"D: nan is outside", [](auto& info) { info.d[0] = std::nan(""); }});
   CAPTURE(c.why);
-  RosCameraInfo info = some_info();
+  RosCameraInfo info = camera_info("left_optical");
   c.spoil(info);
   CHECK_THROWS_WITH(camera_of(info, RosImages::kRaw),
                     Catch::Contains("frame 'left_optical': ") && Catch::Contains(c.why));

@@ -39,18 +39,6 @@ std::vector<PublishedClosure> closures() {
           {closure_id(kOwn0, {3, 9}), ClosureStatus::kCandidate, std::nullopt}};
 }
 
-// The newest message of a topic.
-template <typename Message>
-std::optional<Message> last(const std::vector<TopicMessage>& messages, const std::string& topic) {
-  for (std::size_t k = messages.size(); k-- > 0;)
-    if (messages[k].topic == topic) return decode_ros<Message>("cdr", messages[k].bytes).value;
-  return std::nullopt;
-}
-
-std::size_t count(const std::vector<TopicMessage>& messages, const std::string& topic) {
-  return static_cast<std::size_t>(std::ranges::count(messages, topic, &TopicMessage::topic));
-}
-
 }  // namespace
 
 TEST_CASE("Closures are drawn as lines by their stage", "[ros_dds]") {
@@ -149,32 +137,28 @@ TEST_CASE("A robot's record holds the published messages and the final states", 
   CHECK(lost.empty());
   CHECK(node.dropped() == 0);
 
-  const auto reader = open_mcap(file);
-  const auto messages = topic_messages_of(*reader);
-  CHECK(to_string(reader->report()) == "");
-  CHECK(count(messages, "/bob_3/odometry") == 30);
-  CHECK(count(messages, "/bob_3/pose") == 30);
-  CHECK(count(messages, "/bob_3/path") == 2);
-  CHECK(count(messages, "/bob_3/mesh") == 1);
-  const auto map = last<RosOccupancyGrid>(messages, "/bob_3/map_2d");
-  REQUIRE(map);
-  CHECK(map->header.frame_id == "bob_3/map");
-  CHECK(map->info.width == 2);
-  CHECK(map->info.height == 1);
-  CHECK(map->info.resolution == 0.5F);
-  CHECK(map->info.origin.position == Eigen::Vector3d(-1, 2, 3));
-  CHECK(map->data == std::vector<std::uint8_t>{100, 255});
-  const auto received = last<RosOdometry>(messages, "/bob_3/odometry");
-  REQUIRE(received);
-  CHECK(received->header.frame_id == "bob_3/odom");
-  CHECK(received->child_frame_id == "bob_3/base_link");
-  CHECK(received->pose.pose.position.x() == Approx(2.9));
-  CHECK(received->twist.twist.linear.x() == 0.5);
-  const auto objects = last<RosMarkerArray>(messages, "/bob_3/objects");
-  REQUIRE(objects);
-  REQUIRE(objects->markers.size() == 3);
-  CHECK(objects->markers[0].action == RosMarkerAction::kDeleteAll);
-  const RosMarker &box = objects->markers[1], &name = objects->markers[2];
+  Record record(file);
+  CHECK(to_string(record.reader->report()) == "");
+  CHECK(record.counts["/bob_3/odometry"] == 30);
+  CHECK(record.counts["/bob_3/pose"] == 30);
+  CHECK(record.counts["/bob_3/path"] == 2);
+  CHECK(record.counts["/bob_3/mesh"] == 1);
+  const auto map = record.last<RosOccupancyGrid>("/bob_3/map_2d");
+  CHECK(map.header.frame_id == "bob_3/map");
+  CHECK(map.info.width == 2);
+  CHECK(map.info.height == 1);
+  CHECK(map.info.resolution == 0.5F);
+  CHECK(map.info.origin.position == Eigen::Vector3d(-1, 2, 3));
+  CHECK(map.data == std::vector<std::uint8_t>{100, 255});
+  const auto received = record.last<RosOdometry>("/bob_3/odometry");
+  CHECK(received.header.frame_id == "bob_3/odom");
+  CHECK(received.child_frame_id == "bob_3/base_link");
+  CHECK(received.pose.pose.position.x() == Approx(2.9));
+  CHECK(received.twist.twist.linear.x() == 0.5);
+  const auto objects = record.last<RosMarkerArray>("/bob_3/objects");
+  REQUIRE(objects.markers.size() == 3);
+  CHECK(objects.markers[0].action == RosMarkerAction::kDeleteAll);
+  const RosMarker &box = objects.markers[1], &name = objects.markers[2];
   CHECK(box.type == RosMarkerType::kCube);
   CHECK(box.pose.position == chair.box.center);
   CHECK(box.pose.orientation.angularDistance(Eigen::Quaterniond(chair.box.pose().linear())) < 1e-9);
@@ -183,37 +167,30 @@ TEST_CASE("A robot's record holds the published messages and the final states", 
   CHECK(name.type == RosMarkerType::kText);
   CHECK(name.text == "chair");
   CHECK(name.pose.position.z() > 3.0 + 0.5 * 4.0);
-  const auto slice = last<RosPointCloud2>(messages, "/bob_3/distance_slice");
-  REQUIRE(slice);
-  CHECK(slice->header.frame_id == "bob_3/odom");
-  CHECK(slice->width == 3);
-  const auto path = last<RosPath>(messages, "/bob_3/path");
-  REQUIRE(path);
-  REQUIRE(path->poses.size() == 2);
-  CHECK(path->poses[1].header.stamp == 1001);
-  CHECK(path->poses[1].pose.position.x() == 6.0);
-  CHECK(path->header.frame_id == "bob_3/map");
+  const auto slice = record.last<RosPointCloud2>("/bob_3/distance_slice");
+  CHECK(slice.header.frame_id == "bob_3/odom");
+  CHECK(slice.width == 3);
+  const auto path = record.last<RosPath>("/bob_3/path");
+  REQUIRE(path.poses.size() == 2);
+  CHECK(path.poses[1].header.stamp == 1001);
+  CHECK(path.poses[1].pose.position.x() == 6.0);
+  CHECK(path.header.frame_id == "bob_3/map");
   // The robot has joined alice, so /tf contains its own frame in the frame of the team.
-  const auto transforms = last<RosTFMessage>(messages, "/tf");
-  REQUIRE(transforms);
-  CHECK(transforms->transforms[0].header.frame_id == "alice/map");
-  CHECK(transforms->transforms[0].child_frame_id == "bob_3/map");
-  const auto lines = last<RosMarkerArray>(messages, "/bob_3/closures");
-  REQUIRE(lines);
-  CHECK(lines->markers[3].points.size() == 2);
-  const auto faces = last<RosMarker>(messages, "/bob_3/mesh_faces");
-  REQUIRE(faces);
-  CHECK(faces->points.size() == 3);
-  const auto line = last<RosLog>(messages, "/rosout");
-  REQUIRE(line);
-  CHECK(line->msg == "begins");
-  CHECK(line->name == "bob_3.vio");
-  const auto image = last<RosCompressedImage>(messages, "/bob_3/left/image_raw/compressed");
-  REQUIRE(image);
-  CHECK(image->format == "jpeg");
-  CHECK(image->header.stamp == 1007);
-  CHECK(image->data.size() > 100);
-  for (const TopicMessage& message : messages) CHECK(message.log_time >= 1000);
+  const auto transforms = record.last<RosTFMessage>("/tf");
+  CHECK(transforms.transforms[0].header.frame_id == "alice/map");
+  CHECK(transforms.transforms[0].child_frame_id == "bob_3/map");
+  const auto lines = record.last<RosMarkerArray>("/bob_3/closures");
+  CHECK(lines.markers[3].points.size() == 2);
+  const auto faces = record.last<RosMarker>("/bob_3/mesh_faces");
+  CHECK(faces.points.size() == 3);
+  const auto line = record.last<RosLog>("/rosout");
+  CHECK(line.msg == "begins");
+  CHECK(line.name == "bob_3.vio");
+  const auto image = record.last<RosCompressedImage>("/bob_3/left/image_raw/compressed");
+  CHECK(image.format == "jpeg");
+  CHECK(image.header.stamp == 1007);
+  CHECK(image.data.size() > 100);
+  for (const TopicMessage& message : record.messages) CHECK(message.log_time >= 1000);
 }
 
 TEST_CASE("The map frame of a robot that has not joined has no parent frame", "[ros_dds]") {
@@ -233,15 +210,7 @@ TEST_CASE("The map frame of a robot that has not joined has no parent frame", "[
   trajectories.publish(straight(anchor));
   node.stop();
   node.finish({}, {}, {});
-  const auto reader = open_mcap(file);
-  std::set<std::pair<std::string, std::string>> links;
-  for (const TopicMessage& message : topic_messages_of(*reader)) {
-    if (message.topic != "/tf") continue;
-    const auto transforms = decode_ros<RosTFMessage>("cdr", message.bytes);
-    REQUIRE(transforms.value);
-    for (const RosTransformStamped& link : transforms.value->transforms)
-      links.emplace(link.header.frame_id, link.child_frame_id);
-  }
+  const auto links = Record(file).links();
   CHECK(links.contains({"bob/map", "bob/odom"}));
   CHECK(links.contains({"bob/odom", "bob/base_link"}));
   CHECK(links.contains({"al/map", "bob/map"}) == (anchor == 7));

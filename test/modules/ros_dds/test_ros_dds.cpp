@@ -11,6 +11,7 @@
 #include "runtime/dds/ros_discovery.hpp"
 #include "runtime/dds/ros_publisher.hpp"
 #include "runtime/dds/ros_subscription.hpp"
+#include "test/modules/sensors/listed_bag.hpp"
 #include "test/support/patience.hpp"
 
 namespace km {
@@ -25,16 +26,6 @@ std::shared_ptr<const RosNetwork> network() {
   static const auto shared =
       std::make_shared<const RosNetwork>(RosConfig{.domain = random_domain(), .interface = "lo"});
   return shared;
-}
-
-RosImage image(Stamp stamp) {
-  return {.header = {stamp, "left"},
-          .height = 480,
-          .width = 752,
-          .encoding = "mono8",
-          .is_bigendian = 0,
-          .step = 752,
-          .data = std::vector<std::uint8_t>(752 * 480, 7)};
 }
 
 RosImu imu(Stamp stamp) {
@@ -59,7 +50,8 @@ TEST_CASE("A message published on a ROS topic is received unchanged", "[ros_dds]
   const RosPublisher imus(network(), "/a/imu", "sensor_msgs/Imu", RosQos::kReliable, 10);
   wait_for_reader(images);
   wait_for_reader(imus);
-  const auto sent_imu = encode_ros(imu(17)), sent_image = encode_ros(image(18));
+  const auto sent_imu = encode_ros(imu(17)),
+             sent_image = encode_ros(mono_image({18, "left"}, 752, 480, 7));
   imus.publish(sent_imu);
   images.publish(sent_image);
   for (int k = 0; k < 2; ++k) {

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <catch2/catch.hpp>
+#include <cmath>
 #include <filesystem>
 #include <string>
 #include <utility>
@@ -138,6 +140,20 @@ class EurocFolder {
 
   TemporaryFolder folder_;
 };
+
+/// Checks that all numbers of a rig are those of sensors.
+inline void check_rig(const SensorRig& rig) {
+  for (const Camera& camera : rig.stereo.cameras) {
+    CHECK(camera.T_body_cam.matrix().allFinite());
+    CHECK(std::isfinite(camera.fx * camera.fy * camera.cx * camera.cy));
+    CHECK(camera.width * camera.height > 0);
+    CHECK(camera.lens.max_bearing() >= 0.0);
+    const auto bearing = camera.unproject({camera.cx, camera.cy});
+    CHECK((!bearing || bearing->allFinite()));
+  }
+  CHECK(std::isnormal(rig.imu.gyro_noise_density * rig.imu.gyro_noise_density));
+  CHECK(std::isnormal(rig.imu.accel_noise_density * rig.imu.accel_noise_density));
+}
 
 /// The remaining packets.
 inline std::vector<SensorPacket> packets_of(DatasetReader& reader) {

@@ -11,6 +11,32 @@
 
 namespace km {
 
+/// An image of one grey level.
+inline RosImage mono_image(RosHeader header, std::uint32_t width, std::uint32_t height,
+                           std::uint8_t grey = 0) {
+  return {.header = std::move(header),
+          .height = height,
+          .width = width,
+          .encoding = "mono8",
+          .is_bigendian = 0,
+          .step = width,
+          .data = std::vector<std::uint8_t>(std::size_t{width} * height, grey)};
+}
+
+/// The CameraInfo of a camera with distortion; `Tx` is that of P for the right one of a pair.
+inline RosCameraInfo camera_info(const std::string& frame, double Tx = 0.0) {
+  RosCameraInfo info;
+  info.header.frame_id = frame;
+  info.width = 640;
+  info.height = 480;
+  info.distortion_model = "plumb_bob";
+  info.d = {-0.28, 0.07, 2e-4, 1e-5, 0.0};
+  info.k = {458.0, 0, 320.5, 0, 457.0, 240.5, 0, 0, 1};
+  info.r = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+  info.p = {430.0, 0, 318.0, Tx, 0, 430.0, 239.0, 0, 0, 0, 1, 0};
+  return info;
+}
+
 /// A recording of ROS 2 whose messages a test lists in order of log time.
 class ListedBag final : public BagReader {
  public:

@@ -29,13 +29,7 @@ Rig small_rig() {
 }
 
 RosImage image(Stamp stamp, std::uint8_t grey) {
-  return {.header = {stamp, "camera"},
-          .height = kHeight,
-          .width = kWidth,
-          .encoding = "mono8",
-          .is_bigendian = false,
-          .step = kWidth,
-          .data = std::vector<std::uint8_t>(kWidth * kHeight, grey)};
+  return mono_image({stamp, "camera"}, kWidth, kHeight, grey);
 }
 
 RosImu imu(Stamp stamp) {

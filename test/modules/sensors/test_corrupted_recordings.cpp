@@ -29,16 +29,6 @@ std::string png_of(std::uint32_t width, std::uint32_t height) {
   return bytes;
 }
 
-void check_rig(const SensorRig& rig) {
-  for (const Camera& camera : rig.stereo.cameras) {
-    CHECK(camera.T_body_cam.matrix().allFinite());
-    CHECK(std::isfinite(camera.fx * camera.fy * camera.cx * camera.cy));
-    CHECK(camera.width * camera.height > 0);
-  }
-  CHECK(std::isnormal(rig.imu.gyro_noise_density * rig.imu.gyro_noise_density));
-  CHECK(std::isnormal(rig.imu.accel_noise_density * rig.imu.accel_noise_density));
-}
-
 // Invariants of a reader for any files.
 void check_recording(FolderReader& reader) {
   check_rig(reader.rig());

@@ -103,17 +103,6 @@ TEST_CASE("The map loses its frames first and then odometry every second image a
   CHECK(fast.waited_s == 0.0);
 }
 
-TEST_CASE("Images at three times the rate of odometry are dropped evenly", "[sensors]") {
-  Playback run{.cost_s = 3.0 * kPeriod_s};
-  run.play(2000);
-  CHECK(run.worst_lag_s <= 2.0 * kMaxLag_s + 4 * run.cost_s);
-  const std::size_t settled = run.gaps.size() / 4;
-  for (std::size_t k = settled; k < run.gaps.size(); ++k) {
-    CHECK(run.gaps[k] >= 2);
-    CHECK(run.gaps[k] <= LoadShedding::kMaxStride);
-  }
-}
-
 TEST_CASE("Odometry keeps the images that it needs and the recording waits", "[sensors]") {
   // A fifth of the features is lost from image to image. 0.64 of them survive to the second image,
   // 0.41 to the fourth.

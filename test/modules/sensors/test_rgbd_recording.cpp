@@ -72,16 +72,6 @@ TEST_CASE("Range, scale and baseline of depth have defaults", "[sensors]") {
   CHECK(read_depth_scale(folder.mav0()) == 0.001);
 }
 
-TEST_CASE("Depth at a lower rate leaves frames without depth", "[sensors]") {
-  const EurocFolder folder;
-  folder.make_rgbd(3);
-  const Outcome outcome = read(folder);
-  REQUIRE(outcome.packets.size() == EurocFolder::kPairs);
-  CHECK(outcome.report.empty());
-  for (std::size_t i = 0; i < outcome.packets.size(); ++i)
-    CHECK((outcome.packets[i].frame->depth != nullptr) == (i % 3 == 0));
-}
-
 TEST_CASE("Depth and labels beside stereo are read on request", "[sensors]") {
   const EurocFolder folder;
   folder.add_depth();

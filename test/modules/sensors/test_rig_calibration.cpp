@@ -354,15 +354,7 @@ TEST_CASE("An impossible Basalt file is refused with file and line", "[sensors][
 }
 
 void check_calibration(const RigCalibration& calibration) {
-  for (const Camera& camera : calibration.rig.stereo.cameras) {
-    CHECK(camera.T_body_cam.matrix().allFinite());
-    CHECK(std::isfinite(camera.fx * camera.fy * camera.cx * camera.cy));
-    CHECK(camera.width * camera.height > 0);
-    CHECK(camera.lens.max_bearing() >= 0.0);
-    const auto bearing = camera.unproject({camera.cx, camera.cy});
-    CHECK((!bearing || bearing->allFinite()));
-  }
-  CHECK(std::isnormal(calibration.rig.imu.gyro_noise_density));
+  check_rig(calibration.rig);
   CHECK(std::abs(calibration.image_time_offset_s.value_or(0.0)) <= 10.0);
 }
 

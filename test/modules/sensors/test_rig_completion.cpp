@@ -11,19 +11,6 @@ namespace {
 
 using Catch::Contains;
 
-RosCameraInfo info(const std::string& frame, double Tx) {
-  RosCameraInfo info;
-  info.header.frame_id = frame;
-  info.width = 640;
-  info.height = 480;
-  info.distortion_model = "plumb_bob";
-  info.d = {-0.28, 0.07, 2e-4, 1e-5, 0.0};
-  info.k = {458.0, 0, 320.5, 0, 457.0, 240.5, 0, 0, 1};
-  info.r = {1, 0, 0, 0, 1, 0, 0, 0, 1};
-  info.p = {430.0, 0, 318.0, Tx, 0, 430.0, 239.0, 0, 0, 0, 1, 0};
-  return info;
-}
-
 RosImu imu(const std::string& frame) {
   RosImu message;
   message.header.frame_id = frame;
@@ -56,10 +43,10 @@ PartialRig nothing_known() {
 
 TEST_CASE("CameraInfo and static transforms complete a rig", "[sensors][calibration]") {
   ListedBag bag;
-  bag.add("/left_info", info("left_optical", 0.0));
+  bag.add("/left_info", camera_info("left_optical", 0.0));
   add_transforms(bag, {kLeftOnBase});
   bag.add("/imu", imu("imu"));
-  bag.add("/right_info", info("left_optical", -43.0));
+  bag.add("/right_info", camera_info("left_optical", -43.0));
   add_transforms(bag, {kImuOnBase});
   const Rig rig = complete_rig("a.bag", bag, nothing_known());
   const StereoRig& stereo = rig.sensors.stereo;
@@ -76,7 +63,7 @@ TEST_CASE("CameraInfo and static transforms complete a rig", "[sensors][calibrat
 TEST_CASE("Raw images are rotated by R from their frame", "[sensors][calibration]") {
   const Eigen::Matrix3d R_left = so3_exp({0.01, -0.03, 0.02}), R_right = so3_exp({-0.02, 0.01, 0});
   using RowMajor = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
-  RosCameraInfo left = info("imu", 0.0), right = info("imu", -43.0);
+  RosCameraInfo left = camera_info("imu", 0.0), right = camera_info("imu", -43.0);
   Eigen::Map<RowMajor>(left.r.data()) = R_left;
   Eigen::Map<RowMajor>(right.r.data()) = R_right;
   const bool rectified = GENERATE(true, false);
@@ -109,8 +96,8 @@ TEST_CASE("Poses in the rig file and CameraInfo complete a rig", "[sensors][cali
   cameras[0].T_body_cam = make_pose(so3_exp(kQuarter), {0, 0, 0.5});
   cameras[1].T_body_cam = cameras[0].T_body_cam * make_pose(so3_exp({0, 0, 0}), {0.12, 0, 0});
   ListedBag bag;
-  bag.add("/left_info", info("left_optical", 0.0));
-  bag.add("/right_info", info("left_optical", -43.0));  // a baseline of 0.1 m
+  bag.add("/left_info", camera_info("left_optical", 0.0));
+  bag.add("/right_info", camera_info("left_optical", -43.0));  // a baseline of 0.1 m
   const StereoRig stereo = complete_rig("a.bag", bag, partial).sensors.stereo;
   CHECK(stereo.cameras[0].fx == 458.0);
   CHECK(stereo.cameras[0].T_body_cam.isApprox(cameras[0].T_body_cam));
@@ -126,17 +113,6 @@ struct DepthMessages {
   int images = 12;
 };
 
-RosImage tiny_image(const std::string& frame, std::uint32_t width) {
-  RosImage image;
-  image.header.frame_id = frame;
-  image.width = width;
-  image.height = 1;
-  image.step = width;
-  image.encoding = "mono8";
-  image.data.resize(width);
-  return image;
-}
-
 // Completes a rig whose calibration is known from colour images and `depth`. "" if it is complete.
 std::string refusal_of_depth(const DepthMessages& depth, bool is_accepted = false) {
   PartialRig partial = nothing_known();
@@ -150,11 +126,11 @@ std::string refusal_of_depth(const DepthMessages& depth, bool is_accepted = fals
     add_transforms(bag, {transform("base", "color_optical", {0, 0, 0}, {0, 0, 0}),
                          transform("base", depth.frame, {*depth.offset_m, 0, 0}, {0, 0, 0})});
   for (int k = 0; k < depth.images; ++k) {
-    bag.add("/left", tiny_image("color_optical", 640));
-    bag.add("/depth", tiny_image(depth.frame, depth.width));
+    bag.add("/left", mono_image({0, "color_optical"}, 640, 1));
+    bag.add("/depth", mono_image({0, depth.frame}, depth.width, 1));
   }
-  bag.add("/left_info", info("color_optical", 0.0));
-  RosCameraInfo depth_info = info(depth.frame, 0.0);
+  bag.add("/left_info", camera_info("color_optical", 0.0));
+  RosCameraInfo depth_info = camera_info(depth.frame, 0.0);
   depth_info.k[0] = depth.info_fx.value_or(0.0);
   if (depth.info_fx) bag.add("/depth_info", depth_info);
   try {
@@ -202,8 +178,8 @@ TEST_CASE("Without an inertial sensor the body is the odometry's child frame",
   partial.rig.topics.imu.clear();
   partial.rig.topics.odometry = "/odom";
   ListedBag bag;
-  bag.add("/left_info", info("left_optical", 0.0));
-  bag.add("/right_info", info("left_optical", -43.0));
+  bag.add("/left_info", camera_info("left_optical", 0.0));
+  bag.add("/right_info", camera_info("left_optical", -43.0));
   RosOdometry odometry;
   odometry.header.frame_id = "odom";
   odometry.child_frame_id = "base";
@@ -219,7 +195,7 @@ TEST_CASE("Calibrated cameras get the pose of their images' frame", "[sensors][c
   for (Camera& camera : partial.rig.sensors.stereo.cameras) camera.fx = 300.0;
   partial.rig.sensors.stereo.cameras[1].T_body_cam.translation().x() = 0.11;
   ListedBag bag;
-  bag.add("/left_info", info("another", 0.0));
+  bag.add("/left_info", camera_info("another", 0.0));
   bag.add("/imu", imu("base"));
   RosImage image;
   image.header = {5, "left_optical"};
@@ -249,8 +225,8 @@ TEST_CASE("A missing part of a calibration is named with the topics that could s
                  Contains("frame of the body: messages on /imu, or body_frame") &&
                  Contains("pose of the left camera on the body: /tf_static"));
   ListedBag bag;
-  bag.add("/left_info", info("left_optical", 0.0));
-  bag.add("/right_info", info("right_optical", 0.0));
+  bag.add("/left_info", camera_info("left_optical", 0.0));
+  bag.add("/right_info", camera_info("right_optical", 0.0));
   bag.add("/imu", imu("imu"));
   add_transforms(bag, {kLeftOnBase});
   CHECK_THAT(complaint(bag),
@@ -259,10 +235,10 @@ TEST_CASE("A missing part of a calibration is named with the topics that could s
                  Contains("pose of the left camera on the body: /tf_static does not join imu and "
                           "left_optical, its frames are: base, left_optical (body_frame"));
   ListedBag uncalibrated;
-  uncalibrated.add("/right_info", info("right_optical", 0.0));
+  uncalibrated.add("/right_info", camera_info("right_optical", 0.0));
   uncalibrated.add("/imu", imu("imu"));
   add_transforms(uncalibrated, {});
-  RosCameraInfo zero = info("left_optical", 0.0);
+  RosCameraInfo zero = camera_info("left_optical", 0.0);
   zero.k.fill(0.0);
   uncalibrated.add_bytes("/left_info", RosCameraInfo::kType, 1, encode_ros(zero));
   CHECK_THAT(complaint(uncalibrated), Contains("/left_info: CameraInfo of frame 'left_optical': K "

@@ -19,6 +19,7 @@
 #include "modules/evaluation/trajectory_file.hpp"
 #include "modules/sensors/node/open_folder.hpp"
 #include "modules/sensors/text_file.hpp"
+#include "test/support/euroc_copy.hpp"
 #include "test/support/temporary_folder.hpp"
 
 namespace km {
@@ -65,27 +66,6 @@ std::vector<std::optional<SeenRay>> seen_rays(const Camera& rectified, const Cam
       if (const auto px = rectified.project_ray(ray)) seen = SeenRay{*px, ray.z()};
     }
   return rays;
-}
-
-// Makes `folder` a EuRoC folder of links to the images. In the data they are separate from their
-// calibration.
-void link_static_start(const std::filesystem::path& recording,
-                       const std::filesystem::path& folder) {
-  std::filesystem::create_directories(folder / "mav0");
-  const auto source = std::filesystem::absolute(recording);
-  std::filesystem::create_symlink(source / "mav0/imu0", folder / "mav0/imu0");
-  for (const std::string camera : {"cam0", "cam1"}) {
-    const auto target = folder / "mav0" / camera;
-    std::filesystem::create_directories(target);
-    std::filesystem::create_symlink(source / "mav0" / camera / "sensor.yaml",
-                                    target / "sensor.yaml");
-    std::filesystem::create_symlink(source / "static_start" / camera, target / "data");
-    std::set<std::string> names;
-    for (const auto& file : std::filesystem::directory_iterator(target / "data"))
-      names.insert(file.path().filename());
-    std::ofstream list(target / "data.csv");
-    for (const std::string& name : names) list << name.substr(0, 19) << ',' << name << '\n';
-  }
 }
 
 // Repeats `packets` until there are `count` of them. The samples before the second image are also
