@@ -1,17 +1,14 @@
 #include <exception>
 #include <filesystem>
 #include <iostream>
-#include <mutex>
 #include <optional>
 #include <set>
 #include <thread>
 
-#include "apps/output_file.hpp"
 #include "apps/program_options.hpp"
 #include "apps/viewer/page_message.hpp"
 #include "apps/viewer/page_server.hpp"
 #include "apps/viewer/run_playback.hpp"
-#include "apps/viewer/view_recorder.hpp"
 #include "apps/viewer/view_store.hpp"
 #include "modules/core/input_file.hpp"
 #include "modules/view/node/view_listener_node.hpp"
@@ -50,17 +47,14 @@ a random token, a new one for every run, and the content is not encrypted.
 Examples
   kimera_multi_viewer --domain 7                     # a team that runs
   kimera_multi_viewer --domain 7 --peers 10.0.0.2,10.0.0.3   # without multicast
-  kimera_multi_viewer --domain 7 --record team.mcap  # also write a record, for Foxglove and others
   kimera_multi_viewer results/demo                   # a run that has ended
   kimera_multi_viewer results/demo --rate 2          # replay it, twice as fast
   kimera_multi_viewer results/demo --listen 0.0.0.0  # for other hosts
 
-Exit codes: 0 ended by Ctrl-C; 1 unusable input, an address in use, or an incomplete record; 2 bad command
-line.)";
+Exit codes: 0 ended by Ctrl-C; 1 unusable input or an address in use; 2 bad command line.)";
 
 struct ViewerOptions {
-  std::filesystem::path results, palette, record;
-  bool record_images = false;
+  std::filesystem::path results, palette;
   DdsConfig dds;
   PageServerOptions server;
   double memory_MB = 500.0;
@@ -97,13 +91,6 @@ void define(CLI::App& app, ViewerOptions& options) {
                  "Addresses of the robots' hosts, where multicast is off")
       ->delimiter(',')
       ->needs(domain);
-  CLI::Option* const record = app.add_option("--record", options.record,
-                                             "Write the messages of the robots to this MCAP file, "
-                                             "replacing it: the topics of a robot's own record");
-  record->needs(domain);
-  app.add_flag("--record-images", options.record_images,
-               "Also record all camera images (small), not only those that a page shows")
-      ->needs(record);
   app.add_option(
          "--palette", options.palette,
          "label_palette.csv with names and colours of the labels (default: that of RESULTS)")
@@ -173,48 +160,18 @@ void show_run(ViewerOptions options, ViewStore& store, SignalWatch& signals) {
   wait_for_end(signals);
 }
 
-// Robots whose images are requested: by pages that show them, and for the record. Thread-safe.
-class ImageRequests {
- public:
-  explicit ImageRequests(ViewListener& listener) : listener_(listener) {}
-
-  void show(const std::set<RobotId>& robots) { change(shown_, robots); }
-  void record(RobotId robot) { change(recorded_, {robot}); }
-
- private:
-  void change(std::set<RobotId>& these, const std::set<RobotId>& robots) {
-    const std::lock_guard lock(mutex_);
-    if (&these == &shown_) these.clear();
-    these.insert(robots.begin(), robots.end());
-    std::set<RobotId> all = shown_;
-    all.insert(recorded_.begin(), recorded_.end());
-    if (all != asked_) listener_.ask_for_images(asked_ = std::move(all));
-  }
-
-  ViewListener& listener_;
-  std::mutex mutex_;  // guards the members below
-  std::set<RobotId> shown_, recorded_, asked_;
-};
-
 void show_team(ViewerOptions options, ViewStore& store, SignalWatch& signals) {
-  check_output_folder(options.record);
   if (!options.dds.peers.empty()) options.dds.discovery = Discovery::kPeers;
   ViewListener listener(options.dds);
-  ImageRequests images(listener);
   const std::string title = "domain " + std::to_string(options.dds.domain);
   options.server.hello = hello_message(PageSource::kTeam, title, palette_of(options));
-  options.server.on_images = [&](const std::set<RobotId>& robots) { images.show(robots); };
+  options.server.on_images = [&](const std::set<RobotId>& robots) {
+    listener.ask_for_images(robots);
+  };
   const PageServer server(store, options.server);
-  std::optional<ViewRecorder> recorder;
-  if (!options.record.empty()) recorder.emplace(options.record, palette_of(options));
   std::jthread receiver([&](const std::stop_token& stop) {
-    while (!stop.stop_requested()) {
-      auto update = listener.next(1.0);
-      if (!update) continue;
-      if (recorder) recorder->add(*update);
-      if (options.record_images) images.record(update->robot);
-      store.add(*std::move(update));
-    }
+    while (!stop.stop_requested())
+      if (auto update = listener.next(1.0)) store.add(*std::move(update));
   });
   log::info("viewer") << title << " on " << listener.interface().name << " ("
                       << listener.interface().address
@@ -223,8 +180,6 @@ void show_team(ViewerOptions options, ViewStore& store, SignalWatch& signals) {
   wait_for_end(signals);
   receiver.request_stop();
   listener.stop();
-  receiver.join();
-  if (recorder) recorder->finish();
 }
 
 }  // namespace

@@ -5,9 +5,9 @@
 #include <limits>
 #include <map>
 #include <set>
+#include <span>
 #include <stdexcept>
 #include <string>
-#include <unordered_map>
 #include <utility>
 
 namespace km {
@@ -292,22 +292,6 @@ void check(const LabelledMesh& mesh, const ChunkGrid& grid) {
                                     std::to_string(mesh.vertices.size()));
 }
 
-// A vertex in the form that is equal in all chunks.
-struct SharedVertex {
-  GridPoint point;
-  LabelId label;
-  bool operator==(const SharedVertex&) const = default;
-};
-
-struct SharedVertexHash {
-  std::size_t operator()(const SharedVertex& v) const noexcept {
-    std::uint64_t hash = v.label;
-    for (const std::int32_t c : v.point)
-      hash = (hash ^ static_cast<std::uint32_t>(c)) * 0x9E3779B97F4A7C15U;
-    return static_cast<std::size_t>(hash ^ (hash >> 32U));
-  }
-};
-
 // True if the step of the grid is positive, and the origin lies within kFarthest_m.
 bool are_positions_usable(const MeshChunk& chunk) {
   if (!(chunk.step_m > 0.0F)) return false;
@@ -316,10 +300,6 @@ bool are_positions_usable(const MeshChunk& chunk) {
     return steps <= kFarthest_steps &&
            (steps + kMaxOffset) * static_cast<double>(chunk.step_m) <= kFarthest_m;
   });
-}
-
-std::int64_t position(const MeshChunk& chunk, std::size_t vertex, std::size_t axis) {
-  return std::int64_t{chunk.origin[axis]} + chunk.offsets[vertex][axis];
 }
 
 const char* fault_of_views(const MeshChunk& chunk) {
@@ -374,33 +354,6 @@ std::vector<MeshCells::Cell> occupied_cells(const LabelledMesh& mesh, double cel
     last = now;
   }
   return {cells.begin(), cells.end()};
-}
-
-LabelledMesh assemble_mesh(std::span<const MeshChunk* const> chunks) {
-  LabelledMesh mesh;
-  const bool labelled =
-      std::ranges::any_of(chunks, [](const MeshChunk* chunk) { return !chunk->labels.empty(); });
-  std::unordered_map<SharedVertex, std::uint32_t, SharedVertexHash> index_of;
-  for (const MeshChunk* chunk : chunks) {
-    std::vector<std::uint32_t> index;
-    for (std::size_t v = 0; v < chunk->offsets.size(); ++v) {
-      SharedVertex shared{{}, chunk->labels.empty() ? LabelId{0} : chunk->labels[v]};
-      for (std::size_t axis = 0; axis < 3; ++axis)
-        shared.point[axis] = static_cast<std::int32_t>(position(*chunk, v, axis));
-      const auto next = static_cast<std::uint32_t>(mesh.vertices.size());
-      const auto [entry, is_new] = index_of.try_emplace(shared, next);
-      index.push_back(entry->second);
-      if (!is_new) continue;
-      const auto [x, y, z] = shared.point;
-      mesh.vertices.push_back(
-          (static_cast<double>(chunk->step_m) * Eigen::Vector3d(x, y, z)).cast<float>());
-      if (labelled) mesh.labels.push_back(shared.label);
-    }
-    for (const auto& [a, b, c] : chunk->faces)
-      if (index[a] != index[b] && index[b] != index[c] && index[c] != index[a])
-        mesh.faces.push_back({index[a], index[b], index[c]});
-  }
-  return mesh;
 }
 
 }  // namespace km

@@ -4,7 +4,6 @@
 #include <compare>
 #include <cstddef>
 #include <cstdint>
-#include <span>
 #include <vector>
 
 #include "modules/core/ids.hpp"
@@ -116,10 +115,5 @@ struct SplitMesh {
 /// The cells that contain the centroid of a face, ascending. Faces that are not finite, or farther
 /// away than 2^30 cells, are left out. Precondition: corners exist.
 [[nodiscard]] std::vector<MeshCells::Cell> occupied_cells(const LabelledMesh& mesh, double cell_m);
-
-/// One mesh of the chunks, which must have one step_m. Vertices with the same position and label
-/// are merged, and faces that rounding has left without area are removed. The mesh has labels if
-/// any chunk has labels.
-[[nodiscard]] LabelledMesh assemble_mesh(std::span<const MeshChunk* const> chunks);
 
 }  // namespace km

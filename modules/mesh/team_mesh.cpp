@@ -51,8 +51,6 @@ ChunkVerdict TeamMesh::add(MeshChunk chunk) {
   bytes += plain_bytes(chunk);
   if (bytes > max_bytes_per_robot_) return ChunkVerdict::kNoRoom;
   robot.bytes = bytes;
-  robot.anchor = chunk.anchor;
-  robot.step_m = chunk.step_m;
   const MeshChunkKey key = chunk.key;
   robot.chunks.insert_or_assign(key, std::move(chunk));
   return ChunkVerdict::kTaken;
@@ -64,21 +62,6 @@ std::vector<PlacedChunk> TeamMesh::placed() const {
     for (const auto& [key, chunk] : robot.chunks)
       all.push_back(place(chunk, robot.poses ? &*robot.poses : nullptr));
   return all;
-}
-
-std::vector<RobotMesh> TeamMesh::snapshot() const {
-  std::vector<RobotMesh> result;
-  for (const auto& [id, robot] : robots_) {
-    std::vector<const MeshChunk*> current;
-    for (const auto& [key, chunk] : robot.chunks)
-      if (chunk.anchor == robot.anchor && chunk.step_m == robot.step_m) current.push_back(&chunk);
-    result.push_back({.robot = id,
-                      .anchor = robot.anchor,
-                      .mesh = assemble_mesh(current),
-                      .chunks = current.size(),
-                      .outdated_chunks = robot.chunks.size() - current.size()});
-  }
-  return result;
 }
 
 }  // namespace km

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "modules/mesh/chunk_placement.hpp"
-#include "modules/mesh/labelled_mesh.hpp"
 #include "modules/mesh/mesh_chunks.hpp"
 #include "modules/mesh/mesh_poses.hpp"
 
@@ -23,16 +22,6 @@ enum class ChunkVerdict {
 
 /// "taken", "of an earlier boot", "no room"
 [[nodiscard]] const char* to_string(ChunkVerdict verdict);
-
-/// The received part of the mesh of one robot.
-struct RobotMesh {
-  RobotId robot = 0;
-  RobotId anchor = 0;  ///< Robot whose odometry frame is `world`.
-  LabelledMesh mesh;   ///< In `world`.
-  std::size_t chunks = 0;
-  std::size_t outdated_chunks =
-      0;  ///< Chunks left out of mesh: their anchor robot or step differs from the newest.
-};
 
 /// The meshes of other robots, with the newest chunk of each key and the newest poses of each
 /// robot. The mesh of a robot that leaves stays. When a robot restarts, its first message replaces
@@ -52,15 +41,10 @@ class TeamMesh {
   /// All chunks, by their keys, where the newest poses place them. Valid until the next add().
   [[nodiscard]] std::vector<PlacedChunk> placed() const;
 
-  /// One mesh per robot, by ascending id, of the chunks as they were sent.
-  [[nodiscard]] std::vector<RobotMesh> snapshot() const;
-
  private:
   struct Robot {
     std::uint64_t boot = 0;
     std::set<std::uint64_t> earlier_boots = {};
-    RobotId anchor = 0;  // anchor of the newest chunk
-    float step_m = 0.0F;
     std::optional<MeshPoses> poses = {};
     std::map<MeshChunkKey, MeshChunk> chunks = {};
     std::size_t bytes = 0;

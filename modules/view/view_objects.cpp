@@ -37,14 +37,4 @@ ViewObjects view_objects(const ObjectList& list) {
   return view;
 }
 
-ObjectList object_list(const ViewObjects& view) {
-  ObjectList list{.anchor = view.anchor, .objects = {}};
-  for (const ViewObject& object : view.objects)
-    list.objects.push_back(
-        {.label = object.label,
-         .box = {object.center.cast<double>(), object.yaw_rad, object.size_m.cast<double>()},
-         .robots = object.robots});
-  return list;
-}
-
 }  // namespace km

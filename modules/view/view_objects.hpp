@@ -29,7 +29,4 @@ struct ViewObjects {
 /// The largest objects of the list that fit into an update.
 [[nodiscard]] ViewObjects view_objects(const ObjectList& list);
 
-/// The objects of an update, without what updates lack: surface, views and keyframe.
-[[nodiscard]] ObjectList object_list(const ViewObjects& view);
-
 }  // namespace km

@@ -137,34 +137,4 @@ std::optional<ViewRaster> view_raster(const LabelledMesh& slice, RobotId robot) 
                 std::move(cells));
 }
 
-OccupancyGrid occupancy_grid(const ViewRaster& raster) {
-  OccupancyGrid map{.resolution_m = raster.resolution_m,
-                    .origin = {raster.origin[0], raster.origin[1]},
-                    .width = static_cast<int>(raster.width),
-                    .height = static_cast<int>(raster.height),
-                    .cells = {},
-                    .z_m = raster.origin[2],
-                    .anchor = raster.anchor};
-  for (const std::uint8_t value : cells_of(raster))
-    map.cells.push_back(value == ViewRaster::kUnknown ? OccupancyGrid::kUnknown
-                        : value == ViewRaster::kFree  ? OccupancyGrid::kFree
-                                                      : OccupancyGrid::kOccupied);
-  return map;
-}
-
-LabelledMesh distance_points(const ViewRaster& raster) {
-  LabelledMesh points;
-  const std::vector<std::uint8_t> cells = cells_of(raster);
-  for (std::size_t k = 0; k < cells.size(); ++k) {
-    if (cells[k] == ViewRaster::kUnknown) continue;
-    const Eigen::Vector2f cell(static_cast<float>(k % raster.width),
-                               static_cast<float>(k / raster.width));
-    points.vertices.emplace_back(raster.origin[0] + raster.resolution_m * (cell.x() + 0.5F),
-                                 raster.origin[1] + raster.resolution_m * (cell.y() + 0.5F),
-                                 raster.origin[2]);
-    points.colors.push_back(distance_color(static_cast<double>(cells[k]) / ViewRaster::kFarthest));
-  }
-  return points;
-}
-
 }  // namespace km

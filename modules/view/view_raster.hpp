@@ -55,11 +55,4 @@ struct ViewRaster {
 /// nullopt for points without colours, and for points that form no grid.
 [[nodiscard]] std::optional<ViewRaster> view_raster(const LabelledMesh& slice, RobotId robot);
 
-/// The 2D map of a raster of kind kOccupancy. Precondition: the raster is valid.
-[[nodiscard]] OccupancyGrid occupancy_grid(const ViewRaster& raster);
-
-/// Points of a DistanceSlice with the distances of a raster of kind kDistances. Precondition: the
-/// raster is valid.
-[[nodiscard]] LabelledMesh distance_points(const ViewRaster& raster);
-
 }  // namespace km

@@ -346,17 +346,15 @@ void RosOutputNode::publish_diagnostics(std::vector<RosDiagnosticStatus> parts) 
 }
 
 void RosOutputNode::step(const Tick& /*tick*/) {
-  auto parts = diagnose_();
-  const bool is_silent = !parts;
-  if (parts) publish_diagnostics(*std::move(parts));
+  publish_diagnostics(diagnose_());
   if (auto closures = options_.draws ? closures_of_() : std::nullopt) {
     newest_closures_ = *std::move(closures);
     closures_.changed = true;
   }
-  publish_latest(is_silent);
+  publish_latest(false);
   publish_pieces();
   has_slice_readers_ = slice_ && sink_->readers(*slice_) > 0;
-  if (!is_silent) publish_team_frame();
+  publish_team_frame();
   sink_->flush();
 }
 

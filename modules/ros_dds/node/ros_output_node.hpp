@@ -105,11 +105,8 @@ using RosOutputInput =
 /// of the inertial sensor.
 class RosOutputNode final : public WorkerNode<RosOutputInput> {
  public:
-  /// Returns the diagnostics of the other parts of the robot, by name. In a viewer, nullopt if the
-  /// robot has left or no message of it has arrived for long. Then no diagnostics are published,
-  /// and the last changed paths, meshes and closures are published at once, without a limit on
-  /// their rate. Called on the node's thread.
-  using Diagnose = std::function<std::optional<std::vector<RosDiagnosticStatus>>()>;
+  /// Returns the diagnostics of the other parts of the robot, by name. Called on the node's thread.
+  using Diagnose = std::function<std::vector<RosDiagnosticStatus>()>;
   /// Returns all closures of the robot, or nullopt if they are unchanged. Called on the node's
   /// thread.
   using Closures = std::function<std::optional<std::vector<PublishedClosure>>()>;

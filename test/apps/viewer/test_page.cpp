@@ -64,20 +64,12 @@ TEST_CASE("The viewer refuses unusable input", "[viewer]") {
   CHECK_THAT(run_command(kViewer).output, Catch::Contains("--domain of a team that runs"));
   CHECK(run_command(kViewer + " --domain 7 x").exit_code == 2);
   CHECK(run_command(kViewer + " --help").exit_code == 0);
-  const std::string record = (empty.path() / "team.mcap").string();
   for (const auto& [address, exit_code] :
        {std::pair{"127.0.0.1:99999", 2}, {"127.0.0.1:http", 2}, {"203.0.113.7:8777", 1}}) {
     CAPTURE(address);
-    const auto listen = run_command(kViewer + " --domain 7 --interface lo --record " + record +
-                                    " --listen " + address);
-    CHECK(listen.exit_code == exit_code);
-    CHECK_FALSE(std::filesystem::exists(record));
+    CHECK(run_command(kViewer + " --domain 7 --interface lo --listen " + address).exit_code ==
+          exit_code);
   }
-  const auto nowhere =
-      run_command("timeout 300 " + kViewer + " --domain 7 --interface lo --record " +
-                  (empty.path() / "none/team.mcap").string());
-  CHECK(nowhere.exit_code == 1);
-  CHECK_THAT(nowhere.output, Catch::Contains("cannot be written, there is no folder"));
 }
 
 }  // namespace

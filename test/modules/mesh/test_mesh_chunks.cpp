@@ -11,7 +11,7 @@
 #include "modules/mesh/chunk_placement.hpp"
 #include "modules/mesh/chunk_schedule.hpp"
 #include "modules/mesh/mesh_chunks.hpp"
-#include "modules/mesh/team_mesh.hpp"
+#include "test/modules/mesh/assembled_mesh.hpp"
 #include "test/modules/mesh/wavy_sheet.hpp"
 
 namespace km {
@@ -20,12 +20,6 @@ namespace {
 using Catch::Contains;
 
 constexpr ChunkGrid kGrid{.cell_m = 2.0, .step_m = 0.001};
-
-LabelledMesh assembled(const std::vector<MeshChunk>& chunks) {
-  std::vector<const MeshChunk*> pointers;
-  for (const MeshChunk& chunk : chunks) pointers.push_back(&chunk);
-  return assemble_mesh(pointers);
-}
 
 // Faces by the positions of their corners in steps, lowest first, with their labels.
 using Corner = std::tuple<long, long, long, int>;
@@ -251,26 +245,22 @@ void add_all(TeamMesh& team, const std::vector<MeshChunk>& chunks) {
 
 TEST_CASE("The team's mesh has the newest chunk of each robot and cell", "[mesh]") {
   TeamMesh team;
-  CHECK(team.snapshot().empty());
+  CHECK(team.placed().empty());
   add_all(team, chunks_of(5, 1));
   add_all(team, chunks_of(2, 1, 40));
-  std::vector<RobotMesh> snapshot = team.snapshot();
-  REQUIRE(snapshot.size() == 2);
-  CHECK(snapshot[0].robot == 2);
-  CHECK(snapshot[1].robot == 5);
-  CHECK(snapshot[1].mesh.vertices.size() == 61 * 61);
-  CHECK(snapshot[1].mesh.faces.size() == 2 * 60 * 60);
+  CHECK(assembled(team, 2).faces.size() == 2 * 40 * 40);
+  CHECK(assembled(team, 5).vertices.size() == 61 * 61);
+  CHECK(assembled(team, 5).faces.size() == 2 * 60 * 60);
 
   MeshChunk chunk = chunks_of(5, 1).front();
-  const std::size_t faces = chunk.faces.size();
+  const std::size_t faces = chunk.faces.size(), chunks = team.placed().size();
   chunk.faces.resize(1);
   CHECK(team.add(chunk) == ChunkVerdict::kTaken);
-  CHECK(team.snapshot()[1].mesh.faces.size() == 2 * 60 * 60 - faces + 1);
+  CHECK(assembled(team, 5).faces.size() == 2 * 60 * 60 - faces + 1);
   // Chunk without faces
   CHECK(team.add(MeshChunk{.key = chunk.key, .boot = 1}) == ChunkVerdict::kTaken);
-  snapshot = team.snapshot();
-  CHECK(snapshot[1].mesh.faces.size() == 2 * 60 * 60 - faces);
-  CHECK(snapshot[1].chunks + 1 == chunks_of(5, 1).size());
+  CHECK(assembled(team, 5).faces.size() == 2 * 60 * 60 - faces);
+  CHECK(team.placed().size() == chunks - 1);
 }
 
 TEST_CASE("A robot that restarts replaces its mesh", "[mesh]") {
@@ -284,26 +274,9 @@ TEST_CASE("A robot that restarts replaces its mesh", "[mesh]") {
   }
   const std::vector<MeshChunk> fresh = chunks_of(5, 78, 10);
   add_all(team, fresh);
-  CHECK(team.snapshot()[0].mesh.vertices.size() == 11 * 11);
+  CHECK(assembled(team, 5).vertices.size() == 11 * 11);
   CHECK(team.add(chunks_of(5, 77).front()) == ChunkVerdict::kEarlierBoot);
-  CHECK(team.snapshot()[0].mesh.vertices.size() == 11 * 11);
-}
-
-TEST_CASE("Chunks in the frame of an earlier anchor are dropped until they are sent again",
-          "[mesh]") {
-  TeamMesh team;
-  const std::vector<MeshChunk> before = chunks_of(5, 1, 60, 5), after = chunks_of(5, 1, 60, 0);
-  add_all(team, before);
-  add_all(team, {after.front()});
-  RobotMesh mesh = team.snapshot()[0];
-  CHECK(mesh.anchor == 0);
-  CHECK(mesh.chunks == 1);
-  CHECK(mesh.outdated_chunks == before.size() - 1);
-  CHECK(mesh.mesh.faces.size() == after.front().faces.size());
-  add_all(team, after);
-  mesh = team.snapshot()[0];
-  CHECK(mesh.outdated_chunks == 0);
-  CHECK(mesh.mesh.vertices.size() == 61 * 61);
+  CHECK(assembled(team, 5).vertices.size() == 11 * 11);
 }
 
 TEST_CASE("A robot cannot send more than its bound", "[mesh]") {

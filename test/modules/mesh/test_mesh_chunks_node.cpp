@@ -14,8 +14,8 @@
 #include "modules/mesh/mesh_chunks.hpp"
 #include "modules/mesh/node/mesh_chunks_node.hpp"
 #include "modules/mesh/node/mesh_codec.hpp"
-#include "modules/mesh/team_mesh.hpp"
 #include "runtime/dds/envelope.hpp"
+#include "test/modules/mesh/assembled_mesh.hpp"
 #include "test/modules/mesh/wavy_sheet.hpp"
 #include "test/runtime/dds/dds_fixture.hpp"
 #include "test/support/corrupted_message.hpp"
@@ -105,11 +105,10 @@ TEST_CASE("A mesh that changes while it is sent ends in its newest state", "[nod
 
   TeamMesh team;
   for (const MeshChunk& chunk : sent.messages()) REQUIRE(team.add(chunk) == ChunkVerdict::kTaken);
-  const auto received = team.snapshot();
-  REQUIRE(received.size() == 1);
-  CHECK(received[0].mesh.vertices.size() == mesh->vertices.size());
+  const LabelledMesh received = assembled(team, 7);
+  CHECK(received.vertices.size() == mesh->vertices.size());
   float lowest = 10.0F;
-  for (const auto& vertex : received[0].mesh.vertices) lowest = std::min(lowest, vertex.z());
+  for (const auto& vertex : received.vertices) lowest = std::min(lowest, vertex.z());
   CHECK(lowest == Approx(-0.5F).margin(0.01));
 }
 

@@ -103,8 +103,9 @@ struct Visitor {
     while (auto update = listener.next(0.0)) watcher.receive(update->content);
   }
   [[nodiscard]] std::size_t faces() const {
-    const auto meshes = watcher.mesh.snapshot();
-    return meshes.empty() ? 0 : meshes[0].mesh.faces.size();
+    std::size_t count = 0;
+    for (const PlacedChunk& placed : watcher.mesh.placed()) count += placed.chunk->faces.size();
+    return count;
   }
 
   ViewListener listener;
