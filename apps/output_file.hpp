@@ -9,6 +9,7 @@
 #include <string>
 #include <system_error>
 
+#include "modules/core/json.hpp"
 #include "modules/core/write_file.hpp"
 
 namespace km {
@@ -21,6 +22,11 @@ inline void write_output(const std::filesystem::path& file, const auto& writer) 
   std::ostringstream out;
   writer(out);
   write_file(file, out.view());
+}
+
+/// Writes json_text() to `file` with write_output().
+inline void write_json_output(const std::filesystem::path& file, const Json& json) {
+  write_output(file, [&](std::ostream& out) { out << json_text(json); });
 }
 
 /// Makes the folder if it is absent. Throws std::runtime_error that names the folder and the reason

@@ -2,6 +2,7 @@
 
 #include <CLI/CLI.hpp>  // takes seconds to compile: only for sources that define options
 #include <initializer_list>
+#include <memory>
 #include <optional>
 #include <string>
 
@@ -21,5 +22,15 @@ namespace km {
 /// requested. It is 1 for an exception, with a message on stderr, and for an invalid command line.
 int run_subcommands(const std::string& program, const std::string& about,
                     std::initializer_list<void (*)(CLI::App&)> adders, int argc, char** argv);
+
+/// Adds a subcommand to `app`. Its options are those that `define(CLI::App&)` of a Command adds,
+/// and `run()` runs it as soon as the command line names it.
+template <typename Command>
+void add_command(CLI::App& app, const char* name, const char* about) {
+  CLI::App& subcommand = *app.add_subcommand(name, about);
+  const auto command = std::make_shared<Command>();
+  command->define(subcommand);
+  subcommand.callback([command] { command->run(); });
+}
 
 }  // namespace km

@@ -2,15 +2,14 @@
 #include <filesystem>
 #include <iostream>
 #include <map>
-#include <memory>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <vector>
 
 #include "apps/evaluate/commands.hpp"
+#include "apps/evaluate/inputs.hpp"
 #include "apps/output_file.hpp"
 #include "modules/evaluation/closure_truth.hpp"
-#include "modules/evaluation/trajectory_file.hpp"
 #include "modules/recordings/open_bag.hpp"
 #include "modules/sensors/node/open_folder.hpp"
 
@@ -18,15 +17,6 @@ namespace km {
 namespace {
 
 namespace fs = std::filesystem;
-
-struct ClosuresCommand {
-  std::vector<std::filesystem::path> truths;   // One file for all results, or one for each.
-  std::vector<std::filesystem::path> results;  // Results folder or record of each robot, or
-                                               // record of a team.
-  std::filesystem::path dataset;               // EuRoC/ASL folder with the robots' left camera.
-  ClosureTruthOptions options;
-  std::filesystem::path json;  // Not written if empty.
-};
 
 constexpr std::string_view kKeyframes = "keyframes.csv", kClosures = "loop_closures.csv";
 
@@ -36,17 +26,18 @@ struct Found {
   std::vector<ClosureRecord> closures;
 };
 
+void append(auto& to, const auto& more) {
+  to.insert(to.end(), more.begin(), more.end());
+}
+
 Found found_in(const fs::path& results) {
   if (results.extension() != ".mcap")
     return {read_keyframes(results / kKeyframes), read_closures(results / kClosures)};
   Found all;
-  const auto add = [](auto& to, const auto& more) {
-    to.insert(to.end(), more.begin(), more.end());
-  };
   for (const auto& [name, text] : read_mcap_attachments(results)) {
     const std::string place = results.string() + ':' + name;
-    if (name.ends_with(kKeyframes)) add(all.keyframes, parse_keyframes(text, place));
-    if (name.ends_with(kClosures)) add(all.closures, parse_closures(text, place));
+    if (name.ends_with(kKeyframes)) append(all.keyframes, parse_keyframes(text, place));
+    if (name.ends_with(kClosures)) append(all.closures, parse_closures(text, place));
   }
   if (all.keyframes.empty())
     throw std::invalid_argument(results.string() +
@@ -108,28 +99,60 @@ std::string notes_on(const std::vector<RobotSpan>& spans) {
   return notes;
 }
 
-void run(const ClosuresCommand& command) {
-  check_output_folder(command.json);
-  if (command.truths.size() != 1 && command.truths.size() != command.results.size())
-    throw std::invalid_argument("give one --truth, or as many as there are --results");
-  std::vector<TrueKeyframe> keyframes;
-  std::vector<ClosureRecord> closures;
-  std::vector<RobotSpan> spans;
-  for (std::size_t i = 0; i < command.results.size(); ++i) {
-    const fs::path& truth = command.truths[command.truths.size() == 1 ? 0 : i];
-    const Found found = found_in(command.results[i]);
-    const auto placed = place_keyframes(found.keyframes, read_trajectory(truth));
-    const auto robots = spans_of(found.keyframes, placed, command.results[i], truth);
-    spans.insert(spans.end(), robots.begin(), robots.end());
-    keyframes.insert(keyframes.end(), placed.begin(), placed.end());
-    closures.insert(closures.end(), found.closures.begin(), found.closures.end());
+struct ClosuresCommand {
+  std::vector<fs::path> truths, results;
+  fs::path dataset, json;
+  ClosureTruthOptions options;
+
+  void define(CLI::App& app) {
+    app.add_option("--truth", truths,
+                   "True poses in one common world: one file for each of --results, or one for "
+                   "all, where they are parts of one recording")
+        ->required();
+    app.add_option(
+           "--results", results,
+           "Results folders of all robots of the run, or records (MCAP) of robots or of the team")
+        ->required();
+    app.add_option("--dataset", dataset, "EuRoC/ASL folder: its left camera is the robots'")
+        ->required();
+    app.add_option("--max-translation", options.max_translation_m,
+                   "Error of a true pose, at most [m]")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
+    app.add_option("--max-rotation", options.max_rotation_deg,
+                   "Error of a true pose, at most [deg]")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
+    app.add_option("--min-overlap", options.min_overlap, "Share of the image that is seen by both")
+        ->check(CLI::Range(0.01, 1.0))
+        ->capture_default_str();
+    app.add_option("--default-depth", options.default_depth_m,
+                   "Depth of the scene where a keyframe does not know it [m]")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
+    app.add_option("--json", json, "Also write the numbers to this file, as JSON");
   }
-  const SensorRig rig = read_euroc_rig(find_mav0(command.dataset));
-  const ClosureScores scores =
-      score_closures(keyframes, closures, rig.stereo.cameras[0], command.options);
-  std::cout << to_table(scores) << notes_on(spans);
-  write_output(command.json, [&](std::ostream& out) { out << json_text(scores); });
-}
+
+  void run() const {
+    check_output_folder(json);
+    const auto true_poses = read_truths(truths, results.size(), "--results");
+    std::vector<TrueKeyframe> keyframes;
+    std::vector<ClosureRecord> closures;
+    std::vector<RobotSpan> spans;
+    for (std::size_t i = 0; i < results.size(); ++i) {
+      const Found found = found_in(results[i]);
+      const auto placed = place_keyframes(found.keyframes, of_each(true_poses, i));
+      append(spans, spans_of(found.keyframes, placed, results[i], of_each(truths, i)));
+      append(keyframes, placed);
+      append(closures, found.closures);
+    }
+    const SensorRig rig = read_euroc_rig(find_mav0(dataset));
+    const ClosureScores scores =
+        score_closures(keyframes, closures, rig.stereo.cameras[0], options);
+    std::cout << to_table(scores) << notes_on(spans);
+    write_json_output(json, scores);
+  }
+};
 
 constexpr const char* kClosuresDetails =
     R"(Loop closures of a finished run against the truth, per stage: their number, the share
@@ -151,42 +174,10 @@ Examples:
       --truth room/robot{0,1}/mav0/state_groundtruth_estimate0/data.csv \
       --results results/robot{0,1})";
 
-void define(CLI::App& app, ClosuresCommand& command) {
-  app.add_option("--truth", command.truths,
-                 "True poses in one common world: one file for each of --results, or one for "
-                 "all, where they are parts of one recording")
-      ->required();
-  app.add_option(
-         "--results", command.results,
-         "Results folders of all robots of the run, or records (MCAP) of robots or of the team")
-      ->required();
-  app.add_option("--dataset", command.dataset, "EuRoC/ASL folder: its left camera is the robots'")
-      ->required();
-  ClosureTruthOptions& options = command.options;
-  app.add_option("--max-translation", options.max_translation_m,
-                 "Error of a true pose, at most [m]")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
-  app.add_option("--max-rotation", options.max_rotation_deg, "Error of a true pose, at most [deg]")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
-  app.add_option("--min-overlap", options.min_overlap, "Share of the image that is seen by both")
-      ->check(CLI::Range(0.01, 1.0))
-      ->capture_default_str();
-  app.add_option("--default-depth", options.default_depth_m,
-                 "Depth of the scene where a keyframe does not know it [m]")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
-  app.add_option("--json", command.json, "Also write the numbers to this file, as JSON");
-}
-
 }  // namespace
 
-void add_closures(CLI::App& parent) {
-  CLI::App& app = *parent.add_subcommand("closures", kClosuresDetails);
-  const auto command = std::make_shared<ClosuresCommand>();
-  define(app, *command);
-  app.callback([command] { run(*command); });
+void add_closures(CLI::App& app) {
+  add_command<ClosuresCommand>(app, "closures", kClosuresDetails);
 }
 
 }  // namespace km

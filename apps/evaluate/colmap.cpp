@@ -2,19 +2,18 @@
 #include <filesystem>
 #include <iostream>
 #include <map>
-#include <memory>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "apps/evaluate/commands.hpp"
+#include "apps/evaluate/inputs.hpp"
 #include "apps/output_file.hpp"
 #include "modules/core/input_file.hpp"
 #include "modules/evaluation/exports/colmap_model.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
 #include "modules/images/image_codec.hpp"
 #include "modules/images/image_view.hpp"
-#include "modules/mesh/mesh_file.hpp"
 #include "modules/sensors/node/open_folder.hpp"
 
 namespace km {
@@ -22,31 +21,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct ColmapCommand {
-  std::vector<fs::path> results;   // folder of each robot
-  std::vector<fs::path> datasets;  // EuRoC/ASL folder of each robot
-  std::vector<fs::path> meshes;    // in the frame of the poses; may be empty
-  std::size_t max_points = 200000;
-  fs::path output;
-};
-
-void write_image(const fs::path& file, const GrayImage& image) {
-  const std::vector<std::uint8_t> png = encode_png(view(image));
-  write_file(file, {reinterpret_cast<const char*>(png.data()), png.size()});
-}
-
-// Keyframe poses by stamp.
-std::map<Stamp, SE3> poses_in(const fs::path& results) {
-  std::map<Stamp, SE3> poses;
-  for (const StampedPose& pose : read_trajectory(results / "optimized_keyframes.tum"))
-    poses[pose.stamp] = pose.T;
-  return poses;
-}
-
 // Adds the keyframes of one robot that have an image, and writes their images.
 void add_robot(ColmapModel& model, const fs::path& results, const fs::path& dataset,
                const fs::path& images) {
-  const std::map<Stamp, SE3> poses = poses_in(results);
+  std::map<Stamp, SE3> poses;
+  for (const StampedPose& pose : read_trajectory(results / "optimized_keyframes.tum"))
+    poses[pose.stamp] = pose.T;
   FolderReader reader = open_folder(dataset);
   const Camera& camera = reader.rig().stereo.cameras[0];
   const std::string name = fs::absolute(results).lexically_normal().filename().string();
@@ -65,7 +45,7 @@ void add_robot(ColmapModel& model, const fs::path& results, const fs::path& data
   while (const auto packet = reader.next(choose)) {
     const SE3* const T_world_body = pose_at(packet->frame->stamp);
     const std::string file = name + '/' + std::to_string(packet->frame->stamp) + ".png";
-    write_image(images / file, packet->frame->left);
+    write_png(images / file, view(packet->frame->left));
     model.images.push_back({file, model.cameras.size() - 1, *T_world_body * camera.T_body_cam});
     ++found;
   }
@@ -75,31 +55,45 @@ void add_robot(ColmapModel& model, const fs::path& results, const fs::path& data
   std::cout << name << ": " << found << " of " << poses.size() << " keyframes have an image\n";
 }
 
-LabelledMesh points_of(const ColmapCommand& command) {
-  LabelledMesh all;
-  for (const fs::path& file : command.meshes) all.append(read_mesh(file));
-  std::vector<std::uint32_t> kept;
-  const std::size_t step = all.vertices.size() / std::max<std::size_t>(command.max_points, 1) + 1;
-  for (std::size_t v = 0; v < all.vertices.size(); v += step)
-    kept.push_back(static_cast<std::uint32_t>(v));
-  all.faces.clear();
-  all.keep_vertices(kept);
-  return all;
-}
+struct ColmapCommand {
+  std::vector<fs::path> results, datasets, meshes;
+  std::size_t max_points = 200000;
+  fs::path output;
 
-void run(const ColmapCommand& command) {
-  if (command.datasets.size() != command.results.size())
-    throw std::invalid_argument("give one --dataset for each of --results");
-  ColmapModel model;
-  make_output_folder(command.output / "sparse/0");
-  for (std::size_t i = 0; i < command.results.size(); ++i)
-    add_robot(model, command.results[i], command.datasets[i], command.output / "images");
-  model.points = points_of(command);
-  write_colmap(command.output / "sparse/0", model);
-  std::cout << (command.output / "sparse/0").string() << ": " << model.cameras.size()
-            << " cameras, " << model.images.size() << " images, " << model.points.vertices.size()
-            << " points\n";
-}
+  void define(CLI::App& app) {
+    app.add_option("--results", results, "Results folder of each robot")->required();
+    app.add_option("--dataset", datasets, "Recording of each robot (EuRoC/ASL folder)")->required();
+    app.add_option("--mesh", meshes, "Meshes (PLY) in the frame of the poses");
+    app.add_option("--max-points", max_points,
+                   "Largest number of points; beyond it evenly chosen vertices are written")
+        ->capture_default_str();
+    app.add_option("--output", output, "Folder to write")->required();
+  }
+
+  [[nodiscard]] LabelledMesh points() const {
+    LabelledMesh all = read_meshes(meshes);
+    std::vector<std::uint32_t> kept;
+    const std::size_t step = all.vertices.size() / std::max<std::size_t>(max_points, 1) + 1;
+    for (std::size_t v = 0; v < all.vertices.size(); v += step)
+      kept.push_back(static_cast<std::uint32_t>(v));
+    all.faces.clear();
+    all.keep_vertices(kept);
+    return all;
+  }
+
+  void run() const {
+    if (datasets.size() != results.size())
+      throw std::invalid_argument("give one --dataset for each of --results");
+    ColmapModel model;
+    make_output_folder(output / "sparse/0");
+    for (std::size_t i = 0; i < results.size(); ++i)
+      add_robot(model, results[i], datasets[i], output / "images");
+    model.points = points();
+    write_colmap(output / "sparse/0", model);
+    std::cout << (output / "sparse/0").string() << ": " << model.cameras.size() << " cameras, "
+              << model.images.size() << " images, " << model.points.vertices.size() << " points\n";
+  }
+};
 
 constexpr const char* kColmapDetails =
     R"(Keyframes of robots as a COLMAP model, for trainers of Gaussian splats and radiance fields
@@ -115,18 +109,8 @@ Example:
 
 }  // namespace
 
-void add_colmap(CLI::App& parent) {
-  CLI::App& app = *parent.add_subcommand("colmap", kColmapDetails);
-  const auto command = std::make_shared<ColmapCommand>();
-  app.add_option("--results", command->results, "Results folder of each robot")->required();
-  app.add_option("--dataset", command->datasets, "Recording of each robot (EuRoC/ASL folder)")
-      ->required();
-  app.add_option("--mesh", command->meshes, "Meshes (PLY) in the frame of the poses");
-  app.add_option("--max-points", command->max_points,
-                 "Largest number of points; beyond it evenly chosen vertices are written")
-      ->capture_default_str();
-  app.add_option("--output", command->output, "Folder to write")->required();
-  app.callback([command] { run(*command); });
+void add_colmap(CLI::App& app) {
+  add_command<ColmapCommand>(app, "colmap", kColmapDetails);
 }
 
 }  // namespace km

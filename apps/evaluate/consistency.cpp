@@ -4,7 +4,6 @@
 #include <filesystem>
 #include <iostream>
 #include <map>
-#include <memory>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <string>
@@ -21,13 +20,6 @@
 
 namespace km {
 namespace {
-
-struct ConsistencyCommand {
-  std::vector<std::filesystem::path> truths;
-  std::vector<std::filesystem::path> results;
-  bool upright = false;
-  std::filesystem::path json;
-};
 
 std::string to_table(const std::vector<Consistency>& robots) {
   std::vector<std::vector<std::string>> rows = {{"NEES / degrees of freedom", "poses", "pose",
@@ -72,32 +64,44 @@ struct Edges {
   }
 };
 
-void run(const ConsistencyCommand& command) {
-  check_output_folder(command.json);
-  if (command.truths.size() != 1 && command.truths.size() != command.results.size())
-    throw std::invalid_argument("give one --truth, or as many as there are --results");
-  std::vector<std::vector<StampedPose>> truths;
-  for (const auto& file : command.truths) truths.push_back(read_trajectory(file));
-  std::deque<UncertainTrajectory> estimates;  // inputs refer to them
-  std::vector<ConsistencyInput> inputs;
-  Edges edges;
-  for (std::size_t i = 0; i < command.results.size(); ++i) {
-    const auto& truth = truths[truths.size() == 1 ? 0 : i];
-    const auto file = command.results[i] / "optimized_keyframes.tum";
-    const UncertainTrajectory& estimate = estimates.emplace_back(read_uncertain_trajectory(file));
-    inputs.push_back({"poses of " + short_name(command.results[i]), truth, estimate.poses,
-                      estimate.covariances});
-    edges.add(command.results[i], truth);
+struct ConsistencyCommand {
+  std::vector<std::filesystem::path> truths, results;
+  bool upright = false;
+  std::filesystem::path json;
+
+  void define(CLI::App& app) {
+    app.add_option("--truth", truths, "True poses: one file for all robots or one for each")
+        ->required();
+    app.add_option("--results", results, "Folders of the results, one per robot")->required();
+    app.add_flag("--upright", upright,
+                 "Both frames have z up: runs with inertial sensing, and a truth with z up");
+    app.add_option("--json", json, "Also write the numbers to this file");
   }
-  std::vector<Consistency> rows = consistency(inputs, command.upright);
-  rows.back().name = "all poses";
-  rows.push_back(consistency_of_edges("steps of odometry", edges.steps, edges.truth));
-  std::vector<RelativePose> closures;
-  for (const auto& [id, closure] : edges.closures) closures.push_back(closure);
-  rows.push_back(consistency_of_edges("closures", closures, edges.truth));
-  std::cout << to_table(rows);
-  write_output(command.json, [&](std::ostream& out) { out << to_json(rows).dump(2) << '\n'; });
-}
+
+  void run() const {
+    check_output_folder(json);
+    const auto true_poses = read_truths(truths, results.size(), "--results");
+    std::deque<UncertainTrajectory> estimates;  // inputs refer to them
+    std::vector<ConsistencyInput> inputs;
+    Edges edges;
+    for (std::size_t i = 0; i < results.size(); ++i) {
+      const auto& truth = of_each(true_poses, i);
+      const UncertainTrajectory& estimate =
+          estimates.emplace_back(read_uncertain_trajectory(results[i] / "optimized_keyframes.tum"));
+      inputs.push_back(
+          {"poses of " + short_name(results[i]), truth, estimate.poses, estimate.covariances});
+      edges.add(results[i], truth);
+    }
+    std::vector<Consistency> rows = consistency(inputs, upright);
+    rows.back().name = "all poses";
+    rows.push_back(consistency_of_edges("steps of odometry", edges.steps, edges.truth));
+    std::vector<RelativePose> closures;
+    for (const auto& [id, closure] : edges.closures) closures.push_back(closure);
+    rows.push_back(consistency_of_edges("closures", closures, edges.truth));
+    std::cout << to_table(rows);
+    write_json_output(json, to_json(rows));
+  }
+};
 
 constexpr const char* kDetails =
     R"(Whether covariances are as large as the errors against the truth
@@ -118,17 +122,8 @@ Example:
 
 }  // namespace
 
-void add_consistency(CLI::App& parent) {
-  CLI::App& app = *parent.add_subcommand("consistency", kDetails);
-  const auto command = std::make_shared<ConsistencyCommand>();
-  app.add_option("--truth", command->truths, "True poses: one file for all robots or one for each")
-      ->required();
-  app.add_option("--results", command->results, "Folders of the results, one per robot")
-      ->required();
-  app.add_flag("--upright", command->upright,
-               "Both frames have z up: runs with inertial sensing, and a truth with z up");
-  app.add_option("--json", command->json, "Also write the numbers to this file");
-  app.callback([command] { run(*command); });
+void add_consistency(CLI::App& app) {
+  add_command<ConsistencyCommand>(app, "consistency", kDetails);
 }
 
 }  // namespace km

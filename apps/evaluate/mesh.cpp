@@ -1,8 +1,6 @@
-#include <algorithm>
 #include <deque>
 #include <filesystem>
 #include <iostream>
-#include <memory>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <string>
@@ -18,28 +16,6 @@
 
 namespace km {
 namespace {
-
-struct MeshCommand {
-  std::filesystem::path truth;                   // PLY.
-  std::vector<std::filesystem::path> estimates;  // PLY, one file per robot.
-  std::vector<std::filesystem::path> before;     // The same before a correction; may be empty.
-  // The robots' poses in the frame of the meshes and in that of the truth. They place the meshes.
-  std::vector<std::filesystem::path> trajectories;
-  std::vector<std::filesystem::path> true_trajectories;
-  MeshErrorOptions options;
-  std::filesystem::path palette;  // default: the palette beside the truth
-  std::filesystem::path json;     // Not written if empty.
-};
-
-// Transform of the meshes by the robots' trajectories.
-SE3 placed_by(const MeshCommand& command) {
-  const std::size_t estimates = command.trajectories.size();
-  const std::size_t truths = command.true_trajectories.size();
-  if ((estimates == 0) != (truths == 0) || (truths > 1 && truths != estimates))
-    throw std::invalid_argument(
-        "give one --trajectory-truth for all --trajectory, or one for each");
-  return placement_of(command.trajectories, command.true_trajectories, true);
-}
 
 constexpr double kLargeMove_m = 0.5;  // motion by ICP above which it may have found a wrong surface
 constexpr const char* kPlacing =
@@ -57,52 +33,94 @@ struct MeshFiles {
   }
 };
 
-// Calls `compare`. If it finds no common surface, the message states how to place the meshes.
-auto placed(const MeshCommand& command, const auto& compare) try {
-  return compare();
-} catch (const std::invalid_argument& error) {
-  const std::string problem = error.what();
-  const bool elsewhere = problem.find("in one frame") != problem.npos;
-  if (!elsewhere || !command.trajectories.empty()) throw;
-  throw std::invalid_argument(problem + "\nnote: " + kPlacing);
-}
+struct MeshCommand {
+  std::filesystem::path truth, palette, json;
+  std::vector<std::filesystem::path> estimates, before, trajectories, true_trajectories;
+  MeshErrorOptions options;
 
-void print(const MeshCommand& command, const MeshReport& report, const LabelPalette& palette) {
-  std::cout << to_table(report, palette);
-  if (command.trajectories.empty() && report.moved_m > kLargeMove_m)
-    std::cout << "note: " << kPlacing << '\n';
-}
-
-void run(const MeshCommand& command) {
-  check_output_folder(command.json);
-  MeshErrorOptions options = command.options;
-  options.T_truth_estimate = placed_by(command);
-  StageProgress stages;
-  const MeshProgress progress = [&](std::string_view stage, double share) { stages(stage, share); };
-  progress("reading", 0.0);
-  const LabelledMesh truth = read_mesh(command.truth);
-  const MeshFiles estimates(command.estimates), before(command.before);
-  std::vector<MeshInput> all = {{command.truth.string(), truth}};
-  for (const MeshFiles* files : {&estimates, &before})
-    for (const MeshInput& input : files->inputs) all.push_back(input);
-  const LabelPalette palette = read_palette(command.palette, command.truth, all);
-
-  Json json;
-  if (before.inputs.empty()) {
-    const MeshReport report =
-        placed(command, [&] { return mesh_error(truth, estimates.inputs, options, progress); });
-    print(command, report, palette);
-    json = to_json(report, palette);
-  } else {
-    const MeshChange change = placed(command, [&] {
-      return mesh_change(truth, before.inputs, estimates.inputs, options, progress);
-    });
-    print(command, change.after, palette);
-    std::cout << '\n' << to_table(change);
-    json = to_json(change, palette);
+  void define(CLI::App& app) {
+    app.add_option("--truth", truth, "The true mesh (PLY)")->required();
+    app.add_option("--estimate", estimates,
+                   "Estimated meshes (PLY) in one common frame, one file per robot")
+        ->required();
+    app.add_option("--before", before,
+                   "The meshes before a correction (PLY), in the order of --estimate");
+    app.add_option("--trajectory", trajectories,
+                   "Estimated poses of the robots in the frame of the meshes, TUM or EuRoC CSV");
+    app.add_option("--trajectory-truth", true_trajectories,
+                   "Their true poses: one file for all or one for each");
+    app.add_option("--samples-per-m2", options.samples_per_m2, "Samples per square metre")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
+    app.add_option("--max-samples", options.max_samples,
+                   "Largest number for the estimate, and for the truth: beyond it the density is "
+                   "reduced, with a note")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
+    app.add_option("--seed", options.seed, "Seed of the samples")->capture_default_str();
+    app.add_flag("!--no-icp", options.icp, "Compare the meshes where they are");
+    app.add_option(
+           "--crop", options.crop_m,
+           "True points further from the estimate are not judged [m]; errors count up to it")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
+    app.add_option("--max-distance", options.label_distance_m,
+                   "Labels are judged up to this distance [m]")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
+    app.add_option("--palette", palette,
+                   "Names of the labels (CSV); default: label_palette.csv beside the truth");
+    app.add_option("--json", json, "Also write the numbers to this file, as JSON");
   }
-  write_output(command.json, [&](std::ostream& out) { out << json_text(json); });
-}
+
+  // Calls `compare`. If it finds no common surface, the message states how to place the meshes.
+  auto placed(const auto& compare) const try {
+    return compare();
+  } catch (const std::invalid_argument& error) {
+    const std::string problem = error.what();
+    const bool elsewhere = problem.find("in one frame") != problem.npos;
+    if (!elsewhere || !trajectories.empty()) throw;
+    throw std::invalid_argument(problem + "\nnote: " + kPlacing);
+  }
+
+  void print(const MeshReport& report, const LabelPalette& names) const {
+    std::cout << to_table(report, names);
+    if (trajectories.empty() && report.moved_m > kLargeMove_m)
+      std::cout << "note: " << kPlacing << '\n';
+  }
+
+  void run() {
+    check_output_folder(json);
+    const std::size_t truths = true_trajectories.size();
+    if (trajectories.empty() != (truths == 0) || (truths > 1 && truths != trajectories.size()))
+      throw std::invalid_argument(
+          "give one --trajectory-truth for all --trajectory, or one for each");
+    options.T_truth_estimate = placement_of(trajectories, true_trajectories, true);
+    StageProgress stages;
+    const MeshProgress progress = [&](std::string_view stage, double share) {
+      stages(stage, share);
+    };
+    progress("reading", 0.0);
+    const LabelledMesh world = read_mesh(truth);
+    const MeshFiles after(estimates), former(before);
+    std::vector<MeshInput> all = {{truth.string(), world}};
+    for (const MeshFiles* files : {&after, &former})
+      for (const MeshInput& input : files->inputs) all.push_back(input);
+    const LabelPalette names = read_palette(palette, truth, all);
+    if (before.empty()) {
+      const MeshReport report =
+          placed([&] { return mesh_error(world, after.inputs, options, progress); });
+      print(report, names);
+      write_json_output(json, to_json(report, names));
+    } else {
+      const MeshChange change = placed(
+          [&] { return mesh_change(world, former.inputs, after.inputs, options, progress); });
+      print(change.after, names);
+      std::cout << '\n' << to_table(change);
+      write_json_output(json, to_json(change, names));
+    }
+  }
+};
 
 constexpr const char* kMeshDetails =
     R"(Errors of estimated meshes against the true one, of each robot and of all together
@@ -136,48 +154,10 @@ Examples:
       --trajectory-truth city/robot0/mav0/state_groundtruth_estimate0/data.csv \
                          city/robot1/mav0/state_groundtruth_estimate0/data.csv)";
 
-void define(CLI::App& app, MeshCommand& command) {
-  MeshErrorOptions& options = command.options;
-  app.add_option("--truth", command.truth, "The true mesh (PLY)")->required();
-  app.add_option("--estimate", command.estimates,
-                 "Estimated meshes (PLY) in one common frame, one file per robot")
-      ->required();
-  app.add_option("--before", command.before,
-                 "The meshes before a correction (PLY), in the order of --estimate");
-  app.add_option("--trajectory", command.trajectories,
-                 "Estimated poses of the robots in the frame of the meshes, TUM or EuRoC CSV");
-  app.add_option("--trajectory-truth", command.true_trajectories,
-                 "Their true poses: one file for all or one for each");
-  app.add_option("--samples-per-m2", options.samples_per_m2, "Samples per square metre")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
-  app.add_option("--max-samples", options.max_samples,
-                 "Largest number for the estimate, and for the truth: beyond it the density is "
-                 "reduced, with a note")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
-  app.add_option("--seed", options.seed, "Seed of the samples")->capture_default_str();
-  app.add_flag("!--no-icp", options.icp, "Compare the meshes where they are");
-  app.add_option("--crop", options.crop_m,
-                 "True points further from the estimate are not judged [m]; errors count up to it")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
-  app.add_option("--max-distance", options.label_distance_m,
-                 "Labels are judged up to this distance [m]")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
-  app.add_option("--palette", command.palette,
-                 "Names of the labels (CSV); default: label_palette.csv beside the truth");
-  app.add_option("--json", command.json, "Also write the numbers to this file, as JSON");
-}
-
 }  // namespace
 
-void add_mesh(CLI::App& parent) {
-  CLI::App& app = *parent.add_subcommand("mesh", kMeshDetails);
-  const auto command = std::make_shared<MeshCommand>();
-  define(app, *command);
-  app.callback([command] { run(*command); });
+void add_mesh(CLI::App& app) {
+  add_command<MeshCommand>(app, "mesh", kMeshDetails);
 }
 
 }  // namespace km

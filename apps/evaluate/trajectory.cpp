@@ -1,32 +1,19 @@
-#include <cmath>
 #include <deque>
 #include <filesystem>
 #include <iostream>
-#include <limits>
-#include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <stdexcept>
 #include <vector>
 
 #include "apps/evaluate/commands.hpp"
 #include "apps/evaluate/inputs.hpp"
-#include "apps/evaluate/recorded_poses.hpp"
 #include "apps/report_files.hpp"
 #include "modules/evaluation/trajectory_error.hpp"
-#include "modules/evaluation/trajectory_file.hpp"
 #include "modules/evaluation/trajectory_report.hpp"
 
 namespace km {
 namespace {
-
-struct TrajectoryCommand {
-  std::vector<std::filesystem::path> truths;     // One for all estimates, or one for each.
-  std::vector<std::filesystem::path> estimates;  // TUM, EuRoC CSV, or records.
-  double from_s = -std::numeric_limits<double>::infinity();
-  double to_s = std::numeric_limits<double>::infinity();
-  TrajectoryErrorOptions options;
-  ReportFiles files;
-};
 
 constexpr double kAbsoluteFrom_s = 1e6;  // larger times are stamps, not seconds since the start
 
@@ -34,37 +21,58 @@ Stamp absolute(double t_s, Stamp start) {
   return nanoseconds(t_s) + (t_s < kAbsoluteFrom_s ? start : 0);
 }
 
-TimeWindow window_of(const TrajectoryCommand& command, const std::vector<StampedPose>& truth) {
-  TimeWindow window = {truth.front().stamp, truth.back().stamp};
-  const Stamp start = window.from;
-  if (std::isfinite(command.from_s)) window.from = absolute(command.from_s, start);
-  if (std::isfinite(command.to_s)) window.to = absolute(command.to_s, start);
-  if (window.from >= window.to) throw std::invalid_argument("--from is not before --to");
-  return window;
-}
+struct TrajectoryCommand {
+  std::vector<std::filesystem::path> truths, estimates;
+  std::optional<double> from_s, to_s;
+  TrajectoryErrorOptions options;
+  ReportFiles files;
 
-void run(TrajectoryCommand command) {
-  command.files.check();
-  command.estimates = expand_records(command.estimates);
-  if (command.truths.size() != 1 && command.truths.size() != command.estimates.size())
-    throw std::invalid_argument("give one --truth, or as many as there are --estimate");
-  std::vector<std::vector<StampedPose>> truths;
-  for (const auto& file : command.truths) truths.push_back(read_trajectory(file));
-  std::deque<std::vector<StampedPose>> estimates;  // inputs refer to them
-  std::vector<TrajectoryInput> inputs;
-  for (std::size_t i = 0; i < command.estimates.size(); ++i) {
-    const auto& truth = truths[truths.size() == 1 ? 0 : i];
-    estimates.push_back(read_estimate(command.estimates[i]));
-    inputs.push_back(
-        {short_name(command.estimates[i]), truth, estimates.back(), window_of(command, truth)});
+  void define(CLI::App& app) {
+    app.add_option("--truth", truths, "True poses: one file for all estimates or one for each")
+        ->required();
+    app.add_option("--estimate", estimates, "Estimated poses, one file per robot, or a record")
+        ->required();
+    app.add_flag("--sim3", options.with_scale, "Align by a similarity: the scale is free");
+    app.add_option("--from", from_s,
+                   "Judge from here on [s since the truth's first pose; above 1e6: a stamp]");
+    app.add_option("--to", to_s, "Judge up to here, as --from");
+    app.add_option("--delta", options.rpe_delta_s, "Time of the relative error [s]")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
+    app.add_option("--coverage-gap", options.max_coverage_gap_s,
+                   "Poses further apart leave the time between uncovered [s]")
+        ->check(CLI::NonNegativeNumber)
+        ->capture_default_str();
+    files.define(app, "the numbers", "truth and estimates from above");
   }
 
-  const TeamError team = trajectory_error(inputs, command.options);
-  std::cout << to_table(team);
-  if (command.options.with_scale) std::cout << "scale " << team.alignment.scale << '\n';
-  command.files.write([&](std::ostream& out) { out << json_text(team); }, "Truth and estimates",
-                      [&] { return std::vector{plot_from_above(inputs, team)}; });
-}
+  [[nodiscard]] TimeWindow window_in(const std::vector<StampedPose>& truth) const {
+    TimeWindow window = {truth.front().stamp, truth.back().stamp};
+    const Stamp start = window.from;
+    if (from_s) window.from = absolute(*from_s, start);
+    if (to_s) window.to = absolute(*to_s, start);
+    if (window.from >= window.to) throw std::invalid_argument("--from is not before --to");
+    return window;
+  }
+
+  void run() const {
+    files.check();
+    const auto all = expand_records(estimates);
+    const auto true_poses = read_truths(truths, all.size(), "--estimate");
+    std::deque<std::vector<StampedPose>> poses;  // inputs refer to them
+    std::vector<TrajectoryInput> inputs;
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      const auto& truth = of_each(true_poses, i);
+      inputs.push_back(
+          {short_name(all[i]), truth, poses.emplace_back(read_estimate(all[i])), window_in(truth)});
+    }
+    const TeamError team = trajectory_error(inputs, options);
+    std::cout << to_table(team);
+    if (options.with_scale) std::cout << "scale " << team.alignment.scale << '\n';
+    files.write([&](std::ostream& out) { out << json_text(team); }, "Truth and estimates",
+                [&] { return std::vector{plot_from_above(inputs, team)}; });
+  }
+};
 
 constexpr const char* kTrajectoryDetails =
     R"(Errors of estimated trajectories against the truth
@@ -87,34 +95,10 @@ Examples:
   kimera_multi_evaluate trajectory --truth a.csv --truth b.csv --estimate a.tum b.tum
   kimera_multi_evaluate trajectory --truth data.csv --estimate team.mcap)";
 
-void define(CLI::App& app, TrajectoryCommand& command) {
-  app.add_option("--truth", command.truths,
-                 "True poses: one file for all estimates or one for each")
-      ->required();
-  app.add_option("--estimate", command.estimates,
-                 "Estimated poses, one file per robot, or a record")
-      ->required();
-  app.add_flag("--sim3", command.options.with_scale, "Align by a similarity: the scale is free");
-  app.add_option("--from", command.from_s,
-                 "Judge from here on [s since the truth's first pose; above 1e6: a stamp]");
-  app.add_option("--to", command.to_s, "Judge up to here, as --from");
-  app.add_option("--delta", command.options.rpe_delta_s, "Time of the relative error [s]")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
-  app.add_option("--coverage-gap", command.options.max_coverage_gap_s,
-                 "Poses further apart leave the time between uncovered [s]")
-      ->check(CLI::NonNegativeNumber)
-      ->capture_default_str();
-  command.files.define(app, "the numbers", "truth and estimates from above");
-}
-
 }  // namespace
 
-void add_trajectory(CLI::App& parent) {
-  CLI::App& app = *parent.add_subcommand("trajectory", kTrajectoryDetails);
-  const auto command = std::make_shared<TrajectoryCommand>();
-  define(app, *command);
-  app.callback([command] { run(*command); });
+void add_trajectory(CLI::App& app) {
+  add_command<TrajectoryCommand>(app, "trajectory", kTrajectoryDetails);
 }
 
 }  // namespace km
