@@ -10,7 +10,6 @@
 #include "apps/evaluate/inputs.hpp"
 #include "apps/report_files.hpp"
 #include "modules/evaluation/trajectory_error.hpp"
-#include "modules/evaluation/trajectory_report.hpp"
 
 namespace km {
 namespace {

@@ -3,7 +3,6 @@
 #include <exception>
 #include <filesystem>
 #include <iostream>
-#include <memory>
 #include <optional>
 #include <set>
 #include <span>
@@ -45,13 +44,6 @@ std::int64_t now_s() {
       .count();
 }
 
-struct KeysCommand {
-  fs::path team;
-  std::vector<std::string> robots;  // "name:id" of each robot, or only the number of robots
-  int days = 365;
-  std::string revoked;
-};
-
 std::optional<RobotId> robot_id_from(std::string_view text) {
   RobotId id = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), id);
@@ -79,26 +71,45 @@ std::vector<RobotName> robots_from(const std::vector<std::string>& texts) {
   return robots;
 }
 
-void print_issued(const KeysCommand& command, const std::vector<RobotName>& robots) {
-  for (const RobotName& robot : robots)
-    std::cout << (command.team / robot.name).string() << "  for robot " << robot.id << ", valid "
-              << command.days << " days\n";
-  std::cout << R"(Copy each folder onto its robot, keeping modes (scp -rp), and start the robot with
+// Adds robots to a team, which is made first if `kIsNew`.
+template <bool kIsNew>
+struct IssueCommand {
+  fs::path team;
+  std::vector<std::string> names;  // "name:id" of each robot, or only the number of robots
+  int days = 365;
+
+  void define(CLI::App& app) {
+    app.add_option("TEAM", team, "Folder of the team")->required();
+    app.add_option("--robots", names,
+                   "name:id of each robot, separated by commas, as in --name and --robot of the "
+                   "robots; or the number of robots, which are named robot0, robot1, ...")
+        ->required()
+        ->delimiter(',');
+    app.add_option(
+           "--days", days,
+           "Validity of the certificates. They are valid from the day before, for clocks that "
+           "are late; a robot without a clock needs the time before it starts")
+        ->check(CLI::Range(1, 36500))
+        ->capture_default_str();
+  }
+
+  void run() const {
+    const auto robots = robots_from(names);
+    const std::int64_t now = now_s(), until = now + days * kDay_s;
+    if (kIsNew)
+      TeamFolder::make(team, robots, now, until);
+    else
+      TeamFolder(team).issue(robots, now, until);
+    for (const RobotName& robot : robots)
+      std::cout << (team / robot.name).string() << "  for robot " << robot.id << ", valid " << days
+                << " days\n";
+    std::cout
+        << R"(Copy each folder onto its robot, keeping modes (scp -rp), and start the robot with
   --robot ID --name NAME --security FOLDER
 then delete it here. )"
-            << (command.team / "authority").string()
-            << " stays here: whoever has it can admit anyone.\n";
-}
-
-void make_or_add(const KeysCommand& command, bool is_new) {
-  const auto robots = robots_from(command.robots);
-  const std::int64_t now = now_s(), until = now + command.days * kDay_s;
-  if (is_new)
-    TeamFolder::make(command.team, robots, now, until);
-  else
-    TeamFolder(command.team).issue(robots, now, until);
-  print_issued(command, robots);
-}
+        << (team / "authority").string() << " stays here: whoever has it can admit anyone.\n";
+  }
+};
 
 void print_revoked(std::span<const RevokedCertificate> revoked) {
   for (const RevokedCertificate& one : revoked)
@@ -106,28 +117,22 @@ void print_revoked(std::span<const RevokedCertificate> revoked) {
               << fingerprint_of(one.key) << '\n';
 }
 
-void revoke(const KeysCommand& command) {
-  TeamFolder team(command.team);
-  print_revoked(team.revoke(command.revoked));
-  std::cout << "A robot refuses it once it has the new list: copy "
-            << (command.team / "authority" / kRevocationsFile).string()
-            << "\ninto the folder of keys on every robot that stays.\n";
-}
+struct RevokeCommand {
+  fs::path team;
+  std::string robot;
 
-void define_robots(CLI::App& app, KeysCommand& command) {
-  app.add_option("TEAM", command.team, "Folder of the team")->required();
-  app.add_option("--robots", command.robots,
-                 "name:id of each robot, separated by commas, as in --name and --robot of the "
-                 "robots; or the number of robots, which are named robot0, robot1, ...")
-      ->required()
-      ->delimiter(',');
-  app.add_option(
-         "--days", command.days,
-         "Validity of the certificates. They are valid from the day before, for clocks that "
-         "are late; a robot without a clock needs the time before it starts")
-      ->check(CLI::Range(1, 36500))
-      ->capture_default_str();
-}
+  void define(CLI::App& app) {
+    app.add_option("TEAM", team, "Folder of the team")->required();
+    app.add_option("ROBOT", robot, "Name or id of the robot")->required();
+  }
+
+  void run() const {
+    print_revoked(TeamFolder(team).revoke(robot));
+    std::cout << "A robot refuses it once it has the new list: copy "
+              << (team / "authority" / kRevocationsFile).string()
+              << "\ninto the folder of keys on every robot that stays.\n";
+  }
+};
 
 void print_certificates(std::span<const Certificate> certificates, const std::string& team,
                         const PublicKey& authority, const Revocations& revocations) {
@@ -158,72 +163,65 @@ void report_folder(const fs::path& folder, const Revocations& revocations) {
   }
 }
 
-void show_team(const fs::path& folder) {
-  const TeamFolder team(folder);
-  print_certificates(team.issued(), team.authority().team, team.authority().key,
-                     team.revocations());
-  std::set<std::string> names;
-  for (const Certificate& certificate : team.issued()) names.insert(certificate.name);
-  for (const std::string& name : names) report_folder(folder / name, team.revocations());
-}
+struct ShowCommand {
+  fs::path folder;
 
-void show_robot(const fs::path& folder) {
-  const RobotKeys keys = load_robot_keys(folder);
-  print_certificates({&keys.certificate, 1}, keys.certificate.team, keys.authority,
-                     keys.revocations);
-  print_revoked(keys.revocations.revoked);
-}
+  void define(CLI::App& app) {
+    app.add_option("FOLDER", folder, "Folder of a team, or of a robot's keys")
+        ->required()
+        ->check(CLI::ExistingDirectory);
+  }
 
-void add_make(CLI::App& parent) {
-  CLI::App& app =
-      *parent.add_subcommand("make",
-                             R"(Make a team: its authority, and a folder of keys for each robot.
+  void run() const { fs::exists(folder / kCertificateFile) ? show_robot() : show_team(); }
+
+ private:
+  void show_team() const {
+    const TeamFolder team(folder);
+    print_certificates(team.issued(), team.authority().team, team.authority().key,
+                       team.revocations());
+    std::set<std::string> names;
+    for (const Certificate& certificate : team.issued()) names.insert(certificate.name);
+    for (const std::string& name : names) report_folder(folder / name, team.revocations());
+  }
+
+  void show_robot() const {
+    const RobotKeys keys = load_robot_keys(folder);
+    print_certificates({&keys.certificate, 1}, keys.certificate.team, keys.authority,
+                       keys.revocations);
+    print_revoked(keys.revocations.revoked);
+  }
+};
+
+void add_make(CLI::App& app) {
+  add_command<IssueCommand<true>>(
+      app, "make",
+      R"(Make a team: its authority, and a folder of keys for each robot.
   kimera_multi_keys make survey --robots alpha:0,beta:1
   kimera_multi_keys make survey --robots 3 --days 30)");
-  const auto command = std::make_shared<KeysCommand>();
-  define_robots(app, *command);
-  app.callback([command] { make_or_add(*command, true); });
 }
 
-void add_add(CLI::App& parent) {
-  CLI::App& app = *parent.add_subcommand(
-      "add",
+void add_add(CLI::App& app) {
+  add_command<IssueCommand<false>>(
+      app, "add",
       R"(Add robots to a team, or renew a certificate that is revoked or has expired. Running robots
 accept the new keys: nothing has to be copied to them.
   kimera_multi_keys add survey --robots gamma:2)");
-  const auto command = std::make_shared<KeysCommand>();
-  define_robots(app, *command);
-  app.callback([command] { make_or_add(*command, false); });
 }
 
-void add_revoke(CLI::App& parent) {
-  CLI::App& app = *parent.add_subcommand(
-      "revoke",
+void add_revoke(CLI::App& app) {
+  add_command<RevokeCommand>(
+      app, "revoke",
       R"(Revoke a robot's certificates, for a robot that is lost or whose secret was read. Copy the new
 list of revocations to the other robots: until then they still accept the robot.
   kimera_multi_keys revoke survey beta)");
-  const auto command = std::make_shared<KeysCommand>();
-  app.add_option("TEAM", command->team, "Folder of the team")->required();
-  app.add_option("ROBOT", command->revoked, "Name or id of the robot")->required();
-  app.callback([command] { revoke(*command); });
 }
 
-void add_show(CLI::App& parent) {
-  CLI::App& app = *parent.add_subcommand(
-      "show",
+void add_show(CLI::App& app) {
+  add_command<ShowCommand>(
+      app, "show",
       R"(Check and show the keys of a team, or of one robot, without the secrets.
   kimera_multi_keys show survey
   kimera_multi_keys show keys          # on the robot)");
-  const auto folder = std::make_shared<fs::path>();
-  app.add_option("FOLDER", *folder, "Folder of a team, or of a robot's keys")
-      ->required()
-      ->check(CLI::ExistingDirectory);
-  app.callback([folder] {
-    if (fs::exists(*folder / kCertificateFile))
-      show_robot(*folder);
-    else
-      show_team(*folder);
-  });
 }
 
 }  // namespace

@@ -255,7 +255,7 @@ void write_record(const km::TeamPlan& plan, const km::TeamResult& team, const fs
 void write_results(const TeamOptions& options, const km::TeamPlan& plan, const km::TeamResult& team,
                    km::ResultWriter& results, std::ostream& out) {
   if (!options.json.empty())
-    results.write(options.json, [&](const fs::path& file) { km::write_json(file, team); });
+    results.write(options.json, [&](const fs::path& file) { km::write_json_output(file, team); });
   if (!std::ranges::all_of(team.robots, &km::RobotResult::left_nothing))
     results.write(plan.output / km::kReportPage, [&](const fs::path& file) {
       km::write_report(file, plan, team);

@@ -17,7 +17,6 @@
 #include "apps/team/closure_images.hpp"
 #include "apps/team/team_report.hpp"
 #include "modules/charts/html_page.hpp"
-#include "modules/charts/page_file.hpp"
 #include "modules/core/input_file.hpp"
 #include "modules/core/text_rows.hpp"
 

@@ -3,12 +3,12 @@
 #include <deque>
 #include <filesystem>
 #include <optional>
+#include <ostream>
 #include <string>
 #include <vector>
 
 #include "apps/team/emulated_links.hpp"
 #include "apps/team/robot_process.hpp"
-#include "apps/team/team_display.hpp"
 #include "apps/team/team_file.hpp"
 #include "runtime/signal_watch.hpp"
 
@@ -22,6 +22,30 @@ inline constexpr const char* kTeamRecord = "team.mcap";
 
 /// Report of the run, in the team's output folder.
 inline constexpr const char* kReportPage = "report.html";
+
+/// One line per robot, redrawn in place on a terminal. Otherwise prints every line with the robot's
+/// name in front.
+class TeamDisplay {
+ public:
+  /// Prints to unblocked_stdout(); isatty() decides whether it is a terminal.
+  explicit TeamDisplay(std::vector<std::string> names);
+  /// For tests: `output` outlives this. `width` [characters] cuts lines on a terminal.
+  TeamDisplay(std::vector<std::string> names, std::ostream& output, bool terminal, int width);
+
+  /// The newest line of robot `index`.
+  void update(std::size_t index, const std::string& line);
+
+ private:
+  void redraw();
+
+  std::vector<std::string> names_;
+  std::vector<std::string> lines_;
+  std::ostream& output_;
+  bool terminal_;
+  std::size_t width_;
+  std::size_t name_width_ = 0;
+  bool drawn_ = false;
+};
 
 /// Exit status of the process of one robot.
 struct RobotRun {

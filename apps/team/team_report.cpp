@@ -7,10 +7,8 @@
 #include <set>
 #include <sstream>
 
-#include "apps/output_file.hpp"
 #include "modules/core/text_table.hpp"
 #include "modules/evaluation/mesh/mesh_report.hpp"
-#include "modules/evaluation/trajectory_report.hpp"
 
 namespace km {
 namespace {
@@ -306,10 +304,6 @@ void to_json(Json& json, const TeamResult& team) {
     json["optimized_meshes"] = to_json(team.meshes.errors->after, {});
   }
   json["notes"] = team.notes;
-}
-
-void write_json(const std::filesystem::path& file, const TeamResult& team) {
-  write_output(file, [&](std::ostream& out) { out << json_text(team); });
 }
 
 }  // namespace km

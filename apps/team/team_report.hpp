@@ -1,6 +1,5 @@
 #pragma once
 
-#include <filesystem>
 #include <string>
 
 #include "apps/team/team_results.hpp"
@@ -17,8 +16,5 @@ namespace km {
 /// exit_signal, odometry: {...}, in_team_frame, notes}], optimized: {...}, closures: {...}, meshes:
 /// {...}, optimized_meshes: {...}, notes: [...]}; missing results have no key.
 void to_json(Json& json, const TeamResult& team);
-
-/// Throws std::runtime_error naming the file.
-void write_json(const std::filesystem::path& file, const TeamResult& team);
 
 }  // namespace km

@@ -19,7 +19,6 @@
 #include <string_view>
 #include <thread>
 
-#include "apps/viewer/page_files.hpp"
 #include "modules/core/json.hpp"
 #include "runtime/dds/participant.hpp"
 

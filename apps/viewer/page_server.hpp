@@ -3,12 +3,18 @@
 #include <functional>
 #include <memory>
 #include <set>
+#include <span>
 #include <string>
 
 #include "apps/viewer/view_store.hpp"
+#include "modules/charts/html_page.hpp"
 #include "modules/core/ids.hpp"
 
 namespace km {
+
+/// All files of the page: those in apps/viewer/page, the parts shared with other programs' pages,
+/// and three.js under the names that its modules import.
+[[nodiscard]] std::span<const PageFile> page_files();
 
 struct PageServerOptions {
   std::string address =

@@ -7,7 +7,6 @@
 #include <nlohmann/json.hpp>
 
 #include "modules/charts/html_page.hpp"
-#include "modules/charts/page_file.hpp"
 #include "modules/core/text_table.hpp"
 #include "modules/core/xml_text.hpp"
 

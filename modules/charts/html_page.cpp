@@ -1,11 +1,19 @@
 #include "modules/charts/html_page.hpp"
 
+#include <algorithm>
 #include <cstdint>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 
 #include "modules/core/xml_text.hpp"
 
 namespace km {
+
+std::string_view page_file(std::span<const PageFile> files, std::string_view path) {
+  const auto found = std::ranges::find(files, path, &PageFile::path);
+  if (found == files.end()) throw std::logic_error("no page file " + std::string(path));
+  return found->bytes;
+}
 
 std::string html_page(const HtmlPage& page) {
   std::string text =

@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "modules/view/view_content.hpp"
+
 namespace km {
 
 void ViewLayers::set(std::size_t layer, std::function<std::optional<ViewContent>()> newest) {

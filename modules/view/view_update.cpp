@@ -16,6 +16,12 @@ constexpr std::size_t kFeatureBytes = 2 * sizeof(float);
 constexpr std::size_t kObjectBytes = 1 + 7 * sizeof(float) + 1;
 constexpr std::size_t kTripleBytes = 3 * sizeof(std::uint16_t);
 
+bool is_value(RasterKind kind, std::uint8_t value) {
+  const std::uint8_t most =
+      kind == RasterKind::kOccupancy ? ViewRaster::kFree : ViewRaster::kFarthest;
+  return value <= most || value == ViewRaster::kUnknown;
+}
+
 void describe(auto& archive, As<ViewPose> auto& pose) {
   archive(pose.stamp);
   archive.single(pose.T_odom_body);
@@ -81,6 +87,26 @@ void describe(auto& archive, As<ViewRaster> auto& raster) {
 }
 
 }  // namespace
+
+bool is_valid(const ViewRaster& raster) {
+  const std::uint64_t cells = std::uint64_t{raster.width} * raster.height;
+  if (raster.width > ViewRaster::kMaxSide || raster.height > ViewRaster::kMaxSide || cells == 0 ||
+      cells > ViewRaster::kMaxCells || !(raster.resolution_m > 0.0F) || raster.runs.size() % 2 != 0)
+    return false;
+  std::uint64_t sum = 0;
+  for (std::size_t k = 0; k < raster.runs.size(); k += 2) {
+    if (raster.runs[k] == 0 || !is_value(raster.kind, raster.runs[k + 1])) return false;
+    sum += raster.runs[k];
+  }
+  return sum == cells;
+}
+
+std::vector<std::uint8_t> cells_of(const ViewRaster& raster) {
+  std::vector<std::uint8_t> cells;
+  for (std::size_t k = 0; k < raster.runs.size(); k += 2)
+    cells.insert(cells.end(), raster.runs[k], raster.runs[k + 1]);
+  return cells;
+}
 
 std::vector<std::uint8_t> encode_view(const ViewContent& content) {
   ArchiveWriter archive;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -12,12 +13,11 @@
 #include "modules/core/closure_verdicts.hpp"
 #include "modules/core/geometry.hpp"
 #include "modules/core/ids.hpp"
+#include "modules/core/label_palette.hpp"
 #include "modules/core/pose_graph.hpp"
 #include "modules/core/robot_sample.hpp"
 #include "modules/core/stamp.hpp"
 #include "modules/mesh/mesh_chunks.hpp"
-#include "modules/view/view_objects.hpp"
-#include "modules/view/view_raster.hpp"
 
 namespace km {
 
@@ -57,6 +57,57 @@ struct ViewImage {
   std::vector<std::uint8_t> jpeg = {};
   std::vector<std::array<float, 2>> features = {};  ///< Features in the small image [pixel].
 };
+
+/// Upright box of an object in `world`, see ObjectBox.
+struct ViewObject {
+  LabelId label = 0;
+  Eigen::Vector3f center = Eigen::Vector3f::Zero();  ///< [m]
+  float yaw_rad = 0.0F;
+  Eigen::Vector3f size_m = Eigen::Vector3f::Zero();
+  std::vector<RobotId> robots = {};  ///< Robots that saw it.
+};
+
+/// The objects of the team as one robot knows them; the newest list in a frame counts.
+struct ViewObjects {
+  RobotId anchor = 0;  ///< Robot whose odometry frame is `world`.
+  std::vector<ViewObject> objects = {};
+  std::uint32_t left_out = 0;  ///< Number of smaller objects for which there was no room.
+};
+
+enum class RasterKind : std::uint8_t {
+  kOccupancy,  ///< 2D map, in `world`.
+  kDistances,  ///< Slice of the distance field, in the odometry frame of the sending robot.
+};
+
+/// A horizontal grid of values; the newest of its kind counts. Smaller values are nearer to
+/// obstacles: where several cells become one, the smallest value remains.
+struct ViewRaster {
+  /// Value of an occupied cell of a 2D map, and of a point on a surface or behind it.
+  static constexpr std::uint8_t kOccupied = 0;
+  static constexpr std::uint8_t kFree = 1;  ///< Value of a free cell of a 2D map.
+  /// Value of a point at the largest distance of the field; values between are proportional to the
+  /// distance. With few values the runs are long.
+  static constexpr std::uint8_t kFarthest = 31;
+  static constexpr std::uint8_t kUnknown = 255;
+
+  static constexpr std::size_t kMaxCells = std::size_t{1} << 20U;
+  static constexpr std::uint32_t kMaxSide = 4096;  ///< [cells] Browsers draw no larger images.
+
+  RasterKind kind = RasterKind::kOccupancy;
+  RobotId anchor = 0;  ///< Robot whose odometry frame is `world`; of a slice: the sending robot.
+  float resolution_m = 0.05F;               ///< Side of a cell.
+  std::array<float, 3> origin = {0, 0, 0};  ///< Corner of cell (0, 0), and height [m].
+  std::uint32_t width = 0;                  ///< [cells] along x
+  std::uint32_t height = 0;                 ///< [cells] along y
+  /// Runs of equal cells, row by row, x first: pairs of a length (1 to 255) and a value.
+  std::vector<std::uint8_t> runs = {};
+};
+
+/// True if the raster has a size within the bounds, and runs of possible values for all its cells.
+[[nodiscard]] bool is_valid(const ViewRaster& raster);
+
+/// Values of the cells, row by row. Precondition: the raster is valid.
+[[nodiscard]] std::vector<std::uint8_t> cells_of(const ViewRaster& raster);
 
 using ViewContent = std::variant<RobotSample, ViewPose, ViewKeyframes, ViewClosures, MeshChunk,
                                  ViewImage, ViewObjects, ViewRaster>;

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "apps/lab/pgo/outlier_study.hpp"
-#include "modules/charts/plot.hpp"
+#include "modules/charts/chart_page.hpp"
 
 namespace km {
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "apps/lab/pgo/pcm_run.hpp"
-#include "modules/charts/plot.hpp"
+#include "modules/charts/chart_page.hpp"
 
 namespace km {
 

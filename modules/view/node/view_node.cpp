@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-#include "modules/view/view_image.hpp"
+#include "modules/view/view_content.hpp"
 #include "runtime/clock.hpp"
 #include "runtime/log.hpp"
 

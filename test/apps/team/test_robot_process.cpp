@@ -4,7 +4,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "apps/team/team_display.hpp"
+#include "apps/team/run_team.hpp"
 #include "test/support/temporary_folder.hpp"
 
 namespace km {

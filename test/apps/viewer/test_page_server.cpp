@@ -14,7 +14,6 @@
 #include <regex>
 #include <set>
 
-#include "apps/viewer/page_files.hpp"
 #include "apps/viewer/page_server.hpp"
 #include "test/apps/viewer/page_listener.hpp"
 #include "test/support/temporary_folder.hpp"

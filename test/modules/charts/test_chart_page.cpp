@@ -8,7 +8,6 @@
 #include <stdexcept>
 
 #include "modules/charts/html_page.hpp"
-#include "modules/charts/page_file.hpp"
 #include "test/apps/viewer/page_programs.hpp"
 #include "test/support/page_text.hpp"
 #include "test/support/temporary_folder.hpp"

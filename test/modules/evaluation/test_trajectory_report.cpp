@@ -1,4 +1,4 @@
-#include "modules/evaluation/trajectory_report.hpp"
+#include "modules/evaluation/trajectory_error.hpp"
 
 #include <catch2/catch.hpp>
 #include <nlohmann/json.hpp>

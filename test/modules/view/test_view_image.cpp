@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "modules/view/view_image.hpp"
+#include "modules/view/view_content.hpp"
 #include "test/support/image_file.hpp"
 
 namespace km {

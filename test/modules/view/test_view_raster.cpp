@@ -7,9 +7,7 @@
 #include <vector>
 
 #include "modules/core/distance_color.hpp"
-#include "modules/view/view_objects.hpp"
-#include "modules/view/view_raster.hpp"
-#include "modules/view/view_update.hpp"
+#include "modules/view/view_content.hpp"
 
 namespace km {
 namespace {

@@ -1,25 +1,41 @@
-#include "modules/view/view_raster.hpp"
+#include "modules/view/view_content.hpp"
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
+#include <opencv2/imgproc.hpp>
+#include <stdexcept>
 #include <utility>
 
 #include "modules/core/distance_color.hpp"
-#include "modules/view/view_update.hpp"
+#include "modules/images/image_codec.hpp"
+#include "modules/images/image_view.hpp"
 
 namespace km {
 namespace {
 
+// The rest of an update is room for the features and the head.
+constexpr std::size_t kMaxJpegBytes = kMaxViewBytes - 20000;
+constexpr std::size_t kMaxFeatures = 2000;
+
+std::vector<std::uint8_t> jpeg_of(const cv::Mat& image) {
+  for (const int quality : {60, 30, 10})
+    if (auto jpeg = encode_jpeg(image, quality); jpeg.size() <= kMaxJpegBytes) return jpeg;
+  return {};  // Even the smallest quality is too large, as for noise in a tall and narrow image.
+}
+
+constexpr std::size_t kObjectsHead_bytes = 16;
+
+// Upper bound on the bytes of an object in an update.
+std::size_t bytes_of(const MapObject& object) {
+  constexpr std::size_t kFixed = 1 + 7 * sizeof(float) + 3, kRobot = 3;
+  return kFixed + kRobot * object.robots.size();
+}
+
 constexpr std::size_t kRasterHead_bytes = 64;
 constexpr std::size_t kLongest_run = 255;
 constexpr double kMaxSliceCells = 1 << 26;
-
-bool is_value(RasterKind kind, std::uint8_t value) {
-  const std::uint8_t most =
-      kind == RasterKind::kOccupancy ? ViewRaster::kFree : ViewRaster::kFarthest;
-  return value <= most || value == ViewRaster::kUnknown;
-}
 
 // Cells of a raster that may still be too large.
 struct Cells {
@@ -75,24 +91,41 @@ float spacing_of(const std::vector<Eigen::Vector3f>& points) {
 
 }  // namespace
 
-bool is_valid(const ViewRaster& raster) {
-  const std::uint64_t cells = std::uint64_t{raster.width} * raster.height;
-  if (raster.width > ViewRaster::kMaxSide || raster.height > ViewRaster::kMaxSide || cells == 0 ||
-      cells > ViewRaster::kMaxCells || !(raster.resolution_m > 0.0F) || raster.runs.size() % 2 != 0)
-    return false;
-  std::uint64_t sum = 0;
-  for (std::size_t k = 0; k < raster.runs.size(); k += 2) {
-    if (raster.runs[k] == 0 || !is_value(raster.kind, raster.runs[k + 1])) return false;
-    sum += raster.runs[k];
+ViewImage view_image(const TrackedImage& image, const Camera& camera) {
+  const GrayImage& left = image.frame->left;
+  if (left.width <= 0 || left.height <= 0)
+    throw std::invalid_argument("view: an image without pixels");
+  const double scale = std::min(1.0, static_cast<double>(kMaxViewWidth) / left.width);
+  cv::Mat small = view(left);
+  if (scale < 1.0) cv::resize(small, small, {}, scale, scale, cv::INTER_AREA);
+  ViewImage result{image.frame->stamp, jpeg_of(small), {}};
+  for (const Eigen::Vector2d& bearing : image.bearings) {
+    const auto pixel = camera.project(bearing);
+    if (!pixel || !pixel->allFinite() || result.features.size() == kMaxFeatures) continue;
+    // Integer pixel coordinates are pixel centres.
+    const Eigen::Vector2f there = (scale * (pixel->array() + 0.5) - 0.5).matrix().cast<float>();
+    result.features.push_back({there.x(), there.y()});
   }
-  return sum == cells;
+  return result;
 }
 
-std::vector<std::uint8_t> cells_of(const ViewRaster& raster) {
-  std::vector<std::uint8_t> cells;
-  for (std::size_t k = 0; k < raster.runs.size(); k += 2)
-    cells.insert(cells.end(), raster.runs[k], raster.runs[k + 1]);
-  return cells;
+ViewObjects view_objects(const ObjectList& list) {
+  std::vector<const MapObject*> all;
+  for (const MapObject& object : list.objects) all.push_back(&object);
+  std::ranges::stable_sort(all, std::greater{},
+                           [](const MapObject* object) { return object->box.volume_m3(); });
+  ViewObjects view{.anchor = list.anchor};
+  std::size_t bytes = kObjectsHead_bytes;
+  for (const MapObject* const object : all) {
+    bytes += bytes_of(*object);
+    if (bytes > kMaxViewBytes) break;
+    const ObjectBox& box = object->box;
+    view.objects.push_back({object->label, box.center.cast<float>(),
+                            static_cast<float>(box.yaw_rad), box.size_m.cast<float>(),
+                            object->robots});
+  }
+  view.left_out = static_cast<std::uint32_t>(all.size() - view.objects.size());
+  return view;
 }
 
 std::optional<ViewRaster> view_raster(const OccupancyGrid& map) {
