@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <filesystem>
 #include <iostream>
-#include <limits>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -52,8 +51,6 @@ struct RenderCommand {
   std::vector<std::string> views = {"top"};
   std::string color = "auto";
   std::pair<int, int> size = {1600, 1200};
-  double above_m = std::numeric_limits<double>::infinity();
-  bool both_sides = false;
   fs::path palette, output;
 
   void define(CLI::App& app) {
@@ -79,8 +76,6 @@ struct RenderCommand {
         ->delimiter('x')
         ->type_name("WxH")
         ->check(CLI::Range(64, 8192));
-    app.add_option("--cut", above_m, "Leave out all above this height [m]");
-    app.add_flag("--both-sides", both_sides, "Also draw faces that are seen from behind");
     app.add_option(
         "--palette", palette,
         "Names and colours of the labels (CSV); default: label_palette.csv beside the mesh");
@@ -109,12 +104,9 @@ struct RenderCommand {
       for (const Eigen::Vector3d& point :
            scene.lines.emplace_back(line_of(file, T_picture_mesh)).points)
         extent.extend(point);
-    PictureOptions options;
-    options.color = color_of(color, placed);
-    options.cut = {!both_sides, above_m};
     for (std::size_t i = 0; i < views.size(); ++i) {
       const PictureView view = parse_view(views[i], extent, size.first, size.second);
-      write_png(numbered(output, i), draw_meshes(scene, view, options));
+      write_png(numbered(output, i), draw_meshes(scene, view, color_of(color, placed)));
       std::cout << numbered(output, i).string() << '\n';
     }
   }
@@ -127,7 +119,6 @@ and trajectories on top
 Faces are seen from the side they were mapped from: from above one looks into rooms. Views:
   top, front, oblique     parallel, fill the picture
   x,y,z,yaw,pitch         perspective from there [m, deg]: yaw 90 looks along y, pitch -30 down
-  x,y,z,qx,qy,qz,qw       pose of the camera (its z forward, y down)
 Write --view=-1,... for one that begins with a minus sign.
 
 A team's frame is the odometry frame of the robot with the lowest id, so upright. --reference

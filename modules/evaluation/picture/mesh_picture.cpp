@@ -97,22 +97,18 @@ constexpr int kFiner = 2;  // drawn this many times larger in both directions, t
 constexpr double kInFront_m = 0.05;
 constexpr LabelledMesh::Color kClay = {214, 210, 200};
 constexpr LabelledMesh::Color kUnknown = {150, 150, 150};
-constexpr std::array<LabelledMesh::Color, 8> kRobots = {{{230, 97, 80},
-                                                         {80, 150, 220},
-                                                         {110, 190, 90},
-                                                         {180, 130, 210},
-                                                         {250, 170, 70},
-                                                         {70, 200, 210},
-                                                         {170, 125, 110},
-                                                         {240, 140, 200}}};
-constexpr std::array<LabelledMesh::Color, 8> kLines = {{{214, 39, 40},
-                                                        {31, 119, 180},
-                                                        {20, 120, 20},
-                                                        {148, 40, 189},
-                                                        {255, 127, 14},
-                                                        {0, 160, 180},
-                                                        {110, 60, 50},
-                                                        {227, 60, 180}}};
+// Colours of robots and of lines, 0xRRGGBB.
+constexpr std::array kRobots = {0xE66150, 0x5096DC, 0x6EBE5A, 0xB482D2,
+                                0xFAAA46, 0x46C8D2, 0xAA7D6E, 0xF08CC8};
+constexpr std::array kLines = {0xD62728, 0x1F77B4, 0x147814, 0x9428BD,
+                               0xFF7F0E, 0x00A0B4, 0x6E3C32, 0xE33CB4};
+
+// Colour of element i of a list.
+LabelledMesh::Color color_in(const std::array<int, 8>& list, std::size_t i) {
+  const auto rgb = static_cast<std::uint32_t>(list[i % list.size()]);
+  return {static_cast<std::uint8_t>(rgb >> 16U), static_cast<std::uint8_t>(rgb >> 8U),
+          static_cast<std::uint8_t>(rgb)};
+}
 
 cv::Vec3b bgr(const LabelledMesh::Color& color) {
   return {color[2], color[1], color[0]};
@@ -132,7 +128,7 @@ std::vector<LabelledMesh::Color> colors_of(const PictureScene& scene, std::size_
   const LabelledMesh& mesh = scene.meshes[i];
   const std::size_t count = mesh.vertices.size();
   if (color == PictureColor::kShade) return std::vector(count, kClay);
-  if (color == PictureColor::kRobot) return std::vector(count, kRobots[i % kRobots.size()]);
+  if (color == PictureColor::kRobot) return std::vector(count, color_in(kRobots, i));
   if (color == PictureColor::kOwn) {
     if (mesh.colors.size() != count)
       throw std::invalid_argument(name_of(scene, i) + ": its vertices have no colours");
@@ -181,9 +177,9 @@ std::vector<LegendEntry> legend_of(const PictureScene& scene, const LabelledMesh
   if (color == PictureColor::kLabel) entries = label_entries(mesh, surface, scene.palette);
   if (color == PictureColor::kRobot)
     for (std::size_t i = 0; i < scene.meshes.size(); ++i)
-      entries.push_back({name_of(scene, i), bgr(kRobots[i % kRobots.size()]), false});
+      entries.push_back({name_of(scene, i), bgr(color_in(kRobots, i)), false});
   for (std::size_t i = 0; i < scene.lines.size(); ++i)
-    entries.push_back({scene.lines[i].name, bgr(kLines[i % kLines.size()]), true});
+    entries.push_back({scene.lines[i].name, bgr(color_in(kLines, i)), true});
   return entries;
 }
 
@@ -227,23 +223,22 @@ void draw_path(cv::Mat3b& picture, const PictureLine& line, const cv::Vec3b& col
 
 }  // namespace
 
-cv::Mat3b draw_meshes(const PictureScene& scene, const PictureView& view,
-                      const PictureOptions& options) {
+cv::Mat3b draw_meshes(const PictureScene& scene, const PictureView& view, PictureColor color) {
   std::vector<LabelledMesh::Color> colors;
   for (std::size_t i = 0; i < scene.meshes.size(); ++i) {
-    const auto own = colors_of(scene, i, options.color);
+    const auto own = colors_of(scene, i, color);
     colors.insert(colors.end(), own.begin(), own.end());
   }
   const LabelledMesh mesh = merged(scene);
   const PictureView finer = view.enlarged(kFiner);
-  const SurfaceImage surface = rasterise(mesh, finer, options.cut);
-  cv::Mat3b large = paint(mesh, surface, finer, colors, options.color == PictureColor::kOwn);
-  shade(large, mesh, surface, finer, options.occlusion_m);
+  const SurfaceImage surface = rasterise(mesh, finer);
+  cv::Mat3b large = paint(mesh, surface, finer, colors, color == PictureColor::kOwn);
+  shade(large, mesh, surface, finer);
   cv::Mat3b picture;
   cv::resize(large, picture, {view.width, view.height}, 0, 0, cv::INTER_AREA);
   for (std::size_t i = 0; i < scene.lines.size(); ++i)
-    draw_path(picture, scene.lines[i], bgr(kLines[i % kLines.size()]), view);
-  const cv::Mat3b legend = draw_legend(legend_of(scene, mesh, surface, options.color), view);
+    draw_path(picture, scene.lines[i], bgr(color_in(kLines, i)), view);
+  const cv::Mat3b legend = draw_legend(legend_of(scene, mesh, surface, color), view);
   if (!legend.empty()) picture.push_back(legend);
   return picture;
 }

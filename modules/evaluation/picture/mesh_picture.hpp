@@ -47,17 +47,11 @@ struct PictureScene {
   LabelPalette palette;
 };
 
-struct PictureOptions {
-  PictureColor color = PictureColor::kLabel;
-  SurfaceCut cut;
-  double occlusion_m = 0.8;  ///< Distance within which surface shades a point.
-};
-
 /// Shaded picture of the meshes from `view`. Below are a scale bar (parallel views only) and a
 /// legend of the visible labels, of the meshes if these are coloured one by one, and of the lines.
 /// The picture is as wide as the view, and higher by the legend. Throws std::invalid_argument if no
 /// mesh has a face, and if a mesh lacks the requested labels or colours. Uses OpenCV's threads.
 [[nodiscard]] cv::Mat3b draw_meshes(const PictureScene& scene, const PictureView& view,
-                                    const PictureOptions& options = {});
+                                    PictureColor color);
 
 }  // namespace km

@@ -44,17 +44,8 @@ PictureView filled(const Eigen::AlignedBox3d& extent, const Eigen::Matrix3d& R_c
   return view;
 }
 
-PictureView perspective(const SE3& T_world_cam, int width, int height) {
-  PictureView view;
-  view.width = width;
-  view.height = height;
-  view.perspective = true;
-  view.scale = 0.5 * width / std::tan(0.5 * kFieldOfView);
-  view.T_cam_world = T_world_cam.inverse();
-  return view;
-}
-
-std::optional<std::vector<double>> numbers_in(const std::string& text) {
+// The pose of a camera from "x,y,z,yaw,pitch".
+std::optional<SE3> pose_in(const std::string& text) {
   std::vector<double> numbers;
   std::istringstream stream(text);
   for (std::string word; std::getline(stream, word, ',');) {
@@ -62,27 +53,14 @@ std::optional<std::vector<double>> numbers_in(const std::string& text) {
     numbers.push_back(std::strtod(word.c_str(), &end));
     if (word.empty() || *end != '\0' || !std::isfinite(numbers.back())) return std::nullopt;
   }
-  return numbers;
-}
-
-std::optional<SE3> pose_in(const std::string& text) {
-  const auto numbers = numbers_in(text);
-  if (!numbers || (numbers->size() != 5 && numbers->size() != 7)) return std::nullopt;
-  const auto& n = *numbers;
-  const Eigen::Vector3d position(n[0], n[1], n[2]);
-  if (n.size() == 7) {
-    const Eigen::Quaterniond q(n[6], n[3], n[4], n[5]);
-    if (std::abs(q.norm() - 1.0) > 0.01) return std::nullopt;
-    return make_pose(q.normalized().toRotationMatrix(), position);
-  }
-  const double yaw = n[3] * kRadians;
-  const double pitch = n[4] * kRadians;
+  if (numbers.size() != 5) return std::nullopt;
+  const double yaw = numbers[3] * kRadians, pitch = numbers[4] * kRadians;
   const Eigen::Vector3d forward(std::cos(yaw) * std::cos(pitch), std::sin(yaw) * std::cos(pitch),
                                 std::sin(pitch));
   // The up vector is perpendicular to `forward`, so that a view straight down has one too.
   const Eigen::Vector3d up(-std::cos(yaw) * std::sin(pitch), -std::sin(yaw) * std::sin(pitch),
                            std::cos(pitch));
-  return make_pose(looking(forward, up).transpose(), position);
+  return make_pose(looking(forward, up).transpose(), {numbers[0], numbers[1], numbers[2]});
 }
 
 }  // namespace
@@ -144,9 +122,12 @@ PictureView parse_view(const std::string& text, const Eigen::AlignedBox3d& exten
   }
   const auto T_world_cam = pose_in(text);
   if (!T_world_cam)
-    throw std::invalid_argument("no view '" + text +
-                                "': top, front, oblique, x,y,z,yaw,pitch or x,y,z,qx,qy,qz,qw");
-  return perspective(*T_world_cam, width, height);
+    throw std::invalid_argument("no view '" + text + "': top, front, oblique or x,y,z,yaw,pitch");
+  return {.width = width,
+          .height = height,
+          .T_cam_world = T_world_cam->inverse(),
+          .perspective = true,
+          .scale = 0.5 * width / std::tan(0.5 * kFieldOfView)};
 }
 
 }  // namespace km

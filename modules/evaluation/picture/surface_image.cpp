@@ -15,7 +15,7 @@ using Corners = std::array<Eigen::Vector3d, 3>;
 
 class Rasteriser {
  public:
-  Rasteriser(const PictureView& view, const SurfaceCut& cut) : view_(view), cut_(cut) {
+  explicit Rasteriser(const PictureView& view) : view_(view) {
     image_.width = view.width;
     image_.height = view.height;
     const auto pixels =
@@ -25,9 +25,7 @@ class Rasteriser {
   }
 
   void draw(const Corners& world, std::uint32_t face) {
-    if (world[0].z() > cut_.above_m && world[1].z() > cut_.above_m && world[2].z() > cut_.above_m)
-      return;
-    if (cut_.back_faces && from_behind(world)) return;
+    if (from_behind(world)) return;
     if (!view_.perspective) {
       draw_projected({view_.project(world[0]), view_.project(world[1]), view_.project(world[2])},
                      face);
@@ -102,22 +100,18 @@ class Rasteriser {
   void put(int column, int row, double depth_m, std::uint32_t face) {
     const std::size_t at = image_.at(column, row);
     if (static_cast<float>(depth_m) >= image_.depth_m[at]) return;
-    if (std::isfinite(cut_.above_m) &&
-        view_.unproject(column + 0.5, row + 0.5, depth_m).z() > cut_.above_m)
-      return;
     image_.depth_m[at] = static_cast<float>(depth_m);
     image_.faces[at] = face;
   }
 
   const PictureView& view_;
-  const SurfaceCut& cut_;
   SurfaceImage image_;
 };
 
 }  // namespace
 
-SurfaceImage rasterise(const LabelledMesh& mesh, const PictureView& view, const SurfaceCut& cut) {
-  Rasteriser rasteriser(view, cut);
+SurfaceImage rasterise(const LabelledMesh& mesh, const PictureView& view) {
+  Rasteriser rasteriser(view);
   for (std::size_t face = 0; face < mesh.faces.size(); ++face) {
     const auto [a, b, c] = mesh.faces[face];
     rasteriser.draw({mesh.vertices[a].cast<double>(), mesh.vertices[b].cast<double>(),
@@ -132,8 +126,9 @@ namespace {
 constexpr double kAmbient = 0.62;  // share of ambient light
 constexpr double kDirect = 0.48;   // share of light from the upper left
 constexpr double kOcclusion = 0.95;
-constexpr double kLine = 0.45;  // factor on the light at a line
-constexpr int kDirections = 8;  // directions of the search around each pixel
+constexpr double kOcclusion_m = 0.8;  // distance within which surface shades a point
+constexpr double kLine = 0.45;        // factor on the light at a line
+constexpr int kDirections = 8;        // directions of the search around each pixel
 constexpr int kRings = 3;
 constexpr double kMaxReach_px = 60.0;
 constexpr double kMinReach_px = 4.0;
@@ -175,9 +170,8 @@ void for_each_pixel(const SurfaceImage& surface, const Use& use) {
 
 class Shader {
  public:
-  Shader(const LabelledMesh& mesh, const SurfaceImage& surface, const PictureView& view,
-         double occlusion_m)
-      : mesh_(mesh), surface_(surface), view_(view), occlusion_m_(occlusion_m) {
+  Shader(const LabelledMesh& mesh, const SurfaceImage& surface, const PictureView& view)
+      : mesh_(mesh), surface_(surface), view_(view) {
     points_.resize(surface.faces.size());
     for_each_pixel(surface, [&](int column, int row) {
       const std::size_t at = surface.at(column, row);
@@ -233,8 +227,8 @@ class Shader {
   [[nodiscard]] double occlusion(int column, int row, const Eigen::Vector3d& normal) const {
     const Eigen::Vector3d here = point(column, row);
     const double reach_px =
-        std::clamp(occlusion_m_ / metres_per_px(column, row), kMinReach_px, kMaxReach_px);
-    const double reach_m = std::max(occlusion_m_, reach_px * metres_per_px(column, row));
+        std::clamp(kOcclusion_m / metres_per_px(column, row), kMinReach_px, kMaxReach_px);
+    const double reach_m = std::max(kOcclusion_m, reach_px * metres_per_px(column, row));
     double sum = 0.0;
     for (const Eigen::Vector2d& offset : around_) {
       const int x = column + static_cast<int>(std::lround(reach_px * offset.x()));
@@ -270,7 +264,6 @@ class Shader {
   const LabelledMesh& mesh_;
   const SurfaceImage& surface_;
   const PictureView& view_;
-  double occlusion_m_;
   Eigen::Vector3d light_;
   std::vector<Eigen::Vector3f> points_;  // points in the world, of pixels that show a face
   std::vector<Eigen::Vector2d> around_;  // at most one long
@@ -305,8 +298,8 @@ cv::Mat3b paint(const LabelledMesh& mesh, const SurfaceImage& surface, const Pic
 }
 
 void shade(cv::Mat3b& picture, const LabelledMesh& mesh, const SurfaceImage& surface,
-           const PictureView& view, double occlusion_m) {
-  const Shader shader(mesh, surface, view, occlusion_m);
+           const PictureView& view) {
+  const Shader shader(mesh, surface, view);
   for_each_pixel(surface, [&](int column, int row) {
     cv::Vec3b& pixel = picture(row, column);
     const double light = shader.light(column, row);

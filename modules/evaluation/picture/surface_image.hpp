@@ -26,17 +26,9 @@ struct SurfaceImage {
   }
 };
 
-/// Parts that are not drawn.
-struct SurfaceCut {
-  /// Faces seen from behind; without them one can look into a room through its ceiling.
-  bool back_faces = false;
-  /// Points with a larger z are not drawn.
-  double above_m = std::numeric_limits<double>::infinity();
-};
-
-/// Draws the faces into a depth buffer. O(faces + pixels covered).
-[[nodiscard]] SurfaceImage rasterise(const LabelledMesh& mesh, const PictureView& view,
-                                     const SurfaceCut& cut = {});
+/// Draws the faces that are seen from their front into a depth buffer, so that one can look into a
+/// room through its ceiling. O(faces + pixels covered).
+[[nodiscard]] SurfaceImage rasterise(const LabelledMesh& mesh, const PictureView& view);
 
 /// Colours of the surface without light: blue, green, red, one per pixel; white without a face.
 /// `vertex_colors` is as long as the mesh's vertices. With `blend`, colours are interpolated
@@ -45,9 +37,9 @@ struct SurfaceCut {
                               const PictureView& view,
                               const std::vector<LabelledMesh::Color>& vertex_colors, bool blend);
 
-/// Shows the shape by light from the upper left, ambient occlusion over `occlusion_m` (surface in a
-/// corner or close below other surface is darker), and lines at jumps of depth.
+/// Shows the shape by light from the upper left, ambient occlusion (surface in a corner or close
+/// below other surface is darker), and lines at jumps of depth.
 void shade(cv::Mat3b& picture, const LabelledMesh& mesh, const SurfaceImage& surface,
-           const PictureView& view, double occlusion_m);
+           const PictureView& view);
 
 }  // namespace km

@@ -18,10 +18,8 @@ cv::Mat3b draw(const std::vector<LabelledMesh>& meshes, PictureColor color,
   scene.meshes = meshes;
   scene.palette = kPalette;
   scene.lines = std::move(lines);
-  PictureOptions options;
-  options.color = color;
   const Eigen::AlignedBox3d box(Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(4, 4, 1));
-  return draw_meshes(scene, parse_view("top", box, 200, 200), options);
+  return draw_meshes(scene, parse_view("top", box, 200, 200), color);
 }
 
 // Which of red, green, blue is strongest; -1 for grey.
@@ -147,24 +145,13 @@ TEST_CASE("A triangle covers the pixels whose centres it contains", "[mesh_pictu
   CHECK(std::abs(static_cast<double>(covered(image)) - 300.0) <= 20.0);  // half of 30 x 20
 }
 
-TEST_CASE("Back faces and surface above the cut are not drawn", "[mesh_picture]") {
+TEST_CASE("Faces that are seen from behind are not drawn", "[mesh_picture]") {
   LabelledMesh ceiling = triangle(5.0F);
   std::swap(ceiling.faces[0][1], ceiling.faces[0][2]);  // visible from below
   LabelledMesh mesh = triangle(2.0F);
   mesh.append(ceiling);
-  const auto drawn = [&](const SurfaceCut& cut) {  // the nearer face is in front
-    const SurfaceImage image = rasterise(mesh, from_above(), cut);
-    return image.faces[image.at(65, 25)];
-  };
-  CHECK(drawn({}) == 1);
-  CHECK(drawn({true, 10.0}) == 0);
-  CHECK(drawn({false, 4.0}) == 0);
-  CHECK(drawn({false, 1.0}) == SurfaceImage::kNone);
-  // A slope is cut at the height.
-  const LabelledMesh slope = rectangle({-2, -2, -2}, {4, 0, 4}, {0, 4, 0}, 1);
-  const SurfaceImage image = rasterise(slope, from_above(), {false, 0.0});
-  CHECK(image.faces[image.at(48, 40)] != SurfaceImage::kNone);
-  CHECK(image.faces[image.at(52, 40)] == SurfaceImage::kNone);
+  const SurfaceImage image = rasterise(mesh, from_above());
+  CHECK(image.faces[image.at(65, 25)] == 0);
 }
 
 TEST_CASE("Perspective shows depth along z and clips surface behind the viewer", "[mesh_picture]") {

@@ -47,9 +47,6 @@ TEST_CASE("A view from a position has the direction of yaw and pitch", "[mesh_pi
   CHECK(down.project({1, 2, 0}).isApprox(Eigen::Vector3d(100, 50, 3)));
   CHECK(down.project({2, 2, 0}).y() < 50.0);  // ahead is up
   CHECK(down.project({1, 3, 0}).x() < 100.0);
-  // A camera's pose, z forward and y down, looking along y.
-  const PictureView pose = parse_view("1,2,3,-0.70710678,0,0,0.70710678", kBox, 200, 100);
-  CHECK((pose.T_cam_world.matrix() - view.T_cam_world.matrix()).norm() < 1e-6);
 }
 
 TEST_CASE("Pixels and depths are projected back to their points", "[mesh_picture]") {
@@ -65,8 +62,8 @@ TEST_CASE("Pixels and depths are projected back to their points", "[mesh_picture
 }
 
 TEST_CASE("Other views are refused with their text", "[mesh_picture]") {
-  for (const char* text : {"", "up", "1,2,3", "1,2,3,4,x", "1,2,3,4,5,6", "1,2,3,0,0,0,2",
-                           "1,,3,4,5", "nan,0,0,0,0"}) {
+  for (const char* text :
+       {"", "up", "1,2,3", "1,2,3,4,x", "1,2,3,4,5,6", "1,,3,4,5", "nan,0,0,0,0"}) {
     CAPTURE(text);
     CHECK_THROWS_WITH(parse_view(text, kBox, 100, 100),
                       Catch::StartsWith("no view '" + std::string(text) + "'"));
