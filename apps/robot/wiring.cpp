@@ -508,7 +508,7 @@ void Robot::add_view(const RobotConfig& config, const std::optional<Camera>& cam
     return;
   }
   Topics& t = topics_;
-  view_ = &add<ViewNode>(false, config.view, participant_, ViewMesh(), camera,
+  view_ = &add<ViewNode>(false, config.view, participant_, camera,
                          ViewTopics{.odometry = t.odometry,
                                     .keyframes = t.keyframe_odometry,
                                     .outcomes = t.outcomes,

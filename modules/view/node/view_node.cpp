@@ -39,8 +39,7 @@ constexpr double kUnlimited = std::numeric_limits<double>::infinity();
 }  // namespace
 
 ViewNode::ViewNode(const ViewConfig& config, const DdsParticipant& participant,
-                   const ViewMesh& mesh, const std::optional<Camera>& camera,
-                   const ViewTopics& topics)
+                   const std::optional<Camera>& camera, const ViewTopics& topics)
     // A slow link may block the socket for long.
     : WorkerNode({.name = ViewConfig::kSection,
                   .queue = kQueue,
@@ -50,14 +49,12 @@ ViewNode::ViewNode(const ViewConfig& config, const DdsParticipant& participant,
       config_(checked(config)),
       participant_(participant),
       self_(participant.identity().robot),
-      mesh_settings_(mesh),
       camera_(camera),
       channels_{{{writer_on(participant, ViewChannel::kView), budget_of(config.bytes_per_s)},
                  {writer_on(participant, ViewChannel::kMesh), budget_of(config.mesh_bytes_per_s())},
                  {writer_on(participant, ViewChannel::kImages), budget_of(kUnlimited)}}},
       past_budget_(budget_of(config.past_bytes_per_s())),
       selector_(self_),
-      schedule_(mesh.min_move_m),
       layers_(self_, kLayerShare * config.mesh_bytes_per_s()) {
   follow(topics.odometry, topics.keyframes, topics.outcomes, topics.restored_outcomes,
          topics.closures, topics.restarts, topics.objects, topics.maps_2d);
@@ -169,7 +166,7 @@ void ViewNode::cut_mesh(double now_s) {
   const double begin_s = steady_now_s();
   is_cut_ = true;
   try {
-    schedule_.update(split_mesh(*mesh_.mesh, self_, mesh_.anchor, mesh_settings_.grid).chunks);
+    schedule_.update(split_mesh(*mesh_.mesh, self_, mesh_.anchor, ChunkGrid()).chunks);
   } catch (const std::invalid_argument& error) {
     log::limited(log::Level::kWarn, name(), "mesh") << "a mesh is not sent: " << error.what();
   }

@@ -34,12 +34,6 @@ struct ViewTopics {
   In<TrackedImage> images;
 };
 
-/// Parameters for splitting the mesh into chunks.
-struct ViewMesh {
-  ChunkGrid grid;
-  double min_move_m = kMinChunkMove_m;  ///< See differ().
-};
-
 /// A mesh in the frame of the robot `anchor`.
 struct ViewMeshOffer {
   RobotId anchor = 0;
@@ -61,7 +55,7 @@ class ViewNode final : public WorkerNode<ViewInput> {
  public:
   /// `participant` outlives this. Throws ConfigError if `config` is out of bounds. `camera` belongs
   /// to the images; without it no images are sent.
-  ViewNode(const ViewConfig& config, const DdsParticipant& participant, const ViewMesh& mesh,
+  ViewNode(const ViewConfig& config, const DdsParticipant& participant,
            const std::optional<Camera>& camera, const ViewTopics& topics);
   ~ViewNode() override { stop(); }
 
@@ -130,7 +124,6 @@ class ViewNode final : public WorkerNode<ViewInput> {
   const ViewConfig config_;
   const DdsParticipant& participant_;
   const RobotId self_;
-  const ViewMesh mesh_settings_;
   const std::optional<Camera> camera_;
   std::array<Channel, 3> channels_;
   std::uint64_t moves_ = 0;  // Moves of the participant to which the writers belong.
@@ -140,7 +133,7 @@ class ViewNode final : public WorkerNode<ViewInput> {
   bool is_cut_ = true;  // True if `mesh_` is in the schedule.
   double cut_due_s_ = 0.0;
   std::atomic<bool> sends_mesh_ = false;  // True if the mesh channel has a reader.
-  ChunkSchedule schedule_;
+  ChunkSchedule schedule_{kMinChunkMove_m};
   ViewLayers layers_;
   std::atomic<bool> are_images_asked_ = false;
 };

@@ -34,17 +34,6 @@ using Shown = std::vector<std::pair<std::uint64_t, std::uint32_t>>;
 
 }  // namespace
 
-TEST_CASE("A second process with the id of an active robot is not shown", "[view]") {
-  Page page;
-  for (std::uint32_t second = 0; second < 40; ++second) {
-    page.send(kFirst, second, second);
-    if (second >= 3 && second < 8) page.send(kSecond, 1000 + second, second + 0.5);
-  }
-  for (const auto& [boot, keyframe] : page.shown) CHECK(boot == kFirst);
-  CHECK(page.shown.size() == 40);
-  CHECK(page.incumbents.dropped() == 5);
-}
-
 TEST_CASE("A resumed robot is shown from its beginning once the former process is silent",
           "[view]") {
   Page page;

@@ -88,21 +88,6 @@ TEST_CASE("A viewer receives the updates of robots in order", "[view]") {
   CHECK(w.listener.refused() == 0);
 }
 
-TEST_CASE("A robot detects new viewers", "[view]") {
-  Watching w;
-  REQUIRE(w.is_read(ViewChannel::kView));
-  ViewWriter& writer = w.publisher.on(ViewChannel::kView);
-  CHECK(writer.newcomers() == 1);
-  CHECK(writer.newcomers() == 0);
-  {
-    const ViewListener other(w.domain);
-    REQUIRE(w.is_read(ViewChannel::kView, 2));
-    CHECK(writer.newcomers() == 1);
-  }
-  REQUIRE(w.is_read(ViewChannel::kView, 1));
-  CHECK(writer.newcomers() == 0);
-}
-
 TEST_CASE("A viewer ignores a second robot with a taken id", "[view]") {
   Watching w;
   Publisher twin(w.domain, 7, 1000);

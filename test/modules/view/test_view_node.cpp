@@ -22,7 +22,7 @@ constexpr double kDt_s = 0.1;  // Time between two ticks.
 struct Watched {
   explicit Watched(const ViewConfig& config = {})
       : participant(domain, {.robot = kSelf, .name = "alpha", .boot = 9}),
-        node(config, participant, {}, camera(),
+        node(config, participant, camera(),
              {.odometry = odometry,
               .keyframes = keyframes,
               .outcomes = outcomes,

@@ -127,25 +127,6 @@ TEST_CASE("Keyframes of odometry are sent once, several at a time", "[view]") {
   CHECK(watcher.odometry.at(0).anchor == kSelf);
 }
 
-TEST_CASE("Changed optimised poses are sent, all of them in another frame", "[view]") {
-  Selector selector;
-  Watcher watcher;
-  std::vector<SE3> poses = line(100);
-  selector.set_trajectory(poses);
-  receive_all(selector, watcher, 0.0);
-  CHECK(watcher.optimized_received == 100);
-  poses[40].translation().y() += 1.0;
-  selector.set_trajectory(poses);
-  selector.add(PoseChanges{kSelf, {{{9, 3}, SE3::Identity(), {}}}});  // held pose of another robot
-  receive_all(selector, watcher, 10.0);
-  CHECK(watcher.optimized_received == 101);
-  check_within_bounds(watcher, poses, kSelf);
-  selector.set_trajectory(poses, 9);
-  receive_all(selector, watcher, 20.0);
-  CHECK(watcher.optimized_received == 201);
-  check_within_bounds(watcher, poses, 9);
-}
-
 TEST_CASE("Each sample is sent once, the last one also to a late viewer", "[view]") {
   ViewSelector selector(kSelf);
   Watcher watcher, late;
