@@ -61,19 +61,6 @@ struct ViewerOptions {
   std::optional<double> rate;
 };
 
-// ADDRESS:PORT sets both; an IPv6 address has more than one colon.
-void split_port(PageServerOptions& server) {
-  const std::size_t colon = server.address.find(':');
-  if (colon == std::string::npos || colon != server.address.rfind(':')) return;
-  const char* const end = server.address.data() + server.address.size();
-  std::uint16_t port = 0;
-  const auto [rest, error] = std::from_chars(server.address.data() + colon + 1, end, port);
-  if (error != std::errc() || rest != end)
-    throw CLI::ValidationError("--listen", server.address + ": the port is not from 0 to 65535");
-  server.port = port;
-  server.address.resize(colon);
-}
-
 void define(CLI::App& app, ViewerOptions& options) {
   app.footer(kFooter);
   CLI::Option* const results = app.add_option("RESULTS", options.results, "Results of a run");
@@ -99,19 +86,15 @@ void define(CLI::App& app, ViewerOptions& options) {
       ->check(CLI::Range(0, 65535))
       ->capture_default_str();
   app.add_option("--listen", options.server.address,
-                 "Address of this host to listen on, or ADDRESS:PORT; 0.0.0.0 for all. Except for "
-                 "loopback addresses, the URL has a token")
+                 "Address of this host to listen on; 0.0.0.0 for all. Except for loopback "
+                 "addresses, the URL has a token")
       ->capture_default_str();
   app.add_option("--memory", options.memory_MB,
                  "Memory for messages [MB]. Beyond it the oldest images, then the oldest replaced "
                  "meshes, are discarded")
       ->check(CLI::Range(10.0, 1e6))
       ->capture_default_str();
-  app.add_option("--page", options.server.page_folder,
-                 "Folder with files of the page, for work on them")
-      ->check(CLI::ExistingDirectory);
-  app.callback([&options, results, domain] {
-    split_port(options.server);
+  app.callback([results, domain] {
     if (results->count() + domain->count() == 0)
       throw CLI::ValidationError("give RESULTS of a run, or --domain of a team that runs");
   });

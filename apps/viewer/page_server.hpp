@@ -1,14 +1,21 @@
 #pragma once
 
+#include <atomic>
 #include <functional>
+#include <map>
 #include <memory>
+#include <mutex>
 #include <set>
 #include <span>
 #include <string>
+#include <string_view>
 
 #include "apps/viewer/view_store.hpp"
 #include "modules/charts/html_page.hpp"
 #include "modules/core/ids.hpp"
+
+struct mg_connection;
+struct mg_context;
 
 namespace km {
 
@@ -17,12 +24,9 @@ namespace km {
 [[nodiscard]] std::span<const PageFile> page_files();
 
 struct PageServerOptions {
-  std::string address =
-      "127.0.0.1";          ///< Address to listen on; if not loopback, URLs need the token.
-  int port = 8777;          ///< Port to listen on; 0: any free port.
-  std::string page_folder;  ///< Folder with the files of the page, except for three.js; empty: all
-                            ///< files are those embedded in the program.
-  std::string hello;        ///< See hello_message().
+  std::string address = "127.0.0.1";  ///< If not a loopback address, URLs need the token.
+  int port = 8777;                    ///< 0: any free port.
+  std::string hello;                  ///< See hello_message().
   /// Called with the robots whose images some page requests, when this set has changed. Calls are
   /// in the order of the changes, by one thread at a time.
   std::function<void(const std::set<RobotId>&)> on_images;
@@ -41,12 +45,29 @@ class PageServer {
   PageServer& operator=(const PageServer&) = delete;
 
   /// Address to open in a browser, with the token if there is one.
-  [[nodiscard]] const std::string& url() const { return url_; }
+  [[nodiscard]] std::string url() const;
 
  private:
-  class Impl;
-  std::unique_ptr<Impl> impl_;
-  std::string url_;
+  struct Page;
+
+  [[nodiscard]] std::string prefix() const { return token_.empty() ? "/" : '/' + token_ + '/'; }
+  void start();
+  bool is_allowed(const mg_connection* connection) const;
+  int serve(mg_connection* connection) const;
+  void open(mg_connection* connection);
+  void send_messages(mg_connection* connection, const Page& page);
+  void receive(mg_connection* connection, int bits, std::string_view text);
+  void change_requests(const std::function<void()>& change);
+  [[nodiscard]] std::set<RobotId> requested() const;
+  void close(const mg_connection* connection);
+
+  ViewStore& store_;
+  const PageServerOptions options_;
+  const std::string token_;
+  std::atomic<bool> stopping_ = false;
+  mg_context* context_ = nullptr;
+  std::mutex mutex_;  // guards the members below
+  std::map<const mg_connection*, std::shared_ptr<Page>> pages_;
 };
 
 }  // namespace km

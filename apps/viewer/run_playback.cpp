@@ -18,6 +18,7 @@
 #include "modules/mesh/mesh_chunks.hpp"
 #include "modules/mesh/mesh_file.hpp"
 #include "modules/objects/object_file.hpp"
+#include "modules/view/view_content.hpp"
 #include "modules/view/view_selector.hpp"
 
 namespace km {

@@ -64,12 +64,7 @@ TEST_CASE("The viewer refuses unusable input", "[viewer]") {
   CHECK_THAT(run_command(kViewer).output, Catch::Contains("--domain of a team that runs"));
   CHECK(run_command(kViewer + " --domain 7 x").exit_code == 2);
   CHECK(run_command(kViewer + " --help").exit_code == 0);
-  for (const auto& [address, exit_code] :
-       {std::pair{"127.0.0.1:99999", 2}, {"127.0.0.1:http", 2}, {"203.0.113.7:8777", 1}}) {
-    CAPTURE(address);
-    CHECK(run_command(kViewer + " --domain 7 --interface lo --listen " + address).exit_code ==
-          exit_code);
-  }
+  CHECK(run_command(kViewer + " --domain 7 --interface lo --listen 203.0.113.7").exit_code == 1);
 }
 
 }  // namespace

@@ -51,22 +51,6 @@ TEST_CASE("A state is sent with its members' names", "[page_message]") {
   CHECK(message["sent_bytes"] == json::parse(R"({"pgo": 1234.0})"));
 }
 
-TEST_CASE("Poses are position and quaternion, x first", "[page_message]") {
-  const Eigen::Quaterniond turn(0.8, 0.0, 0.0, 0.6);
-  const json message = text_of(
-      {0, 1, 0, ViewKeyframes{true, 2, 9, {make_pose(turn.toRotationMatrix(), {1.00004, 2, -3})}}});
-  CHECK(message["optimized"] == true);
-  CHECK(message["anchor"] == 2);
-  CHECK(message["first"] == 9);
-  CHECK(message["T_world_kf"] == json::parse("[[1, 2, -3, 0, 0, 0.6, 0.8]]"));
-}
-
-TEST_CASE("A closure is sent with its verdict and the reason", "[page_message]") {
-  const ViewClosure closure{closure_id({1, 2}, {0, 4}), ClosureStatus::kRejected, 30, 8, "too far"};
-  CHECK(text_of({0, 1, 0, ViewClosures{{closure}}})["closures"] ==
-        json::parse(R"([[0, 4, 1, 2, "rejected", 30, 8, "too far"]])"));
-}
-
 TEST_CASE("A mesh is sent as its arrays, one after the other", "[page_message]") {
   MeshChunk chunk{.key = {3, {-1, 0, 7}, 2}, .anchor = 1};
   chunk.offsets = {{1, 2, 3}, {4, 5, 6}, {7, 8, 65535}};
@@ -98,37 +82,37 @@ TEST_CASE("Updates of every kind are the same for the page after encoding and de
   }
 }
 
-TEST_CASE("An object is sent with its label, box and robots", "[page_message]") {
+TEST_CASE("Poses, closures and objects are lists of numbers", "[page_message]") {
+  const Eigen::Quaterniond turn(0.8, 0.0, 0.0, 0.6);
+  const json poses = text_of(
+      {0, 1, 0, ViewKeyframes{true, 2, 9, {make_pose(turn.toRotationMatrix(), {1.00004, 2, -3})}}});
+  CHECK(poses["optimized"] == true);
+  CHECK(poses["anchor"] == 2);
+  CHECK(poses["first"] == 9);
+  CHECK(poses["T_world_kf"] == json::parse("[[1, 2, -3, 0, 0, 0.6, 0.8]]"));
+  const ViewClosure closure{closure_id({1, 2}, {0, 4}), ClosureStatus::kRejected, 30, 8, "too far"};
+  CHECK(text_of({0, 1, 0, ViewClosures{{closure}}})["closures"] ==
+        json::parse(R"([[0, 4, 1, 2, "rejected", 30, 8, "too far"]])"));
   const ViewObjects objects{
       .anchor = 2, .objects = {{7, {1, -2, 0.5F}, 0.25F, {2, 1, 1.5F}, {0, 3}}}, .left_out = 4};
   const json message = text_of({0, 1, 0, objects});
-  CHECK(message["anchor"] == 2);
   CHECK(message["left_out"] == 4);
   CHECK(message["objects"] == json::parse("[[7, [1, -2, 0.5], 0.25, [2, 1, 1.5], [0, 3]]]"));
 }
 
-TEST_CASE("A raster is sent as its runs", "[page_message]") {
-  const ViewRaster raster{.kind = RasterKind::kDistances,
-                          .anchor = 2,
-                          .resolution_m = 0.25F,
-                          .origin = {1, 2, 3},
-                          .width = 5,
-                          .height = 1,
-                          .runs = {5, 31}};
+TEST_CASE("A raster is sent as its runs, an image after its features", "[page_message]") {
+  const ViewRaster raster{
+      .kind = RasterKind::kDistances, .origin = {1, 2, 3}, .width = 5, .runs = {5, 31}};
   const auto [object, data] = parts_of(page_message({0, 1, 0, raster}, 1));
   CHECK(object["layer"] == "distances");
-  CHECK(object["anchor"] == 2);
   CHECK(object["origin"] == json::parse("[1, 2, 3]"));
   CHECK(object["width"] == 5);
   CHECK(data == "\x05\x1f");
-}
-
-TEST_CASE("An image follows its features", "[page_message]") {
   const ViewImage image{0, {0xff, 0xd8}, {{1.5F, 2.5F}}};
-  const auto [object, data] = parts_of(page_message({0, 1, 0, image}, 1));
-  CHECK(object["features"] == 1);
-  CHECK(data.size() == 8 + 2);
-  CHECK(data.substr(8) == "\xff\xd8");
+  const auto [head, bytes] = parts_of(page_message({0, 1, 0, image}, 1));
+  CHECK(head["features"] == 1);
+  CHECK(bytes.size() == 8 + 2);
+  CHECK(bytes.substr(8) == "\xff\xd8");
 }
 
 }  // namespace

@@ -28,7 +28,8 @@ struct Answer {
 
 int port_of(const PageServer& server) {
   std::smatch found;
-  REQUIRE(std::regex_search(server.url(), found, std::regex(":([0-9]+)/")));
+  const std::string url = server.url();
+  REQUIRE(std::regex_search(url, found, std::regex(":([0-9]+)/")));
   return std::stoi(found[1]);
 }
 

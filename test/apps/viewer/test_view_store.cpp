@@ -1,7 +1,6 @@
 #include <catch2/catch.hpp>
 
 #include <nlohmann/json.hpp>
-#include <thread>
 
 #include "apps/viewer/view_store.hpp"
 
@@ -144,13 +143,6 @@ TEST_CASE("A raster replaces the former one of its kind, and a repetition is ign
   store.add(raster(RasterKind::kOccupancy, 1401));
   ViewStore::Cursor page;
   CHECK(numbers(store.take(page, 1'000'000, 0.0)) == Numbers{1, 2});
-}
-
-TEST_CASE("A page waits for new messages", "[view_store]") {
-  ViewStore store(5000);
-  std::jthread sender([&] { store.add(pose(3)); });
-  ViewStore::Cursor page;
-  CHECK(numbers(store.take(page, 1000, 60.0)) == Numbers{0});
 }
 
 }  // namespace
