@@ -1,7 +1,6 @@
 #include "apps/team/closure_images.hpp"
 
 #include <algorithm>
-#include <array>
 #include <exception>
 #include <functional>
 #include <opencv2/imgproc.hpp>
@@ -22,44 +21,22 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Closures by kind; the kind to show first comes first.
-using Kinds = std::array<std::vector<ClosureId>, 3>;
-
-Kinds kinds_of(const std::vector<RobotResult>& robots) {
+// The verified closures that show most come first: those that were rejected, those between robots,
+// then those of one robot.
+std::vector<ClosureId> verified_closures(const std::vector<RobotResult>& robots) {
   std::map<ClosureId, ClosureStage> stages;  // two robots may have the same candidate
   for (const RobotResult& robot : robots)
     for (const ClosureRecord& closure : robot.closures) {
       ClosureStage& stage = stages[closure.id];
       stage = std::max(stage, closure.stage);
     }
-  Kinds kinds;
-  for (const auto& [id, stage] : stages)
-    if (stage >= ClosureStage::kVerified)
-      kinds[stage == ClosureStage::kVerified ? 0
-            : id.from.robot != id.to.robot   ? 1
-                                             : 2]
-          .push_back(id);
-  return kinds;
-}
-
-// Keyframes of at most `max_closures` closures; `notes` receives the number of closures left out.
-std::set<KeyframeId> keyframes_to_show(const Kinds& kinds, std::size_t max_closures,
-                                       std::vector<std::string>& notes) {
-  std::set<KeyframeId> keyframes;
-  std::size_t shown = 0, all = 0;
-  for (const std::vector<ClosureId>& kind : kinds) {
-    const std::size_t count = std::min(kind.size(), max_closures - shown);
-    for (std::size_t k = 0; k < count; ++k) {
-      const ClosureId& closure = kind[k * kind.size() / count];
-      keyframes.insert({closure.from, closure.to});
-    }
-    shown += count;
-    all += kind.size();
-  }
-  if (shown < all)
-    notes.push_back("images are shown of " + std::to_string(shown) + " of " + std::to_string(all) +
-                    " closures that were verified");
-  return keyframes;
+  std::erase_if(stages, [](const auto& one) { return one.second < ClosureStage::kVerified; });
+  std::vector<ClosureId> closures;
+  for (const auto& [id, stage] : stages) closures.push_back(id);
+  std::ranges::stable_sort(closures, {}, [&](const ClosureId& id) {
+    return stages.at(id) == ClosureStage::kVerified ? 0 : id.from.robot != id.to.robot ? 1 : 2;
+  });
+  return closures;
 }
 
 // Wanted: keyframes whose left images are requested, by stamp. Take: function called with each of
@@ -120,8 +97,14 @@ std::string small_jpeg(const cv::Mat& image, const ClosureImageOptions& options)
 ClosureImages closure_images(const std::vector<RobotResult>& robots,
                              const ClosureImageOptions& options) {
   ClosureImages images;
-  const std::set<KeyframeId> shown =
-      keyframes_to_show(kinds_of(robots), options.max_closures, images.notes);
+  std::vector<ClosureId> closures = verified_closures(robots);
+  if (closures.size() > options.max_closures) {
+    images.notes.push_back("images are shown of " + std::to_string(options.max_closures) + " of " +
+                           std::to_string(closures.size()) + " closures that were verified");
+    closures.resize(options.max_closures);
+  }
+  std::set<KeyframeId> shown;
+  for (const ClosureId& closure : closures) shown.insert({closure.from, closure.to});
   for (const RobotResult& robot : robots) {
     Wanted wanted;
     for (const KeyframeRecord& keyframe : robot.keyframes)

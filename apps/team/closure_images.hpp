@@ -24,8 +24,7 @@ struct ClosureImages {
 /// Images of both keyframes of every closure that was kept, or verified and then rejected. They are
 /// read from the recordings that the plans name: EuRoC folders, and bags with the --rig of their
 /// robot. If there are more than `max_closures`, rejected closures come first, then closures
-/// between robots, then closures of one robot. From the last kind shown, evenly spaced ones are
-/// taken. An unreadable recording adds a note.
+/// between robots, then closures of one robot. An unreadable recording adds a note.
 [[nodiscard]] ClosureImages closure_images(const std::vector<RobotResult>& robots,
                                            const ClosureImageOptions& options = {});
 

@@ -80,11 +80,9 @@ Json from_above(const std::vector<StampedPose>& path, const std::vector<PoseHole
 Json position_error(const RobotPaths& paths, const std::vector<StampedPose>& estimate,
                     const std::vector<PoseHole>& holes, Stamp first) {
   if (paths.truth.empty() || estimate.empty()) return Json::array();
-  const TrajectoryErrorOptions options;
   const TimeWindow window{paths.truth.front().stamp, paths.truth.back().stamp};
   return broken_line(
-      associate(paths.truth, estimate, window, options.max_gap_s, options.max_difference_s), holes,
-      [first](const PosePair& pair) -> Json {
+      associate(paths.truth, estimate, window), holes, [first](const PosePair& pair) -> Json {
         return {in_thousandths(seconds_between(first, pair.stamp)),
                 (pair.T_truth_body.translation() - pair.T_estimate_body.translation()).norm()};
       });

@@ -69,17 +69,6 @@ TEST_CASE("If there are too many closures, the rejected ones come first, and a n
   CHECK(images.notes[0] == "images are shown of 2 of 3 closures that were verified");
 }
 
-TEST_CASE("If there are many closures of a kind, those shown are spread over them",
-          "[closure_images]") {
-  const EurocFolder recording;
-  std::vector<RobotResult> robots{robot_on(recording.root(), 0)};
-  for (KeyframeIndex k = 0; k < 8; k += 2)
-    robots[0].closures.push_back(closure({0, k}, {0, k + 1}, ClosureStage::kInlier));
-  const ClosureImages images = closure_images(robots, {.max_closures = 2, .width_px = 16});
-  CHECK(images.jpegs.size() == 4);
-  CHECK((images.jpegs.contains({0, 0}) && images.jpegs.contains({0, 4})));
-}
-
 TEST_CASE("A recording that is gone is a note, a pose graph none", "[closure_images]") {
   const EurocFolder recording;
   std::vector<RobotResult> robots{robot_on(recording.root(), 0), robot_on("/no/such/place", 1),

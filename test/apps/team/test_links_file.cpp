@@ -46,18 +46,6 @@ std::pair<double, double> trace(const LinkPlan& link, double time_s) {
 
 }  // namespace
 
-TEST_CASE("An empty file of links makes perfect ones", "[links]") {
-  LinkScript script = LinkedTeam().script("");
-  CHECK(script.robots == 3);
-  REQUIRE(script.links.size() == 9);
-  CHECK_FALSE(script.link(0, 1).trace.has_limit());
-  CHECK(script.link(0, 1).trace.delay_s(5.0) == 0.0);
-  CHECK(script.link(0, 1).loss == 0.0);
-  CHECK(script.link(0, 1).outages.empty());
-  CHECK(script.partitions.empty());
-  CHECK(script.paths.empty());
-}
-
 TEST_CASE("Keys of a pair override keys of all links", "[links]") {
   LinkScript script = LinkedTeam().script(
       "seed: 7\nloss: 0.1\ndelay_s: 0.02\njitter_s: 0.01\nrate_bytes_per_s: 1000\n"

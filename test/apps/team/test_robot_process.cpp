@@ -89,16 +89,6 @@ TEST_CASE("A process does not outlive its owner", "[team]") {
   CHECK(kill(child, 0) != 0);
 }
 
-TEST_CASE("A process whose owner is destroyed ends in order", "[team]") {
-  const TemporaryFolder folder;
-  {
-    Script script("trap 'echo ended > " + (folder.path() / "diary").string() +
-                  "; exit 0' TERM; echo ready; while :; do sleep 0.02; done");
-    while (script.lines.empty()) script.read_once();
-  }
-  CHECK(folder.read("diary") == "ended\n");
-}
-
 TEST_CASE("A process that was asked to end is not asked again", "[team]") {
   const TemporaryFolder folder;
   {
