@@ -14,6 +14,7 @@
 #include "apps/output_file.hpp"
 #include "modules/core/json.hpp"
 #include "modules/core/text_table.hpp"
+#include "modules/evaluation/association.hpp"
 #include "modules/evaluation/closure_truth.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
 #include "modules/recorded_graph/g2o_io.hpp"
@@ -53,7 +54,7 @@ struct Edges {
 
   void add(const std::filesystem::path& folder, std::span<const StampedPose> true_poses) {
     for (const KeyframeRecord& keyframe : read_keyframes(folder / "keyframes.csv"))
-      if (const auto T = true_pose_at(true_poses, keyframe.stamp)) truth[keyframe.id] = *T;
+      if (const auto T = pose_at(true_poses, keyframe.stamp)) truth[keyframe.id] = *T;
     for (const RelativePose& e : read_g2o(folder / "pose_graph.g2o").edges) {
       const bool step = e.from.robot == e.to.robot && e.to.index == e.from.index + 1;
       if (step)

@@ -38,10 +38,6 @@ struct TrajectoryCommand {
     app.add_option("--delta", options.rpe_delta_s, "Time of the relative error [s]")
         ->check(CLI::PositiveNumber)
         ->capture_default_str();
-    app.add_option("--coverage-gap", options.max_coverage_gap_s,
-                   "Poses further apart leave the time between uncovered [s]")
-        ->check(CLI::NonNegativeNumber)
-        ->capture_default_str();
     files.define(app, "the numbers", "truth and estimates from above");
   }
 

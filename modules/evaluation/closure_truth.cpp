@@ -32,15 +32,6 @@ double share(std::size_t part, std::size_t whole) {
   return static_cast<double>(part) / static_cast<double>(whole);
 }
 
-void check(const ClosureTruthOptions& options) {
-  if (!(options.max_translation_m > 0.0) || !(options.max_rotation_deg > 0.0))
-    throw std::invalid_argument("score_closures: a limit of the error is not positive");
-  if (!(options.min_overlap > 0.0) || !(options.min_overlap <= 1.0))
-    throw std::invalid_argument("score_closures: min_overlap is not within (0, 1]");
-  if (!(options.default_depth_m > 0.0))
-    throw std::invalid_argument("score_closures: default_depth_m is not positive");
-}
-
 // The grid of an image as bearings on z = 1, without pixels for which the lens has no bearing.
 std::vector<Eigen::Vector3d> grid_of(const Camera& camera) {
   std::vector<Eigen::Vector3d> bearings;
@@ -178,8 +169,8 @@ double ClosureScores::frame_recall(const StageScore& stage) const {
 
 ClosureScores score_closures(std::span<const TrueKeyframe> keyframes,
                              std::span<const ClosureRecord> closures, const Camera& camera,
-                             const ClosureTruthOptions& options) {
-  check(options);
+                             const ClosureTruthOptions& limits) {
+  const ClosureTruthOptions options = checked(limits);
   const Places places(keyframes, camera, options);
   const std::set<ClosureId> true_pairs = places.true_pairs();
   StageCounter candidates(true_pairs), verified(true_pairs), inliers(true_pairs);
@@ -226,8 +217,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kMaxTruthGap_s = 0.1;  // longest interpolated gap, as for trajectories
-constexpr double kMaxTruthDifference_s = 0.01;
 constexpr std::size_t kPoseColumn = 8;
 // Largest stamp for which differences of stamps cannot overflow.
 constexpr Stamp kMaxKeyframeStamp = std::numeric_limits<Stamp>::max() / 2;
@@ -320,8 +309,7 @@ std::vector<TrueKeyframe> place_keyframes(std::span<const KeyframeRecord> keyfra
                                           std::span<const StampedPose> truth) {
   std::vector<TrueKeyframe> placed;
   for (const KeyframeRecord& keyframe : keyframes)
-    if (const auto T_world_body =
-            pose_at(truth, keyframe.stamp, kMaxTruthGap_s, kMaxTruthDifference_s))
+    if (const auto T_world_body = pose_at(truth, keyframe.stamp))
       placed.push_back({keyframe.id, *T_world_body, keyframe.scene_depth_m});
   return placed;
 }

@@ -36,6 +36,8 @@ struct ClosureRecord {
 
 /// Conditions under which a closure counts as true.
 struct ClosureTruthOptions {
+  static constexpr const char* kSection = "closure_truth";
+
   double max_translation_m = 0.5;
   double max_rotation_deg = 5.0;
   double min_overlap = 0.3;
@@ -113,7 +115,8 @@ struct ClosureScores {
 /// closure between them, in either direction.
 ///
 /// `camera` is the left one of every robot. Throws std::invalid_argument for a repeated keyframe, a
-/// closure past kVerified without a pose, and options out of range. O(k^2) for k keyframes.
+/// closure past kVerified without a pose, and ConfigError for options out of range. O(k^2) for k
+/// keyframes.
 [[nodiscard]] ClosureScores score_closures(std::span<const TrueKeyframe> keyframes,
                                            std::span<const ClosureRecord> closures,
                                            const Camera& camera,

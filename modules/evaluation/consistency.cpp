@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "modules/core/lie.hpp"
+#include "modules/evaluation/association.hpp"
 #include "modules/evaluation/statistics.hpp"
 
 namespace km {
@@ -63,7 +64,7 @@ SE3 place_in_truth(std::span<const ConsistencyInput> inputs, bool upright) {
       }
   if (origin_of == nullptr) throw std::invalid_argument("no pose has a covariance");
   const StampedPose& pose = origin_of->estimate[origin];
-  const auto truth = true_pose_at(origin_of->truth, pose.stamp);
+  const auto truth = pose_at(origin_of->truth, pose.stamp);
   if (!truth)
     throw std::invalid_argument(origin_of->name + ": the truth has no pose at the origin");
   const SE3 T = *truth * pose.T.inverse();
@@ -90,7 +91,7 @@ std::vector<Consistency> consistency(std::span<const ConsistencyInput> inputs, b
     Sample sample;
     for (std::size_t k = 0; k < input.covariances.size(); ++k) {
       const StampedPose& pose = input.estimate[k];
-      const auto truth = true_pose_at(input.truth, pose.stamp);
+      const auto truth = pose_at(input.truth, pose.stamp);
       if (!truth || input.covariances[k].trace() <= of_origin) continue;
       sample.add(se3_log((T_truth_world * pose.T).inverse() * *truth), input.covariances[k]);
     }

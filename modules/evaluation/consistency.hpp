@@ -9,7 +9,6 @@
 #include "modules/core/geometry.hpp"
 #include "modules/core/pose_graph.hpp"
 #include "modules/core/stamped_pose.hpp"
-#include "modules/evaluation/trajectory_error.hpp"
 
 namespace km {
 
@@ -33,13 +32,6 @@ struct Consistency {
   double median = 0.0;           ///< Median NEES of the pose over the median of chi-squared.
   double share_within_95 = 0.0;  ///< Share of poses whose error lies in their 95 % region.
 };
-
-/// The true pose at `stamp`, within the limits of TrajectoryErrorOptions.
-[[nodiscard]] inline std::optional<SE3> true_pose_at(std::span<const StampedPose> truth,
-                                                     Stamp stamp) {
-  const TrajectoryErrorOptions limits;
-  return pose_at(truth, stamp, limits.max_gap_s, limits.max_difference_s);
-}
 
 /// Compares the errors of all robots with their covariances. The frame of the team is placed in the
 /// truth by its origin: the pose with the smallest covariance. If `upright`, both frames have z up,

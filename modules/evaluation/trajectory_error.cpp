@@ -43,12 +43,10 @@ std::vector<double> segment_lengths(double path_m) {
   return lengths;
 }
 
-SegmentErrors segment_errors(std::span<const PosePair> pairs, std::span<const double> lengths_m,
-                             double scale) {
+SegmentErrors segment_errors(std::span<const PosePair> pairs, double scale) {
   SegmentErrors errors;
   const std::vector<double> at_m = distances(pairs);
-  for (const double length_m : lengths_m) {
-    if (!(length_m > 0.0)) throw std::invalid_argument("segment_errors: a length is not positive");
+  for (const double length_m : segment_lengths(at_m.empty() ? 0.0 : at_m.back())) {
     std::size_t j = 0;
     bool used = false;
     for (std::size_t i = 0; i < pairs.size(); ++i) {
@@ -65,18 +63,14 @@ SegmentErrors segment_errors(std::span<const PosePair> pairs, std::span<const do
     }
     if (used) errors.lengths_m.push_back(length_m);
   }
-  std::sort(errors.lengths_m.begin(), errors.lengths_m.end());
   return errors;
-}
-
-SegmentErrors segment_errors(std::span<const PosePair> pairs, double scale) {
-  const std::vector<double> at_m = distances(pairs);
-  return segment_errors(pairs, segment_lengths(at_m.empty() ? 0.0 : at_m.back()), scale);
 }
 
 namespace {
 
 constexpr std::size_t kMinPairs = 3;
+constexpr double kMaxCoverageGap_s = 2.0;  // largest interval between poses that is covered
+constexpr double kSurroundings_m = 5.0;
 
 void append(std::vector<double>& to, const std::vector<double>& from) {
   to.insert(to.end(), from.begin(), from.end());
@@ -157,20 +151,9 @@ void add_relative_errors(std::span<const PosePair> pairs, const Alignment& align
   }
 }
 
-void check(const TrajectoryErrorOptions& options) {
-  for (const double value :
-       {options.max_gap_s, options.max_difference_s, options.max_coverage_gap_s})
-    if (!(value >= 0.0) || !(value < 1e9))
-      throw std::invalid_argument("trajectory_error: a time limit is negative or not a number");
-  if (!(options.rpe_delta_s > 0.0))
-    throw std::invalid_argument("trajectory_error: rpe_delta_s is not positive");
-}
-
-std::vector<PosePair> associate(const TrajectoryInput& input, const TrajectoryErrorOptions& options,
-                                std::size_t least) {
+std::vector<PosePair> associate(const TrajectoryInput& input, std::size_t least) {
   if (input.truth.empty()) throw std::invalid_argument(input.name + ": the truth holds no pose");
-  auto pairs = associate(input.truth, input.estimate, window_of(input), options.max_gap_s,
-                         options.max_difference_s);
+  auto pairs = associate(input.truth, input.estimate, window_of(input));
   if (pairs.size() < least)
     throw std::invalid_argument(input.name + ": only " + std::to_string(pairs.size()) + " of its " +
                                 std::to_string(input.estimate.size()) +
@@ -205,12 +188,13 @@ Alignment align(std::span<const PosePair> pairs, bool with_scale) {
 
 TeamError trajectory_error(std::span<const TrajectoryInput> inputs,
                            const TrajectoryErrorOptions& options) {
-  check(options);
+  if (!(options.rpe_delta_s > 0.0))
+    throw std::invalid_argument("trajectory_error: rpe_delta_s is not positive");
   if (inputs.empty()) throw std::invalid_argument("trajectory_error: no estimate");
   std::vector<std::vector<PosePair>> pairs;
   std::vector<PosePair> all;
   for (const TrajectoryInput& input : inputs) {
-    pairs.push_back(associate(input, options, kMinPairs));
+    pairs.push_back(associate(input, kMinPairs));
     all.insert(all.end(), pairs.back().begin(), pairs.back().end());
   }
 
@@ -224,7 +208,7 @@ TeamError trajectory_error(std::span<const TrajectoryInput> inputs,
     errors.segments = segment_errors(pairs[r], team.alignment.scale);
     const TimeWindow window = window_of(inputs[r]);
     errors.poses = inputs[r].estimate.size();
-    errors.covered_s = covered_seconds(inputs[r].estimate, window, options.max_coverage_gap_s);
+    errors.covered_s = covered_seconds(inputs[r].estimate, window, kMaxCoverageGap_s);
     errors.window_s = seconds_between(window.from, window.to);
     team.robots.push_back(summary(inputs[r].name, errors));
     joint.append(errors);
@@ -233,18 +217,17 @@ TeamError trajectory_error(std::span<const TrajectoryInput> inputs,
   return team;
 }
 
-SE3 align_surroundings(std::span<const TrajectoryInput> inputs, double radius_m,
-                       const TrajectoryErrorOptions& options) {
+SE3 align_surroundings(std::span<const TrajectoryInput> inputs) {
   std::vector<PosePair> around;
   for (const TrajectoryInput& input : inputs) {
-    const auto pairs = associate(input, options, 0);
+    const auto pairs = associate(input, 0);
     if (pairs.empty())
       throw std::invalid_argument(input.name + ": none of its " +
                                   std::to_string(input.estimate.size()) +
                                   " poses falls on the truth's time");
     for (const PosePair& pair : pairs)
       for (int axis = 0; axis < 3; ++axis)
-        for (const double side_m : {-radius_m, radius_m}) {
+        for (const double side_m : {-kSurroundings_m, kSurroundings_m}) {
           const Eigen::Vector3d point = side_m * Eigen::Vector3d::Unit(axis);
           PosePair& added = around.emplace_back();
           added.T_truth_body.translation() = pair.T_truth_body * point;

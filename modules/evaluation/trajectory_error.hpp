@@ -24,19 +24,14 @@ struct SegmentErrors {
 /// empty for a path below 2 cm.
 [[nodiscard]] std::vector<double> segment_lengths(double path_m);
 
-/// For every pair i and every length, j is the first pair after i at which the true path, summed
-/// over the positions in between, has at least that length. With E = (T_truth_i^-1 T_truth_j)^-1
-/// (T_estimate_i^-1 T_estimate_j), the errors are |t(E)| and angle(E) divided by the true path from
-/// i to j.
+/// For every pair i and each of the segment_lengths() of the true path, j is the first pair after i
+/// at which the true path, summed over the positions in between, has at least that length. With
+/// E = (T_truth_i^-1 T_truth_j)^-1 (T_estimate_i^-1 T_estimate_j), the errors are |t(E)| and
+/// angle(E) divided by the true path from i to j.
 ///
 /// This follows the odometry benchmark of Geiger et al., "Are we ready for Autonomous Driving?",
 /// CVPR 2012, Sec. 2.5. The benchmark starts at every tenth frame and divides by the nominal
-/// length. `scale` multiplies the positions of the estimate. Throws std::invalid_argument for a
-/// length that is not positive. O(n) per length.
-[[nodiscard]] SegmentErrors segment_errors(std::span<const PosePair> pairs,
-                                           std::span<const double> lengths_m, double scale = 1.0);
-
-/// Errors over segment_lengths() of the pairs' true path.
+/// length. `scale` multiplies the positions of the estimate. O(n) per length.
 [[nodiscard]] SegmentErrors segment_errors(std::span<const PosePair> pairs, double scale = 1.0);
 
 /// p_truth = scale * T_truth_estimate.linear() * p_estimate + T_truth_estimate.translation().
@@ -57,13 +52,8 @@ struct Alignment {
 
 /// Options of trajectory_error().
 struct TrajectoryErrorOptions {
-  bool with_scale = false;  ///< Align by a similarity instead of a rigid transform.
-  double max_gap_s = 0.1;   ///< Poses further apart are not interpolated.
-  /// Largest difference to the nearest pose if there are no neighbours to interpolate.
-  double max_difference_s = 0.01;
+  bool with_scale = false;   ///< Align by a similarity instead of a rigid transform.
   double rpe_delta_s = 1.0;  ///< Time over which relative errors are taken.
-  /// Largest interval between estimated poses that counts as covered.
-  double max_coverage_gap_s = 2.0;
 };
 
 /// One estimate with its truth; both ascending and outliving the call.
@@ -105,20 +95,19 @@ struct TeamError {
 /// is the ratio of the sums.
 ///
 /// Throws std::invalid_argument with the name of the estimate if it shares fewer than three poses
-/// with its truth. Throws it also if there is no input and for options out of range.
+/// with its truth. Throws it also if there is no input and if rpe_delta_s is not positive.
 [[nodiscard]] TeamError trajectory_error(std::span<const TrajectoryInput> inputs,
                                          const TrajectoryErrorOptions& options = {});
 
 /// The rigid transform T_truth_estimate that best moves the surroundings of the robots to their
 /// true position. It minimises the squared distance between six points around each estimated pose,
-/// `radius_m` from it along its axes, and the same points around the true pose. align() uses only
+/// 5 m from it along its axes, and the same points around the true pose. align() uses only
 /// positions. These leave the roll of a map undetermined if the path was straight, and determine
 /// its rotation poorly if the path is short. All estimates are moved by the one transform.
 ///
 /// Throws std::invalid_argument with the name of the estimate if it shares no pose with its truth,
 /// and if there is no input.
-[[nodiscard]] SE3 align_surroundings(std::span<const TrajectoryInput> inputs, double radius_m = 5.0,
-                                     const TrajectoryErrorOptions& options = {});
+[[nodiscard]] SE3 align_surroundings(std::span<const TrajectoryInput> inputs);
 
 /// A table for people with one line per estimate, and one for the team if there are several.
 /// Positions are in metres, angles in degrees, completeness in percent. Missing relative errors are

@@ -61,20 +61,6 @@ void check_comparable(const LabelledMesh& mesh, const std::string& name) {
   if (!(area > 0.0)) refuse("its faces have no area");
 }
 
-void check(const MeshErrorOptions& options) {
-  const auto positive = [](double value, const char* what) {
-    if (!(value > 0.0) || !std::isfinite(value))
-      throw std::invalid_argument(std::string(what) + " must be positive, not " +
-                                  std::to_string(value));
-  };
-  positive(options.samples_per_m2, "samples per square metre");
-  positive(static_cast<double>(options.max_samples), "the largest number of samples");
-  positive(options.crop_m, "the crop distance");
-  positive(options.label_distance_m, "the distance up to which labels are judged");
-  positive(options.registration.reach_m, "the reach of registration");
-  positive(options.registration.gate_m, "the gate of registration");
-}
-
 constexpr std::size_t kChunk = 1U << 18;  // points between two reports of progress
 
 Eigen::Vector3f normal_of(const LabelledMesh& mesh, std::uint32_t face) {
@@ -180,7 +166,6 @@ class Evaluation {
         robots_(robots),
         options_(options),
         progress_(progress) {
-    check(options);
     check_comparable(truth, "truth");
     if (inputs_.empty()) throw std::invalid_argument("no estimated mesh");
     double area = 0.0;
@@ -210,8 +195,8 @@ class Evaluation {
   }
 
  private:
-  void report_progress(std::string_view stage, double share) const {
-    if (progress_) progress_(stage, share);
+  void begin(std::string_view stage) const {
+    if (progress_) progress_(stage, 0.0);
   }
 
   void place(const SE3& T_truth_estimate) {
@@ -248,15 +233,14 @@ class Evaluation {
   }
 
   void register_estimates() {
-    report_progress("registering", 0.0);
+    begin("registering");
     const double per_m2 = std::min(per_m2_, kRegistrationPerM2);
     const auto estimates = sampled_estimates(per_m2);
-    const SurfaceSamples truth = sampled_truth(per_m2, options_.registration.reach_m, estimates);
+    const SurfaceSamples truth = sampled_truth(per_m2, kRegistrationReach_m, estimates);
     const NearestSurface nearest(truth_, truth);
     OrientedPoints all;
     for (std::size_t i = 0; i < estimates.size(); ++i) all.add(moved_[i], estimates[i]);
-    report_.registration =
-        register_mesh(truth_, nearest, all, SE3::Identity(), options_.registration);
+    report_.registration = register_mesh(truth_, nearest, all);
     note_registration(report_.registration);
     report_.registration.T_truth_estimate =
         report_.registration.T_truth_estimate * options_.T_truth_estimate;
@@ -288,7 +272,7 @@ class Evaluation {
 
   // Samples both sides with the same density, below max_samples.
   void sample() {
-    report_progress("sampling", 0.0);
+    begin("sampling");
     for (;;) {
       estimates_ = sampled_estimates(per_m2_);
       true_samples_ = sampled_truth(per_m2_, options_.crop_m, estimates_);
@@ -331,7 +315,7 @@ class Evaluation {
   }
 
   [[nodiscard]] PointMatches matches_of_truth(std::size_t input) const {
-    report_progress("indexing the estimate", 0.0);
+    begin("indexing the estimate");
     const NearestSurface nearest(moved_[input], estimates_[input]);
     return match_points({truth_, true_samples_}, {moved_[input], estimates_[input]}, nearest,
                         options_.crop_m, "true points to " + inputs_[input].name, progress_);
@@ -392,7 +376,7 @@ class Evaluation {
   }
 
   void compare_estimates() {
-    report_progress("indexing the truth", 0.0);
+    begin("indexing the truth");
     const NearestSurface nearest(truth_, true_samples_);
     for (std::size_t state = 0; state < reports_.size(); ++state) compare_estimates(nearest, state);
   }
@@ -461,10 +445,6 @@ class Evaluation {
 
 double LabelScore::accuracy() const {
   return ratio(right, points());
-}
-
-double LabelScore::accuracy_of_known() const {
-  return ratio(right, right + wrong);
 }
 
 void LabelScore::add(const LabelScore& other) {

@@ -36,10 +36,8 @@ struct LabelScore {
 
   [[nodiscard]] std::size_t points() const { return right + wrong + unknown; }
 
-  /// Share of right labels among all points, unknown included, or among the known ones. NaN if
-  /// there are none.
+  /// Share of right labels among all points, unknown included; NaN if there are none.
   [[nodiscard]] double accuracy() const;
-  [[nodiscard]] double accuracy_of_known() const;
   void add(const LabelScore& other);
 };
 
@@ -72,7 +70,6 @@ struct MeshErrorOptions {
   /// Initial guess of the registration, or the whole of it without ICP.
   SE3 T_truth_estimate = SE3::Identity();
   bool icp = true;
-  RegistrationOptions registration;
 
   /// True points further from the estimate are not judged, because a true world is larger than the
   /// part that was seen. The error of an estimated point is at most crop_m. Half a metre is above

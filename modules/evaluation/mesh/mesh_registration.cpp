@@ -13,8 +13,12 @@
 namespace km {
 namespace {
 
-constexpr double kStop_m = 1e-5;  // step that ends the iterations
-constexpr double kShrink = 0.7;   // factor on the gate from one iteration to the next
+constexpr double kGate_m = 0.01;      // smallest final bound on the distance of a pair
+constexpr double kGateMedians = 3.0;  // final bound, as a multiple of the median
+constexpr int kMaxIterations = 50;
+constexpr std::size_t kMaxPoints = 50'000;  // paired points of the estimate, evenly chosen
+constexpr double kStop_m = 1e-5;            // step that ends the iterations
+constexpr double kShrink = 0.7;             // factor on the gate from one iteration to the next
 // Share of the pairs' weight below which a direction is undetermined
 constexpr double kOpen = 1e-3;
 constexpr std::size_t kMinPairs = 6;
@@ -30,11 +34,9 @@ struct Pair {
 
 class Pairing {
  public:
-  Pairing(const LabelledMesh& truth, const NearestSurface& nearest, const OrientedPoints& estimate,
-          const RegistrationOptions& options)
-      : truth_(truth), nearest_(nearest), options_(options) {
-    const std::size_t step = std::max<std::size_t>(
-        1, estimate.points.size() / std::max<std::size_t>(1, options.max_points));
+  Pairing(const LabelledMesh& truth, const NearestSurface& nearest, const OrientedPoints& estimate)
+      : truth_(truth), nearest_(nearest) {
+    const std::size_t step = std::max<std::size_t>(1, estimate.points.size() / kMaxPoints);
     for (std::size_t i = 0; i < estimate.points.size(); i += step) {
       points_.emplace_back(estimate.points[i].cast<double>());
       normals_.emplace_back(estimate.normals[i].cast<double>());
@@ -59,7 +61,7 @@ class Pairing {
  private:
   [[nodiscard]] std::optional<Pair> pair_of(const Eigen::Vector3d& point,
                                             const Eigen::Vector3d& point_normal) const {
-    const auto near = nearest_.find(point.cast<float>(), options_.reach_m);
+    const auto near = nearest_.find(point.cast<float>(), kRegistrationReach_m);
     if (!near) return std::nullopt;
     const LabelledMesh::Face& face = truth_.faces[near->face];
     const auto corner = [&](std::size_t k) {
@@ -79,8 +81,7 @@ class Pairing {
     for (const Pair& pair : pairs) distances.push_back(pair.distance_m);
     const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
     std::nth_element(distances.begin(), middle, distances.end());
-    const double limit_m =
-        std::max({gate_m, options_.gate_m, options_.gate_medians * static_cast<double>(*middle)});
+    const double limit_m = std::max({gate_m, kGate_m, kGateMedians * static_cast<double>(*middle)});
     std::erase_if(pairs,
                   [&](const Pair& pair) { return static_cast<double>(pair.distance_m) > limit_m; });
     return pairs;
@@ -88,7 +89,6 @@ class Pairing {
 
   const LabelledMesh& truth_;
   const NearestSurface& nearest_;
-  const RegistrationOptions& options_;
   std::vector<Eigen::Vector3d> points_, normals_;
 };
 
@@ -158,15 +158,13 @@ void OrientedPoints::add(const LabelledMesh& mesh, const SurfaceSamples& samples
 }
 
 Registration register_mesh(const LabelledMesh& truth, const NearestSurface& nearest_truth,
-                           const OrientedPoints& estimate, const SE3& T_truth_estimate,
-                           const RegistrationOptions& options) {
-  const Pairing pairing(truth, nearest_truth, estimate, options);
+                           const OrientedPoints& estimate) {
+  const Pairing pairing(truth, nearest_truth, estimate);
   Registration result;
-  result.T_truth_estimate = T_truth_estimate;
   // At first all pairs within reach count, so that an estimate that errs in only one direction is
   // moved.
-  double gate_m = options.reach_m;
-  while (result.iterations < options.max_iterations && !result.converged) {
+  double gate_m = kRegistrationReach_m;
+  while (result.iterations < kMaxIterations && !result.converged) {
     const std::vector<Pair> pairs = pairing.pairs(result.T_truth_estimate, gate_m);
     result.pairs = pairs.size();
     result.rms_m = rms_of(pairs);
@@ -174,8 +172,8 @@ Registration register_mesh(const LabelledMesh& truth, const NearestSurface& near
     const Step step = step_of(pairs);
     result.T_truth_estimate = step.T * result.T_truth_estimate;
     result.free_directions = step.free_directions;
-    result.converged = step.length_m < kStop_m && gate_m <= options.gate_m;
-    gate_m = std::max(options.gate_m, kShrink * gate_m);
+    result.converged = step.length_m < kStop_m && gate_m <= kGate_m;
+    gate_m = std::max(kGate_m, kShrink * gate_m);
     ++result.iterations;
   }
   return result;

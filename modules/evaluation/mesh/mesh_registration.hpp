@@ -10,15 +10,8 @@
 
 namespace km {
 
-/// Options of the registration of an estimate to the truth.
-struct RegistrationOptions {
-  double reach_m = 1.0;  ///< Pairs further apart are ignored.
-  double gate_m = 0.01;  ///< Smallest final bound on the distance of a pair.
-  /// Final bound on the distance of a pair, as a multiple of the median.
-  double gate_medians = 3.0;
-  int max_iterations = 50;
-  std::size_t max_points = 50'000;  ///< Number of paired points of the estimate, evenly chosen.
-};
+/// Largest distance of a pair of the registration, at first.
+inline constexpr double kRegistrationReach_m = 1.0;
 
 /// Points on an estimate, and the unit normals of its faces there.
 struct OrientedPoints {
@@ -46,10 +39,8 @@ struct [[nodiscard]] Registration {
 /// Gauss-Newton on [rotation; translation].
 ///
 /// Along directions in which the surfaces slide along themselves, as for three directions of a
-/// single plane, the initial guess is kept. Starts from `T_truth_estimate`; converged when a step
-/// is below 10 micrometres.
+/// single plane, the estimate stays. Converged when a step is below 10 micrometres.
 Registration register_mesh(const LabelledMesh& truth, const NearestSurface& nearest_truth,
-                           const OrientedPoints& estimate, const SE3& T_truth_estimate,
-                           const RegistrationOptions& options = {});
+                           const OrientedPoints& estimate);
 
 }  // namespace km

@@ -70,9 +70,11 @@ Json to_json(const DistanceSummary& summary) {
 }
 
 Json to_json(const LabelScore& score) {
-  return {{"points", score.points()},     {"right", score.right},
-          {"wrong", score.wrong},         {"unknown", score.unknown},
-          {"accuracy", score.accuracy()}, {"accuracy_of_known", score.accuracy_of_known()}};
+  return {{"points", score.points()},
+          {"right", score.right},
+          {"wrong", score.wrong},
+          {"unknown", score.unknown},
+          {"accuracy", score.accuracy()}};
 }
 
 Json to_json(const LabelConfusion& labels, const LabelPalette& palette) {

@@ -57,9 +57,6 @@ TEST_CASE("trajectory judges a window, in seconds or stamps", "[evaluate]") {
   CHECK_THAT(run_command(command).output, Catch::Contains(" 50.0%"));
   CHECK_THAT(run_command(command + " --from 5 --to 15").output, Catch::Contains(" 50.0%"));
   CHECK_THAT(run_command(command + " --to 10").output, Catch::Contains("100.0%"));
-  const auto backwards = run_command(command + " --from 10 --to 5");
-  CHECK(backwards.exit_code == 1);
-  CHECK_THAT(backwards.output, Catch::Contains("--from is not before --to"));
 }
 
 TEST_CASE("Several truths belong to the estimates one by one", "[evaluate]") {
@@ -68,9 +65,6 @@ TEST_CASE("Several truths belong to the estimates one by one", "[evaluate]") {
   const auto result = run_command(two + " --estimate " + files.a + ' ' + files.b);
   CHECK(result.exit_code == 0);
   CHECK_THAT(result.output, Catch::Contains(" 0.0000"));
-  const auto mismatch = run_command(two + " --estimate " + files.a);
-  CHECK(mismatch.exit_code == 1);
-  CHECK_THAT(mismatch.output, Catch::Contains("give one --truth"));
 }
 
 TEST_CASE("closures judges the folders of a run", "[evaluate]") {
@@ -105,33 +99,31 @@ TEST_CASE("closures judges the folders of a run", "[evaluate]") {
   CHECK_THAT(apart.output, Catch::Contains("note: none of the 1 keyframes of robot 2 (" + b +
                                            ") lies within " + own) &&
                                !Catch::Contains("at the same times"));
-  const auto missing = run_command(command + "/none");
-  CHECK(missing.exit_code == 1);
-  CHECK(missing.output == "kimera_multi_evaluate: /none/keyframes.csv: no such file\n");
 }
 
-TEST_CASE("Bad input ends with code 1 and one line that names it", "[evaluate]") {
+TEST_CASE("Bad input ends with code 1 and names it", "[evaluate]") {
   const Files files;
-  const auto missing = run_command(kTool + "trajectory --truth /none --estimate " + files.a);
-  CHECK(missing.exit_code == 1);
-  CHECK(missing.output == "kimera_multi_evaluate: /none: no such file\n");
-  const auto bad = files.folder.write("bad.tum", "1.0 0 0 0 0 0 0 1\nhello\n").string();
-  const auto broken = run_command(kTool + "trajectory --truth " + bad + " --estimate " + files.a);
-  CHECK(broken.exit_code == 1);
-  CHECK_THAT(broken.output, Catch::Contains("bad.tum line 2: 1 fields, expected 8"));
-  const auto plot = run_command(kTool + "trajectory --truth " + files.truth + " --estimate " +
-                                files.a + " --plot x.svg");
-  CHECK(plot.exit_code == 1);
-  CHECK_THAT(plot.output, Catch::Contains("x.svg: --plot writes *.html"));
-  CHECK(run_command(kTool).exit_code == 1);
-  CHECK(run_command(kTool + "trajectory --truth " + files.truth).exit_code == 1);
-  for (const char* word : {"bogus", "trajectory --bogus"}) {
-    const auto unknown = run_command(kTool + word);
-    CAPTURE(unknown.output);
-    CHECK(unknown.exit_code == 1);
-    CHECK_THAT(unknown.output, Catch::Contains("not expected") && Catch::Contains("bogus"));
+  const std::string bad = files.folder.write("bad.tum", "1.0 0 0 0 0 0 0 1\nhello\n").string();
+  const std::string rest = " --estimate " + files.a;
+  const std::string good = "trajectory --truth " + files.truth;
+  const std::vector<std::pair<std::string, std::string>> refused = {
+      {"trajectory --truth /none" + rest, "kimera_multi_evaluate: /none: no such file\n"},
+      {"trajectory --truth " + bad + rest, "bad.tum line 2: 1 fields, expected 8"},
+      {good + rest + " --plot x.svg", "x.svg: --plot writes *.html"},
+      {good + rest + " --from 10 --to 5", "--from is not before --to"},
+      {good + " --truth " + files.b + rest, "give one --truth"},
+      {"closures --dataset . --truth " + files.truth + " --results /none",
+       "kimera_multi_evaluate: /none/keyframes.csv: no such file\n"},
+      {good, "--estimate is required"},
+      {"", "subcommand is required"},
+      {"bogus", "bogus"},
+      {"trajectory --bogus", "--bogus"}};
+  for (const auto& [arguments, message] : refused) {
+    const auto result = run_command(kTool + arguments);
+    CAPTURE(arguments);
+    CHECK(result.exit_code == 1);
+    CHECK_THAT(result.output, Catch::Contains(message));
   }
-  CHECK_THAT(run_command(kTool).output, Catch::Contains("subcommand is required"));
   const auto help = run_command(kTool + "trajectory --help");
   CHECK(help.exit_code == 0);
   CHECK_THAT(help.output, Catch::Contains("Examples:"));

@@ -18,14 +18,6 @@ SE3 screw(double t_s) {
 
 }  // namespace
 
-TEST_CASE("Poses between stamps are interpolated", "[evaluation]") {
-  const auto poses = sample(0.0, 10.0, 11, screw);
-  const auto T = pose_at(poses, kSecond / 4, 0.1, 0.0);
-  REQUIRE(T);
-  CHECK(T->isApprox(screw(0.25), 1e-12));
-  CHECK(pose_at(poses, kSecond / 2, 0.0, 0.0)->isApprox(screw(0.5), 1e-12));  // exact stamp
-}
-
 TEST_CASE("Across a gap and outside the trajectory only a near pose counts", "[evaluation]") {
   const auto poses = sample(0.0, 1.0, 3, screw);
   CHECK_FALSE(pose_at(poses, kSecond * 3 / 2, 0.9, 0.1));

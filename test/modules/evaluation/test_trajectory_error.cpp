@@ -1,4 +1,5 @@
 #include <catch2/catch.hpp>
+#include <nlohmann/json.hpp>
 #include <numbers>
 #include <random>
 #include <stdexcept>
@@ -8,6 +9,7 @@
 #include "modules/evaluation/trajectory_error.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
 #include "test/modules/evaluation/trajectories.hpp"
+#include "test/support/page_text.hpp"
 #include "test/support/random_pose.hpp"
 #include "test/support/shared_data.hpp"
 
@@ -247,6 +249,44 @@ TEST_CASE("A wrong heading has less effect on a long path than on a short one",
   };
   CHECK(heading_error(2) > 0.09);
   CHECK(heading_error(200) < 0.005);
+}
+
+const std::vector<StampedPose> kTruePoses = sample(0.0, 20.0, 100, curve);
+const std::vector<TrajectoryInput> kInputs = {{"alpha", kTruePoses, kTruePoses, {}},
+                                              {"b<&>eta", kTruePoses, kTruePoses, {}}};
+
+TEST_CASE("Missing relative errors are not perfect errors", "[evaluation]") {
+  TrajectoryErrorOptions options;
+  options.rpe_delta_s = 100.0;  // the poses span 20 s
+  const TeamError none = trajectory_error(kInputs, options);
+  CHECK(none.joint.rpe_translation_m.count == 0);
+  const std::string table = to_table(none);
+  CHECK(occurrences(table, "          -          -   100.0%\n") == 3);
+  CHECK(occurrences(table, "\n-: no two compared poses lie one delta apart") == 1);
+  CHECK(occurrences(to_table(trajectory_error(kInputs)), "no two compared poses") == 0);
+  const std::string text = json_text(none.joint);
+  CHECK(occurrences(text, ": null") == 8);  // four figures of translation, four of rotation
+  CHECK_THAT(text, !Catch::Contains("nan"));
+}
+
+TEST_CASE("The plot draws a shared truth once and every estimate", "[evaluation]") {
+  const Plot plot = plot_from_above(kInputs, trajectory_error(kInputs));
+  CHECK(plot.is_map);
+  REQUIRE(plot.series.size() == 3);
+  CHECK(plot.series[0].name == "truth");
+  CHECK(plot.series[0].colour == PlotSeries::kGrey);
+  CHECK_THAT(plot.series[1].name, Catch::StartsWith("alpha, position rmse "));
+  CHECK_THAT(plot.series[2].name, Catch::StartsWith("b<&>eta, position rmse "));
+  CHECK(plot.series[1].colour != plot.series[2].colour);
+  constexpr double kRounding_m = 1e-9;
+  for (const PlotSeries& series : plot.series) {
+    REQUIRE(series.points.size() == kTruePoses.size());
+    CHECK(series.points[40].y == Approx(kTruePoses[40].T.translation().y()).margin(kRounding_m));
+  }
+  // The truth before and after the estimates is left out.
+  const std::vector<StampedPose> part(kTruePoses.begin() + 40, kTruePoses.begin() + 60);
+  const std::vector<TrajectoryInput> inputs = {{"part", kTruePoses, part, {}}};
+  CHECK(plot_from_above(inputs, trajectory_error(inputs)).series[0].points.size() == part.size());
 }
 
 }  // namespace

@@ -51,18 +51,4 @@ TEST_CASE("An impossible trajectory is refused with file and line", "[evaluation
   CHECK_THROWS_WITH(read_trajectory("/nowhere.txt"), "/nowhere.txt: no such file");
 }
 
-TEST_CASE("Recorded trajectories of other programs are read", "[evaluation]") {
-  struct Case {
-    const char* file;
-    std::size_t poses;
-  };
-  // Rows counted with grep -vc '^#'.
-  const Case c =
-      GENERATE(Case{"euroc/MH_01_easy/mav0/state_groundtruth_estimate0/groundtruth_tum.txt", 36382},
-               Case{"euroc/V1_01_easy/mav0/state_groundtruth_estimate0/data.csv", 2895});
-  const auto file = shared_data(c.file);
-  if (!file) return;
-  CHECK(read_trajectory(*file).size() == c.poses);
-}
-
 }  // namespace km

@@ -62,16 +62,6 @@ TEST_CASE("Two parallel planes have the error of their distance", "[mesh_error]"
   CHECK(report.samples_per_m2 == density);
 }
 
-TEST_CASE("A sphere too large by 5 cm has an error of 5 cm", "[mesh_error]") {
-  MeshErrorOptions options;
-  const MeshReport report = compare(sphere(1.0F), sphere(1.05F), options);
-  // Both are smaller because of their chords, by 1 - cos(pi / 96) = 0.5 mm at most, equally.
-  CHECK(report.merged.truth.surface.mean_m == Approx(0.05).margin(6e-4));
-  CHECK(report.merged.estimate.surface.mean_m == Approx(0.05).margin(6e-4));
-  CHECK(report.registration.free_directions == 3);  // a sphere rotates in itself
-  CHECK(report.registration.T_truth_estimate.translation().norm() < 1e-3);
-}
-
 TEST_CASE("Shares of right and wrong and unknown labels are those of the areas", "[mesh_error]") {
   LabelledMesh truth = rectangle({0, 0, 0}, {5, 0, 0}, {0, 4, 0}, 8, 1);
   truth.append(rectangle({5, 0, 0}, {5, 0, 0}, {0, 4, 0}, 8, 7));
@@ -90,7 +80,6 @@ TEST_CASE("Shares of right and wrong and unknown labels are those of the areas",
   CHECK(scores[0].unknown == 0);
   CHECK(scores[1].id == 7);
   CHECK(scores[1].accuracy() == Approx(0.5).margin(kBorder));
-  CHECK(scores[1].accuracy_of_known() == Approx(0.625).margin(kBorder));
   const LabelScore total = report.merged.truth.labels.total();
   CHECK(total.accuracy() == Approx(0.55).margin(kBorder));
   CHECK(static_cast<double>(total.unknown) / static_cast<double>(total.points()) ==
@@ -252,36 +241,31 @@ TEST_CASE("Meshes without labels are compared by shape, with a note", "[mesh_err
 
 TEST_CASE("Meshes that cannot be compared are refused by name", "[mesh_error]") {
   const LabelledMesh good = square(1.0F, 0.0F);
-  const auto message = [&](const LabelledMesh& truth, const LabelledMesh& estimate,
-                           MeshErrorOptions options = {}) -> std::string {
-    try {
-      (void)compare(truth, estimate, options);
-    } catch (const std::invalid_argument& error) {
-      return error.what();
-    }
-    return "";
+  const auto changed = [&](const auto& change) {
+    LabelledMesh mesh = good;
+    change(mesh);
+    return mesh;
   };
-  LabelledMesh cloud = good;
-  cloud.faces.clear();
-  CHECK(message(good, {}) == "a: no faces, so no surface to compare");
-  CHECK(message(cloud, good) == "truth: no faces, so no surface to compare");
-  LabelledMesh outside = good;
-  outside.faces[3][1] = 1000;
-  CHECK(message(good, outside) == "a: a face names vertex 1000 of 81");
-  LabelledMesh flat = good;
-  for (auto& vertex : flat.vertices) vertex.setZero();
-  CHECK(message(good, flat) == "a: its faces have no area");
-  LabelledMesh broken = good;
-  broken.vertices[0].x() = std::nanf("");
-  CHECK(message(broken, good) == "truth: coordinates that are not finite");
-  LabelledMesh labels = good;
-  labels.labels.pop_back();
-  CHECK(message(good, labels) == "a: 80 labels for 81 vertices");
-  CHECK_THAT(message(good, square(0.01F, 0.0F)), Catch::StartsWith("a: too small for a single"));
-  CHECK_THAT(message(good, square(1.0F, 50.0F)), Catch::Contains("are both in one frame?"));
+  const std::vector<std::pair<LabelledMesh, std::string>> refused = {
+      {changed([](LabelledMesh& mesh) { mesh.faces.clear(); }),
+       "a: no faces, so no surface to compare"},
+      {changed([](LabelledMesh& mesh) { mesh.faces[3][1] = 1000; }),
+       "a: a face names vertex 1000 of 81"},
+      {changed([](LabelledMesh& mesh) {
+         for (auto& vertex : mesh.vertices) vertex.setZero();
+       }),
+       "a: its faces have no area"},
+      {changed([](LabelledMesh& mesh) { mesh.vertices[0].x() = std::nanf(""); }),
+       "a: coordinates that are not finite"},
+      {changed([](LabelledMesh& mesh) { mesh.labels.pop_back(); }), "a: 80 labels for 81 vertices"},
+      {square(0.01F, 0.0F), "a: too small for a single"},
+      {square(1.0F, 50.0F), "are both in one frame?"}};
+  for (const auto& [mesh, message] : refused)
+    CHECK_THROWS_WITH(compare(good, mesh, {}), Catch::Contains(message));
+  CHECK_THROWS_WITH(compare({}, good, {}), Catch::StartsWith("truth: no faces"));
   MeshErrorOptions options;
   options.crop_m = -1.0;
-  CHECK_THAT(message(good, good, options), Catch::StartsWith("the crop distance must be positive"));
+  CHECK_THROWS_WITH(compare(good, good, options), Catch::StartsWith("a reach of -1"));
   CHECK_THROWS_AS(mesh_error(good, {}, {}), std::invalid_argument);
   const std::vector<MeshInput> one = {{"a", good}}, two = {{"a", good}, {"b", good}};
   CHECK_THROWS_WITH(mesh_change(good, one, two), Catch::Contains("1 meshes before and 2 after"));

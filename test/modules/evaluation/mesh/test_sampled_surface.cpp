@@ -102,19 +102,5 @@ TEST_CASE("The nearest sample is that of brute force", "[mesh_error]") {
   CHECK_FALSE(NearestSurface({}, {}).find({0, 0, 0}, 10.0));
 }
 
-TEST_CASE("The distance to the surface has no lower limit from sampling", "[mesh_error]") {
-  const LabelledMesh mesh = square(2.0F, 0.0F);
-  const SurfaceSamples samples = sample_surface(mesh, 1000.0, 1);
-  const NearestSurface nearest(mesh, samples);
-  std::mt19937 random(1);
-  std::uniform_real_distribution<float> uniform(0.1F, 1.9F);
-  for (int i = 0; i < 200; ++i) {
-    const float x = uniform(random), y = uniform(random);
-    const auto found = nearest.find({x, y, 0.001F}, 0.5);
-    REQUIRE(found);
-    CHECK(found->surface_m == Approx(0.001F).margin(1e-6));
-  }
-}
-
 }  // namespace
 }  // namespace km
