@@ -21,15 +21,9 @@ constexpr double kUnlimited = std::numeric_limits<double>::infinity();
 
 // The values of `own`, and those of `usual` for missing ones.
 LinkKeys merged(LinkKeys usual, const LinkKeys& own) {
-  const auto take = [](auto& value, const auto& over) {
-    if (over) value = over;
-  };
-  take(usual.delay_s, own.delay_s);
-  take(usual.jitter_s, own.jitter_s);
-  take(usual.loss, own.loss);
-  take(usual.rate_bytes_per_s, own.rate_bytes_per_s);
-  take(usual.queue_bytes, own.queue_bytes);
-  take(usual.range_m, own.range_m);
+  for (const auto key : {&LinkKeys::delay_s, &LinkKeys::jitter_s, &LinkKeys::loss,
+                         &LinkKeys::rate_bytes_per_s, &LinkKeys::queue_bytes, &LinkKeys::range_m})
+    if (own.*key) usual.*key = own.*key;
   if (!own.trace.empty() || own.delay_s || own.rate_bytes_per_s) usual.trace = own.trace;
   if (!own.packets.empty() || !own.trace.empty() || own.rate_bytes_per_s)
     usual.packets = own.packets;

@@ -16,10 +16,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool is_same(const RobotSample& a, const RobotSample& b) {
-  return encode_view(a) == encode_view(b);
-}
-
 void check_same(const std::map<KeyframeIndex, Watcher::Placed>& live,
                 const std::map<KeyframeIndex, Watcher::Placed>& played) {
   constexpr double kRounding = 1e-5;  // float32, 20 m from the origin
@@ -35,27 +31,14 @@ void check_same(const std::map<KeyframeIndex, Watcher::Placed>& live,
 void check_states(const std::vector<RobotSample>& live, const std::vector<RobotSample>& played) {
   auto next = played.begin();
   for (const RobotSample& state : live) {
-    next = std::find_if(next, played.end(), [&](const auto& one) { return is_same(one, state); });
+    next = std::find_if(next, played.end(), [&](const RobotSample& one) {
+      return encode_view(one) == encode_view(state);
+    });
     REQUIRE(next != played.end());
     ++next;
   }
   CHECK(live.size() > 5);
   CHECK(next == played.end());
-}
-
-void check_closures(const std::map<ClosureId, ViewClosure>& live,
-                    const std::map<ClosureId, ViewClosure>& played) {
-  std::map<ClosureStatus, int> counts;
-  REQUIRE(live.size() == played.size());
-  for (const auto& [id, closure] : live) {
-    const ViewClosure& same = played.at(id);
-    CHECK(closure.verdict == same.verdict);
-    CHECK(closure.matches == same.matches);
-    CHECK(closure.inliers == same.inliers);
-    CHECK(closure.reason == same.reason);
-    ++counts[closure.verdict];
-  }
-  CHECK(counts[ClosureStatus::kKept] > 10);
 }
 
 // The viewer's state equals the results that the robot has written.
@@ -106,7 +89,7 @@ TEST_CASE("A viewer of a running team and the playback of its run show its resul
     check_states(watcher.states, played[robot].states);
     check_same(watcher.odometry, played[robot].odometry);
     check_same(watcher.optimized, played[robot].optimized);
-    check_closures(watcher.closures, played[robot].closures);
+    CHECK(watcher.closures == played[robot].closures);
   }
 }
 
