@@ -21,8 +21,8 @@ struct TimeWindow {
   Stamp to = 0;
 };
 
-/// Limits of pose_at() for truths: poses further apart are not interpolated, and the nearest pose
-/// may differ by so much.
+/// Limits of pose_at() for true poses: the longest gap that is interpolated, and the largest
+/// difference to the nearest pose.
 inline constexpr double kMaxGap_s = 0.1, kMaxDifference_s = 0.01;
 
 /// Pose at `stamp`. If the poses around it are at most `max_gap_s` apart, it is interpolated

@@ -24,8 +24,8 @@ struct SegmentErrors {
 /// empty for a path below 2 cm.
 [[nodiscard]] std::vector<double> segment_lengths(double path_m);
 
-/// For every pair i and each of the segment_lengths() of the true path, j is the first pair after i
-/// at which the true path, summed over the positions in between, has at least that length. With
+/// Errors over the segment_lengths() of the true path, summed over the positions in between. For
+/// every pair i and length, j is the first pair after i at which the path has that length. With
 /// E = (T_truth_i^-1 T_truth_j)^-1 (T_estimate_i^-1 T_estimate_j), the errors are |t(E)| and
 /// angle(E) divided by the true path from i to j.
 ///

@@ -1,7 +1,7 @@
 // The 2D maps and the slices of distance fields: horizontal images.
 import * as THREE from './three/build/three.module.js';
 
-const OCCUPIED = 0, FREE = 1, FARTHEST = 31, UNKNOWN = 255;  // values, as in view_raster.hpp
+const OCCUPIED = 0, FREE = 1, FARTHEST = 31, UNKNOWN = 255;  // values, as in view_update.hpp
 const CLEAR = [0, 0, 0, 0];
 const LIFT_M = 0.05;  // height of the 2D map above the floor
 

@@ -554,7 +554,7 @@ export function mapChart(host, options = {}) {
   return chart;
 }
 
-/** A chart of a plot from to_json() of plot.hpp. */
+/** A chart of a plot from to_json() of chart_page.hpp. */
 export function plotChart(host, plot) {
   const series = plot.series.map((one) => ({
                                    name: one.name,
