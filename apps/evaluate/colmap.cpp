@@ -10,7 +10,7 @@
 #include "apps/evaluate/inputs.hpp"
 #include "apps/output_file.hpp"
 #include "modules/core/input_file.hpp"
-#include "modules/evaluation/exports/colmap_model.hpp"
+#include "apps/evaluate/colmap_model.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
 #include "modules/images/image_codec.hpp"
 #include "modules/images/image_view.hpp"

@@ -1,4 +1,4 @@
-#include "modules/evaluation/exports/glb_file.hpp"
+#include "apps/evaluate/glb_file.hpp"
 
 #include <filesystem>
 #include <iostream>

@@ -10,7 +10,7 @@
 #include "apps/evaluate/inputs.hpp"
 #include "apps/output_file.hpp"
 #include "modules/evaluation/mesh/mesh_error.hpp"
-#include "modules/evaluation/picture/mesh_picture.hpp"
+#include "apps/evaluate/mesh_picture.hpp"
 #include "modules/mesh/mesh_file.hpp"
 
 namespace km {

@@ -2,7 +2,7 @@
 #include <random>
 #include <sstream>
 
-#include "modules/evaluation/exports/colmap_model.hpp"
+#include "apps/evaluate/colmap_model.hpp"
 #include "test/support/random_pose.hpp"
 #include "test/support/temporary_folder.hpp"
 

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <set>
 
-#include "modules/evaluation/picture/mesh_picture.hpp"
-#include "modules/evaluation/picture/surface_image.hpp"
+#include "apps/evaluate/mesh_picture.hpp"
+#include "apps/evaluate/surface_image.hpp"
 #include "test/modules/evaluation/mesh/shapes.hpp"
 
 namespace km {

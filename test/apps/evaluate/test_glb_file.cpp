@@ -5,7 +5,7 @@
 #include <catch2/catch.hpp>
 #include <cstring>
 
-#include "modules/evaluation/exports/glb_file.hpp"
+#include "apps/evaluate/glb_file.hpp"
 #include "test/modules/evaluation/mesh/shapes.hpp"
 #include "test/support/temporary_folder.hpp"
 

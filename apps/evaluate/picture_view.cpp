@@ -1,4 +1,4 @@
-#include "modules/evaluation/picture/picture_view.hpp"
+#include "apps/evaluate/picture_view.hpp"
 
 #include <algorithm>
 #include <cmath>

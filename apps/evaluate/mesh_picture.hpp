@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "modules/core/label_palette.hpp"
-#include "modules/evaluation/picture/picture_view.hpp"
-#include "modules/evaluation/picture/surface_image.hpp"
+#include "apps/evaluate/picture_view.hpp"
+#include "apps/evaluate/surface_image.hpp"
 #include "modules/mesh/labelled_mesh.hpp"
 
 namespace km {

@@ -1,4 +1,4 @@
-#include "modules/evaluation/picture/surface_image.hpp"
+#include "apps/evaluate/surface_image.hpp"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-#include "modules/evaluation/exports/colmap_model.hpp"
+#include "apps/evaluate/colmap_model.hpp"
 
 #include <sstream>
 #include <stdexcept>

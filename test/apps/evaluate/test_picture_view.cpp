@@ -1,6 +1,6 @@
 #include <catch2/catch.hpp>
 
-#include "modules/evaluation/picture/picture_view.hpp"
+#include "apps/evaluate/picture_view.hpp"
 #include "test/modules/evaluation/mesh/shapes.hpp"
 
 namespace km {

@@ -6,7 +6,7 @@
 #include <opencv2/core/mat.hpp>
 #include <vector>
 
-#include "modules/evaluation/picture/picture_view.hpp"
+#include "apps/evaluate/picture_view.hpp"
 #include "modules/mesh/labelled_mesh.hpp"
 
 namespace km {

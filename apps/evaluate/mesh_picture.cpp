@@ -1,4 +1,4 @@
-#include "modules/evaluation/picture/mesh_picture.hpp"
+#include "apps/evaluate/mesh_picture.hpp"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-#include "modules/evaluation/exports/glb_file.hpp"
+#include "apps/evaluate/glb_file.hpp"
 
 #define TINYGLTF_NO_INCLUDE_STB_IMAGE
 #define TINYGLTF_NO_INCLUDE_STB_IMAGE_WRITE
