@@ -50,12 +50,6 @@ struct Selector : ViewSelector {
   StatedPoses stated;
 };
 
-std::vector<SE3> line(std::size_t count) {
-  std::vector<SE3> poses(count, SE3::Identity());
-  for (std::size_t k = 0; k < count; ++k) poses[k].translation().x() = 0.1 * static_cast<double>(k);
-  return poses;
-}
-
 void check_within_bounds(const Watcher& watcher, const std::vector<SE3>& truth, RobotId anchor) {
   REQUIRE(watcher.optimized.size() == truth.size());
   for (std::size_t k = 0; k < truth.size(); ++k) {
