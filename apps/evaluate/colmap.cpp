@@ -6,11 +6,11 @@
 #include <string>
 #include <vector>
 
+#include "apps/evaluate/colmap_model.hpp"
 #include "apps/evaluate/commands.hpp"
 #include "apps/evaluate/inputs.hpp"
 #include "apps/output_file.hpp"
 #include "modules/core/input_file.hpp"
-#include "apps/evaluate/colmap_model.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
 #include "modules/images/image_codec.hpp"
 #include "modules/images/image_view.hpp"

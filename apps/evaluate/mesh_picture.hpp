@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "modules/core/label_palette.hpp"
 #include "apps/evaluate/picture_view.hpp"
 #include "apps/evaluate/surface_image.hpp"
+#include "modules/core/label_palette.hpp"
 #include "modules/mesh/labelled_mesh.hpp"
 
 namespace km {

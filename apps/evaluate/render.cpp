@@ -8,9 +8,9 @@
 
 #include "apps/evaluate/commands.hpp"
 #include "apps/evaluate/inputs.hpp"
+#include "apps/evaluate/mesh_picture.hpp"
 #include "apps/output_file.hpp"
 #include "modules/evaluation/mesh/mesh_error.hpp"
-#include "apps/evaluate/mesh_picture.hpp"
 #include "modules/mesh/mesh_file.hpp"
 
 namespace km {
