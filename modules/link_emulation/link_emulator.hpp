@@ -12,7 +12,6 @@
 #include <vector>
 
 #include "modules/link_emulation/link_trace.hpp"
-#include "modules/link_emulation/packet_schedule.hpp"
 
 namespace km {
 
