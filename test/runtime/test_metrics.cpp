@@ -51,14 +51,5 @@ TEST_CASE("Durations off the scale are still counted", "[metrics]") {
   CHECK(histogram.count() == 2);
 }
 
-TEST_CASE("A scope is measured when it ends", "[metrics]") {
-  Timing timing;
-  {
-    const auto scope = timing.measure();
-    CHECK(timing.histogram().count() == 0);
-  }
-  CHECK(timing.histogram().count() == 1);
-}
-
 }  // namespace
 }  // namespace km

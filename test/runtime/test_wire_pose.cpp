@@ -40,23 +40,16 @@ TEST_CASE("a pose from the wire is a rotation even if its quaternion was rounded
   CHECK((pose->linear().transpose() * pose->linear()).isIdentity(kRounding));
 }
 
-TEST_CASE("poses that are not poses are refused", "[wire_pose]") {
-  const double bad = GENERATE(values({kNan, kInfinity, -kInfinity, 1e300}));
-  const int slot = GENERATE(0, 1, 2, 3, 4, 5, 6);
-  CAPTURE(bad, slot);
-  km_wire_Pose wire = to_wire(SE3::Identity());
-  (slot < 4 ? wire.q[slot] : wire.t[slot - 4]) = bad;
-  CHECK_FALSE(from_wire(wire));
-}
-
-TEST_CASE("quaternions and matrices that have no meaning are refused", "[wire_pose]") {
-  for (const double w : {0.0, 0.99, 1.01, -2.0}) {
-    CAPTURE(w);
-    km_wire_Pose wire = to_wire(SE3::Identity());
-    wire.q[3] = w;
-    CHECK_FALSE(from_wire(wire));
-  }
-  REQUIRE(from_wire(to_wire(Matrix6(Matrix6::Identity()))));
+TEST_CASE("poses and matrices that have no meaning are refused", "[wire_pose]") {
+  for (const double bad : {kNan, kInfinity, -kInfinity, 1e300, 0.0, 0.99, 1.01, -2.0})
+    for (const int slot : {3, 0, 1, 2, 4, 5, 6}) {
+      if (slot != 3 && std::abs(bad) < 3.0) continue;
+      CAPTURE(bad, slot);
+      km_wire_Pose wire = to_wire(SE3::Identity());
+      (slot < 4 ? wire.q[slot] : wire.t[slot - 4]) = bad;
+      CHECK_FALSE(from_wire(wire));
+    }
+  CHECK(from_wire(to_wire(Matrix6(Matrix6::Zero()))) == Matrix6(Matrix6::Zero()));
   // Not finite, beyond any scale, a negative variance, and a correlation above one.
   for (const auto& [slot, value] : {std::pair(7, kNan), {0, 1e300}, {20, -1e-3}, {1, 1.1}}) {
     CAPTURE(slot, value);
@@ -64,10 +57,6 @@ TEST_CASE("quaternions and matrices that have no meaning are refused", "[wire_po
     wire.upper[slot] = value;
     CHECK_FALSE(from_wire(wire));
   }
-}
-
-TEST_CASE("the zero covariance of a first keyframe is accepted", "[wire_pose]") {
-  CHECK(from_wire(to_wire(Matrix6(Matrix6::Zero()))) == Matrix6(Matrix6::Zero()));
 }
 
 TEST_CASE("an odometry pose with one bad part is refused", "[wire_pose]") {

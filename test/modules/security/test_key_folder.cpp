@@ -121,15 +121,5 @@ TEST_CASE("A wrong or incomplete file of keys is refused", "[security]") {
   }
 }
 
-TEST_CASE("Times are unchanged by writing and reading", "[security]") {
-  CHECK(time_text(0) == "1970-01-01T00:00:00Z");
-  CHECK(time_text(951'826'154) == "2000-02-29T12:09:14Z");
-  const TemporaryFolder folder;
-  const std::int64_t time_s = GENERATE(-1, 0, 951'826'154, 4'102'444'799);
-  const auto file = folder.write("x", "format: x\ntime: " + time_text(time_s) + "\n");
-  KeyFile read = KeyFile::read(file, "x", KeyFileAccess::kEveryone);
-  CHECK(read.time_s(read.next("time")) == time_s);
-}
-
 }  // namespace
 }  // namespace km

@@ -216,6 +216,14 @@ struct TestRobot {
   Inbox<Ping> received, received_addressed;
 };
 
+/// Starts robots, and waits until each of them receives all others.
+inline void meet(const std::vector<TestRobot*>& robots) {
+  for (TestRobot* robot : robots) robot->start();
+  for (TestRobot* robot : robots)
+    for (const TestRobot* other : robots)
+      if (other != robot) REQUIRE(robot->receives(PeerEventKind::kJoined, other->id()));
+}
+
 /// The head of an envelope that `identity` writes as its message `number`.
 inline km_wire_Envelope header(const RobotIdentity& identity, std::uint32_t number) {
   return {.key = 0,
@@ -245,10 +253,7 @@ inline std::vector<std::uint32_t> up_to(std::uint32_t count) {
 struct Two {
   explicit Two(const DdsConfig& config = loopback_config())
       : domain(std::make_shared<const DdsDomain>(config)) {
-    a.start();
-    b.start();
-    REQUIRE(a.receives(PeerEventKind::kJoined, 4));
-    REQUIRE(b.receives(PeerEventKind::kJoined, 3));
+    meet({&a, &b});
   }
 
   std::shared_ptr<const DdsDomain> domain;

@@ -33,24 +33,11 @@ TEST_CASE("A message of one robot arrives at the other unchanged and once", "[dd
   CHECK(a.received.messages().empty());  // a robot does not receive its own messages
 }
 
-TEST_CASE("The status of each robot reaches the others", "[dds]") {
-  Two two;
-  auto& [domain, a, b] = two;
-  REQUIRE(eventually([&] { return b.status.peers().size() == 1; }));
-  const RobotStatus status = b.status.peers()[0];
-  CHECK(status.robot == 3);
-  CHECK(status.name == "robot3");
-  CHECK(status.phase == RobotPhase::kRunning);
-  CHECK(status.boot == a.participant.identity().boot);
-}
-
 TEST_CASE("A robot that joins late gets every event, request, and the newest state", "[dds]") {
   const auto kind = GENERATE(TopicKind::kEvent, TopicKind::kState, TopicKind::kRequest);
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
   TestRobot a(domain, 3, kind), witness(domain, 4, kind);
-  a.start();
-  witness.start();
-  REQUIRE(a.receives(PeerEventKind::kJoined, 4));
+  meet({&a, &witness});
   // Keys 0 and 1 each written twice.
   for (const std::uint8_t round : std::vector<std::uint8_t>{1, 2})
     for (const std::uint32_t key : {0U, 1U}) a.ping(key, {round});
@@ -101,9 +88,7 @@ TEST_CASE("An addressed message reaches its addressee and no other robot gets a 
   const auto kind = GENERATE(TopicKind::kRequest, TopicKind::kEvent);
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
   TestRobot a(domain, 3, kind, kind), b(domain, 4, kind, kind), c(domain, 5, kind, kind);
-  for (TestRobot* robot : {&a, &b, &c}) robot->start();
-  REQUIRE(a.receives(PeerEventKind::kJoined, 4));
-  REQUIRE(a.receives(PeerEventKind::kJoined, 5));
+  meet({&a, &b, &c});
 
   for (std::uint32_t i = 0; i < 10; ++i) a.ping_one(4, i, std::vector<std::uint8_t>(1000));
   CHECK(indices(b.received_addressed.wait_for(10)) == up_to(10));
@@ -122,9 +107,7 @@ TEST_CASE("An addressed message reaches its addressee and no other robot gets a 
 TEST_CASE("Sender and receiver count the same bytes for all sizes", "[dds]") {
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
   TestRobot a(domain, 3), b(domain, 4), c(domain, 5);
-  for (TestRobot* robot : {&a, &b, &c}) robot->start();
-  REQUIRE(a.receives(PeerEventKind::kJoined, 4));
-  REQUIRE(a.receives(PeerEventKind::kJoined, 5));
+  meet({&a, &b, &c});
   constexpr std::uint32_t kCount = 50;
   for (std::uint32_t i = 0; i < kCount; ++i) a.ping(i, std::vector<std::uint8_t>(i));
   for (TestRobot* robot : {&b, &c}) REQUIRE(robot->received.wait_for(kCount).size() == kCount);
@@ -148,9 +131,7 @@ TEST_CASE("Earlier messages for a robot that joins late are counted once", "[dds
   const auto kind = GENERATE(TopicKind::kEvent, TopicKind::kState);
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
   TestRobot a(domain, 3, kind), b(domain, 4, kind);
-  a.start();
-  b.start();
-  REQUIRE(a.receives(PeerEventKind::kJoined, 4));
+  meet({&a, &b});
   for (std::uint32_t i = 0; i < 50; ++i) a.ping(i, std::vector<std::uint8_t>(1000));
   const std::uint32_t newer = kind == TopicKind::kState ? 25 : 0;
   for (std::uint32_t i = 0; i < newer; ++i) a.ping(i, std::vector<std::uint8_t>(2000));
@@ -167,9 +148,7 @@ TEST_CASE("Earlier messages for a robot that joins late are counted once", "[dds
 TEST_CASE("Messages of a hostile peer are counted by reason and change nothing", "[dds]") {
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
   TestRobot a(domain, 3), b(domain, 4), foe(domain, 9);
-  for (TestRobot* robot : {&a, &b, &foe}) robot->start();
-  REQUIRE(b.receives(PeerEventKind::kJoined, 3));
-  REQUIRE(b.receives(PeerEventKind::kJoined, 9));
+  meet({&a, &b, &foe});
 
   RawWriter writer(foe.participant.handle(), domain->config(), TopicKind::kEvent);
   const RobotIdentity self = foe.participant.identity();
@@ -213,9 +192,7 @@ TEST_CASE("A guard appends a tail to messages and sees them before any node", "[
       }};
   a.bridge.exchange(from_a, TopicKind::kEvent, TrafficCategory::kOther, {}, {}, guard);
   b.bridge.exchange(at_b, TopicKind::kEvent, TrafficCategory::kOther, {}, {}, guard);
-  a.start();
-  b.start();
-  REQUIRE(b.receives(PeerEventKind::kJoined, 3));
+  meet({&a, &b});
   for (std::uint32_t i = 0; i < 3; ++i) from_a.to_peers().publish(MarkedPing{{3, i, {1, 2, 3}}});
   const auto pings = got.wait_for(2);
   REQUIRE(pings.size() == 2);
@@ -236,9 +213,7 @@ TEST_CASE("Programs without an identity, or with a broken one, are ignored", "[d
       dds_create_participant(static_cast<dds_domainid_t>(domain->config().domain), qos.get(),
                              nullptr),
       "participant");
-  a.start();
-  b.start();
-  REQUIRE(b.receives(PeerEventKind::kJoined, 3));
+  meet({&a, &b});
   RawWriter writer(outsider.handle(), domain->config(), TopicKind::kEvent);
   writer.write(header(a.participant.identity(), 0), {3, 0, {}});
   CHECK(eventually(
@@ -288,9 +263,7 @@ TEST_CASE("A subscriber that throws does not stop the robot from receiving", "[d
   b.pings.from_peers().subscribe([](const auto& ping) {
     if (ping->index == 0) throw std::runtime_error("subscriber");
   });
-  a.start();
-  b.start();
-  REQUIRE(a.receives(PeerEventKind::kJoined, 4));
+  meet({&a, &b});
   a.ping(0);
   a.ping(1);
   CHECK(b.received.wait_for(2).size() == 2);

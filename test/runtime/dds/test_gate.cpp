@@ -101,9 +101,7 @@ TEST_CASE("A peer that sends much delays only its own messages", "[gate]") {
   Worker<std::shared_ptr<const Ping>> node(
       kFlood, Overflow::kBlock, [&](const auto& ping) { handled.publish(ping); }, "node");
   c.pings.from_peers().subscribe([&](const auto& ping) { node.post(ping); });
-  for (TestRobot* robot : {&a, &b, &c}) robot->start();
-  REQUIRE(c.receives(PeerEventKind::kJoined, 3));
-  REQUIRE(c.receives(PeerEventKind::kJoined, 4));
+  meet({&a, &b, &c});
   for (std::uint32_t i = 0; i < kFlood; ++i) a.ping(i);
   REQUIRE(eventually([&] { return c.received.messages().size() > 10; }));
   b.ping(99999);

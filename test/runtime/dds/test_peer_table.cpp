@@ -147,17 +147,6 @@ TEST_CASE("A silent robot is lost and returns when it is received again, whateve
   CHECK(table.peers()[0].state == PeerState::kAlive);
 }
 
-TEST_CASE("An orderly end is not a loss", "[peers]") {
-  PeerTable table(kSelf);
-  table.participant(guid(2), data_of(7, 70), "");
-  table.alive(guid(2));
-  table.closed(guid(2));
-  table.participant_gone(guid(2));
-  CHECK(kinds(table) == Kinds{PeerEventKind::kJoined, PeerEventKind::kLeft});
-  CHECK(table.peers()[0].state == PeerState::kLeft);
-  CHECK(table.identity_of(guid(2)).has_value());  // its messages may still be on their way
-}
-
 const char* admit_all(const RobotIdentity& /*identity*/, std::string_view /*credentials*/) {
   return nullptr;
 }

@@ -91,10 +91,7 @@ TEST_CASE("Renewed writers send all events again, in a team with keys", "[sealed
         has_keys ? member_of(team) : TestRobot::MakeSeal(), TopicKind::kEvent, TopicKind::kEvent);
   };
   const auto a = robot(3), b = robot(4);
-  a->start();
-  b->start();
-  REQUIRE(a->receives(PeerEventKind::kJoined, 4));
-  REQUIRE(b->receives(PeerEventKind::kJoined, 3));
+  meet({a.get(), b.get()});
   a->ping(1);
   a->ping_one(4, 2);
   REQUIRE(b->received.wait_for(1).size() == 1);
@@ -123,10 +120,7 @@ TEST_CASE("Writers are not renewed while messages wait for the budget", "[sealed
               TopicKind::kEvent, TopicKind::kEvent, {.bytes_per_s = 20'000.0});
   TestRobot b(domain, {4, robot_name(4), kProtocolVersion, random_boot_id()}, member_of(team),
               TopicKind::kEvent, TopicKind::kEvent);
-  a.start();
-  b.start();
-  REQUIRE(a.receives(PeerEventKind::kJoined, 4));
-  REQUIRE(b.receives(PeerEventKind::kJoined, 3));
+  meet({&a, &b});
   a.ping_one(4, 2);
   REQUIRE(b.received_addressed.wait_for(1).size() == 1);
   for (std::uint32_t k = 0; k < 1000; ++k) a.ping(k, std::vector<std::uint8_t>(1000, 1));
@@ -225,9 +219,7 @@ TEST_CASE("The later of two processes of one robot is notified and ignored", "[s
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
   TestRobot a(domain, 3, has_keys ? its_keys : no_keys);
   TestRobot b(domain, 4, has_keys ? member_of(team) : no_keys);
-  a.start();
-  b.start();
-  REQUIRE(b.receives(PeerEventKind::kJoined, 3));
+  meet({&a, &b});
   REQUIRE(eventually([&] { return a.status_count() >= 4; }));
   TestRobot twin(domain, 3, has_keys ? its_keys : no_keys);
   twin.start();
@@ -246,9 +238,7 @@ TEST_CASE("Messages under a new key wait for it, however many they are", "[seale
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
   TestRobot a(domain, 3, member_of(team)), b(domain, 4, member_of(team));
   TestRobot c(domain, 5, member_of(team));
-  for (TestRobot* robot : {&a, &b, &c}) robot->start();
-  REQUIRE(b.receives(PeerEventKind::kJoined, 3));
-  REQUIRE(b.receives(PeerEventKind::kJoined, 5));
+  meet({&a, &b, &c});
   const Revocations list = team.revoking({team.keys_of(9, "lost").certificate});
   REQUIRE(a.participant.seal()->with(
       [&](TeamSeal& seal) { return seal.update(list, today_s()).new_key; }));
@@ -336,9 +326,7 @@ TEST_CASE("Messages for a robot reach its resumed process and not its next incar
   };
   const auto a = make({3, robot_name(3), kProtocolVersion, random_boot_id()});
   const auto c = make({5, robot_name(5), kProtocolVersion, random_boot_id()});
-  a->start();
-  c->start();
-  REQUIRE(a->receives(PeerEventKind::kJoined, 5));
+  meet({a.get(), c.get()});
   const RobotIdentity former{4, robot_name(4), kProtocolVersion, random_boot_id()};
   {
     const auto first = make(former);

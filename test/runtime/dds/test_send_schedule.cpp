@@ -65,17 +65,6 @@ TEST_CASE("The bytes sent equal the budget for messages of any size", "[budget]"
   CHECK(sent_bytes <= budget + message);
 }
 
-TEST_CASE("After a silence little more than the budget is sent at once", "[budget]") {
-  Schedule schedule({.bytes_per_s = 10'000.0});
-  CHECK(sent(schedule, 0.0).empty());
-  for (int k = 0; k < 1000; ++k) schedule.push(entry(kWords, k), 60.0);
-  CHECK(sent(schedule, 60.0).size() == 1);  // a debt from the start
-  CHECK(sent(schedule, 120.0).size() ==
-        static_cast<std::size_t>(1e4 * Schedule::kBurst_s / 100 + 1));
-  REQUIRE(schedule.wait_s());
-  CHECK(*schedule.wait_s() == Approx(0.01).margin(1e-6));
-}
-
 TEST_CASE("Statuses never wait, and are counted", "[budget]") {
   Schedule schedule({.bytes_per_s = 1000.0});
   for (int k = 0; k < 10; ++k) schedule.push(entry(kPresence, k), 0.0);
@@ -225,10 +214,6 @@ TEST_CASE("Without a budget nothing is dropped, replaced or counted", "[budget]"
   }
   CHECK(sent(schedule, 100.0).size() == kMany);
   CHECK(schedule.held_back().empty());
-}
-
-TEST_CASE("A budget out of bounds is refused", "[budget]") {
-  CHECK_THROWS_AS(Schedule({.bytes_per_s = -1.0}), ConfigError);
 }
 
 }  // namespace

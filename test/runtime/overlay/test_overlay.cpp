@@ -65,16 +65,6 @@ TEST_CASE("A robot gets each bag of a robot out of range once and in order", "[o
         std::vector<OverlayHeld>{{{kA, Network::first_boot(kA)}, 300, 0}});
 }
 
-TEST_CASE("A bag that arrives before its robot is announced is stored", "[overlay]") {
-  Network network(3);
-  CHECK(network.at(kC).keep_bag(network.identity(kA), 0, octets(600)) == OverlayArrival::kNew);
-  CHECK_FALSE(network.at(kC).robots().receives(kA));
-  network.link(kA, kC);
-  network.link(kB, kC);
-  network.run(10.0);
-  CHECK(network.read(kB, OverlayStream::kBag) == first(1));
-}
-
 TEST_CASE("Bags pass along a chain and only one of two robots in between forwards them",
           "[overlay]") {
   const bool has_keys = GENERATE(false, true);
@@ -221,25 +211,6 @@ TEST_CASE("A message to one incarnation of a robot does not reach the next", "[o
   const auto& read = network.all_read(kA);
   REQUIRE(read.size() == 1);
   CHECK(read.front()->content.front() == 2);
-}
-
-TEST_CASE("A request reaches its addressee and the reply returns", "[overlay]") {
-  const bool has_keys = GENERATE(false, true);
-  CAPTURE(has_keys);
-  Network network(4, has_keys);
-  network.link(kA, kC);
-  network.link(kC, kD);
-  network.link(kD, kB);
-  network.run(20.0);
-  CHECK(network.reachable(kB) == std::vector<RobotId>{kC, kA});
-  (void)network.at(kB).call(OverlayStream::kRequest, kA, 17, octets(20));
-  network.run(kPeriod_s);
-  REQUIRE(network.read(kA, OverlayStream::kRequest) == std::vector<std::uint32_t>{17});
-  CHECK(network.all_read(kA)[0]->origin == TeamPeer{kB, Network::first_boot(kB)});
-  (void)network.at(kA).call(OverlayStream::kReply, kB, 17, octets(9000));
-  network.run(kPeriod_s);
-  CHECK(network.read(kB, OverlayStream::kReply) == std::vector<std::uint32_t>{17});
-  CHECK(network.all_read(kB).back()->origin == TeamPeer{kA, Network::first_boot(kA)});
 }
 
 TEST_CASE("A reply that DDS keeps for a known robot is not carried by the overlay", "[overlay]") {

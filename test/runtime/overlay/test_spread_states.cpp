@@ -76,15 +76,6 @@ TEST_CASE("the states of a full team reach all robots of a line", "[overlay]") {
   CHECK(network.packets() == kMaxTeam - 1);
 }
 
-TEST_CASE("a robot with a new link receives all present states", "[overlay]") {
-  Network network(5, line(3));
-  network.publish(1, kPoses);
-  network.publish(3, kPoses);
-  network.link(3, 4);
-  network.run(kPeriod_s);
-  CHECK(network.read(4, kPoses).size() == 2);
-}
-
 TEST_CASE("in a line of robots that have just met, a state waits once and not at each link",
           "[overlay]") {
   Network network(7);
@@ -135,16 +126,6 @@ TEST_CASE("calls take the shortest path, and another one after an outage", "[ove
   CHECK(hops_to_3() == 2);
   network.cut(5, 1);
   CHECK_FALSE(network.call(1, OverlayStream::kSolver, 3));
-}
-
-TEST_CASE("the lowest robot id decides between several shortest paths", "[overlay]") {
-  Network network(9, {{1, 8}, {1, 3}, {8, 2}, {3, 2}});
-  const KnownRobots& of_1 = network.at(1).robots();
-  const KnownRobots& of_2 = network.at(2).robots();
-  CHECK(of_1.next_hop(2) == RobotId{3});
-  CHECK(of_2.next_hop(1) == RobotId{3});
-  CHECK(of_2.next_hop(1, RobotId{3}) == RobotId{8});
-  CHECK_FALSE(of_1.next_hop(77));
 }
 
 TEST_CASE("a call does not circulate for ever, whatever links robots report", "[overlay]") {
