@@ -44,24 +44,6 @@ TEST_CASE("A robot keeps the memory of a frame for the next one", "[load]") {
 #endif
 }
 
-// Thin voxels take longer than the 50 ms between two images: at --rate 1 the map lacks frames.
-TEST_CASE("By default a recording waits, and every image is in odometry and map", "[load]") {
-  const auto dataset = shared_data("euroc/MH_01_easy");
-  if (!dataset) return;
-  const TemporaryFolder folder;
-  const fs::path output = folder.path() / "a";
-  const CommandResult run = run_alone(*dataset, output,
-                                      "--to 4 --set mapping.mode=metric mapping.rate_hz=20 "
-                                      "semantic_mapping.voxel_size_m=0.015");
-  CAPTURE(run.output);
-  REQUIRE(run.exit_code == 0);
-  const RunSummary summary = read_summary(output / "summary.json");
-  CHECK(summary.frames == 80);
-  CHECK(summary.frames_skipped == 0);
-  REQUIRE(summary.mapping);
-  CHECK(summary.mapping->frames == 80);
-}
-
 TEST_CASE("On an overloaded computer the map skips frames first, then images are skipped evenly",
           "[load]") {
   const auto dataset = shared_data("euroc/MH_01_easy");
