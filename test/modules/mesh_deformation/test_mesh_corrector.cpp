@@ -229,25 +229,11 @@ TEST_CASE("Copies stay until a further visit exceeds their share", "[mesh_deform
 }
 
 constexpr MotionScale kMotionScale{.translation_m = 0.01, .rotation_rad = 0.005};
-constexpr double kRounding = 1e-9;  // in units of the scale, for poses within 10 m
 
 std::vector<SE3> random_poses(std::mt19937& rng, std::size_t count) {
   std::vector<SE3> poses;
   for (std::size_t i = 0; i < count; ++i) poses.push_back(random_pose(rng));
   return poses;
-}
-
-TEST_CASE("A common motion of all keyframes is rigid", "[mesh_deformation]") {
-  const auto count = GENERATE(1U, 2U, 30U);
-  const auto seed = GENERATE(range(0U, 5U));
-  CAPTURE(count, seed);
-  std::mt19937 rng(seed);
-  const std::vector<SE3> before = random_poses(rng, count);
-  const SE3 T = random_pose(rng);
-  const KeyframeMotion motion = keyframe_motion(before, moved(T, before), kMotionScale);
-  CHECK(motion.T_after_before.isApprox(T, 1e-9));
-  CHECK(motion.non_rigid < kRounding);
-  CHECK(largest_difference(before, T, motion.T_after_before, kMotionScale) < kRounding);
 }
 
 TEST_CASE("One keyframe that moves against many others is found", "[mesh_deformation]") {

@@ -171,27 +171,6 @@ TEST_CASE("A last map that cannot be corrected is reported", "[node]") {
   CHECK(robot.results().empty());
 }
 
-TEST_CASE("The mesh deformation node works as a thread", "[node]") {
-  Robot robot;
-  MeshDeformationConfig config;
-  config.period_s = 0.01;
-  MeshDeformationNode node(config, kSelf, robot.topics());
-  node.start();
-  for (std::size_t i = 0; i < robot.T_odom_kf.size(); ++i)
-    robot.keyframes.publish(robot.keyframe(i));
-  robot.maps.publish(robot.map);
-  robot.trajectory.publish(robot.solution(20.0));
-  REQUIRE_FALSE(robot.inbox.wait_for(1).empty());
-  robot.trajectory.publish(robot.solution(10.0));
-  node.finish();
-  robot.trajectory.publish(robot.solution(15.0));  // too late
-  node.stop();
-  CHECK(node.error() == nullptr);
-  REQUIRE(robot.results().size() >= 2);  // the last result, and possibly an earlier one
-  CHECK(robot.results().back().mesh.vertices.back().x() ==
-        Approx(last_vertex_x(10.0)).margin(0.05));
-}
-
 TEST_CASE("A mesh is current once it is corrected, also if there is none", "[node]") {
   Robot robot;
   MeshDeformationConfig config;
