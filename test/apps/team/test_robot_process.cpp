@@ -48,14 +48,6 @@ TEST_CASE("A process gives its lines, its end and its last words", "[team]") {
   CHECK_THAT(script.folder.read("log"), Catch::Contains("one\n") && Catch::Contains("bad\n"));
 }
 
-TEST_CASE("Only the last words are kept", "[team]") {
-  Script script("for i in $(seq 1 1000); do echo $i >&2; done");
-  script.wait();
-  CHECK(script.process.exit()->ok());
-  CHECK(script.process.last_log_lines().size() == 12);
-  CHECK(script.process.last_log_lines().back() == "1000");
-}
-
 TEST_CASE("Its standard input is empty and its process group its own", "[team]") {
   Script script("read x || echo empty; [ $(ps -o pgid= -p $$) = $$ ] && echo leader");
   script.wait();

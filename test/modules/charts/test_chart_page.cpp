@@ -66,13 +66,10 @@ TEST_CASE("No text of a plot can leave its place in the page", "[charts]") {
   CHECK(occurrences(page, "<script") == 2);
   CHECK(occurrences(page, "</script") == 2);
   CHECK(occurrences(page, "<!--") == 0);
+  CHECK(references_of_page(chart_page("t", {Plot{}})) == 0);  // needs no other file, no network
   const Json plot = data_of_page(page, "plots")["charts"][0];
   CHECK(plot["title"] == kHostileText);
   CHECK(plot["series"][0]["name"] == kHostileText);
-}
-
-TEST_CASE("A page of charts needs no other file and no network", "[charts]") {
-  CHECK(references_of_page(chart_page("t", {Plot{}})) == 0);
 }
 
 // The plots that charts_in_browser.mjs examines, in this order.

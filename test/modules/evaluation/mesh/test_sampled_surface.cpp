@@ -47,15 +47,6 @@ TEST_CASE("Samples are uniform within a triangle", "[mesh_error]") {
   for (const int count : quarter) CHECK(std::abs(count - 10'000) < 5 * 87);
 }
 
-TEST_CASE("Faces smaller than the area per sample are sampled correctly on average",
-          "[mesh_error]") {
-  const SurfaceSamples samples = sample_surface(square(1.0F, 0.0F, 100), 1000.0, 1);  // 20000 faces
-  CHECK(std::abs(static_cast<double>(samples.points.size()) - 1000.0) <= 1.0);
-  const auto left = std::count_if(samples.points.begin(), samples.points.end(),
-                                  [](const auto& point) { return point.x() < 0.5F; });
-  CHECK(std::abs(static_cast<double>(left) - 500.0) <= 11.0);  // a row of cells is 10 samples
-}
-
 TEST_CASE("A mesh ends at an edge of one face with shared and with separate vertices",
           "[mesh_error]") {
   const bool shared = GENERATE(true, false);
