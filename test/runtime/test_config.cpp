@@ -63,16 +63,6 @@ TEST_CASE("A key without a value is an empty text, or none where that is accepte
   CHECK(loaded(command_line).name.empty());
 }
 
-TEST_CASE("A key that is absent keeps its default", "[config]") {
-  ConfigLayers layers;
-  layers.add_text("toy:\n  count: 5\n", "a.yaml");
-  ToyConfig expected;
-  expected.count = 5;
-  CHECK(loaded(layers) == expected);
-  ConfigLayers nothing;
-  CHECK(loaded(nothing) == ToyConfig{});
-}
-
 TEST_CASE("A configuration error names every problem with file and line", "[config]") {
   const std::string text = complaint(
       "toy:\n  count: many\n  length_m: 7\n  level: 256\n  flag: perhaps\n  colour: blue\n"

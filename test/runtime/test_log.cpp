@@ -31,17 +31,6 @@ TEST_CASE("A limited log line appears once per key", "[log]") {
   CHECK_THAT(captured.lines()[0], Catch::EndsWith("warn test: line 0"));
 }
 
-TEST_CASE("Levels below the limit are not written", "[log]") {
-  const CapturedLog captured;
-  log::debug("test") << "not this";
-  log::set_level(log::Level::kError);
-  log::warn("test") << "nor this";
-  log::error("test") << "but this";
-  log::set_level(log::Level::kInfo);
-  REQUIRE(captured.lines().size() == 1);
-  CHECK_THAT(captured.lines()[0], Catch::Contains("but this"));
-}
-
 TEST_CASE("A listener of the log receives the written lines until another replaces it", "[log]") {
   CapturedLog log;
   std::vector<log::Entry> received;

@@ -1,6 +1,4 @@
-#include <pthread.h>
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <catch2/catch.hpp>
 #include <future>
@@ -92,18 +90,6 @@ TEST_CASE("A worker that throws keeps the exception and releases the threads tha
   worker.stop();
   REQUIRE(worker.error() != nullptr);
   CHECK_THROWS_WITH(std::rethrow_exception(worker.error()), "no");
-}
-
-TEST_CASE("The thread of a worker carries its name", "[worker]") {
-  std::array<char, 16> name{};
-  Worker<int> worker(
-      1, Overflow::kBlock,
-      [&](int) { pthread_getname_np(pthread_self(), name.data(), name.size()); },
-      "a name far too long for Linux");
-  worker.start();
-  worker.post(0);
-  worker.stop();
-  CHECK(std::string(name.data()) == "a name far too ");
 }
 
 // A node can neither write its inputs nor confuse the channels from peers and to peers.

@@ -216,15 +216,6 @@ TEST_CASE("An outage begins and ends as planned for its direction", "[link_emula
   CHECK(lost(emulator, LinkLoss::kOutage) == 3);
 }
 
-TEST_CASE("A frame on its way arrives although the link fails", "[link_emulation]") {
-  LinkPlan link;
-  link.trace = LinkTrace({{0.0, std::numeric_limits<double>::infinity(), 0.5}});
-  link.outages = {{1.0, 2.0}};
-  LinkEmulator emulator(script_of(2, link));
-  emulator.send(0, 0.9, frame_to(1));
-  CHECK(emulator.due(1.4).size() == 1);
-}
-
 TEST_CASE("A partition separates groups while it lasts", "[link_emulation]") {
   LinkScript script = script_of(4);
   script.partitions = {{{10.0, 20.0}, {0, 0, 1, 1}}};

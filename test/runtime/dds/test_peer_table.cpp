@@ -274,19 +274,6 @@ TEST_CASE("No participant takes over the id of a present robot", "[peers]") {
   CHECK(kinds(table) == Kinds{PeerEventKind::kReturned});
 }
 
-TEST_CASE("An id passes to the participant that has claimed it for longest", "[peers]") {
-  PeerTable table = with_robot();
-  for (const std::uint8_t n : std::vector<std::uint8_t>{5, 4, 3}) {
-    table.participant(guid(n), data_of(7, kBoot + n), "");
-    table.alive(guid(n));
-  }
-  table.closed(guid(2));
-  CHECK(table.standing(guid(5)) == Standing::kAdmitted);
-  table.closed(guid(4));
-  table.closed(guid(5));
-  CHECK(table.standing(guid(3)) == Standing::kAdmitted);
-}
-
 TEST_CASE("A robot that is a member no longer is lost, and its certificate no proof", "[peers]") {
   PeerTable table(kSelf, admit_all);
   for (const std::uint8_t n : std::vector<std::uint8_t>{2, 3}) {

@@ -141,10 +141,6 @@ TEST_CASE("A robot out of reach is accepted only with a valid certificate of its
     const ToyTeam others("survey");
     is_forged(ToyMember(others, kA, "alpha"), "credentials of another team");
   }
-  SECTION("a revoked member") {
-    (void)receiver.b.seal.update(receiver.team.revoking({receiver.a.keys.certificate}), kToyNow_s);
-    is_forged(receiver.a, "certificate is revoked");
-  }
   SECTION("a member with a name or boot id that it has not signed, or without credentials") {
     const std::string& shown = receiver.a.seal.credentials();
     for (const auto& [boot, introduction] :
