@@ -92,16 +92,6 @@ TrueState euroc_state(const Table& table, const TextRow& row) {
           vector(table, row, 14, false)};
 }
 
-// TUM: t[s] p q_xyzw.
-TrueState tum_state(const Table& table, const TextRow& row) {
-  const double t_s = number(table, row, 0);
-  const auto q = rotation(table, row, number(table, row, 7), vector(table, row, 4));
-  TrueState state;
-  state.stamp = static_cast<Stamp>(std::llround(t_s * 1e9));
-  state.T_world_body = make_pose(q.toRotationMatrix(), vector(table, row, 1));
-  return state;
-}
-
 bool is_header(const TextRow& row) {
   return !parse_double(row.fields.front());
 }
@@ -120,20 +110,14 @@ std::vector<Row> read_rows(const Table& table, const Parse& parse) {
   return rows;
 }
 
-bool is_comma_separated(const Table& table) {
-  return table.text.find(',') != std::string::npos;
-}
-
 }  // namespace
 
 RecordedFlight read_recorded_flight(const fs::path& truth, const fs::path& imu) {
   const Table states(truth);
   const Table samples(imu);
   RecordedFlight flight;
-  const bool euroc = is_comma_separated(states);
-  flight.truth = read_rows<TrueState>(states, [&](const TextRow& row) {
-    return euroc ? euroc_state(states, row) : tum_state(states, row);
-  });
+  flight.truth =
+      read_rows<TrueState>(states, [&](const TextRow& row) { return euroc_state(states, row); });
   flight.imu = read_rows<ImuSample>(samples, [&](const TextRow& row) {
     const auto stamp = parse_int64(row.fields.front());
     if (!stamp) samples.fail(row, "does not begin with a stamp in nanoseconds");

@@ -23,10 +23,10 @@ struct RecordedFlight {
   std::string fingerprint;  ///< Names and check sums of both files.
 };
 
-/// Reads true poses (EuRoC's state CSV, or TUM text with stamps in seconds) and inertial data
-/// (EuRoC's CSV); both may be gzipped. Rows that repeat the stamp of the row before are left out,
-/// because published truths have some. Throws std::runtime_error that names file and line for
-/// unusable rows, and for files that do not overlap in time.
+/// Reads true poses (EuRoC's state CSV) and inertial data (EuRoC's CSV); both may be gzipped. Rows
+/// that repeat the stamp of the row before are left out, because published truths have some. Throws
+/// std::runtime_error that names file and line for unusable rows, and for files that do not overlap
+/// in time.
 [[nodiscard]] RecordedFlight read_recorded_flight(const std::filesystem::path& truth,
                                                   const std::filesystem::path& imu);
 

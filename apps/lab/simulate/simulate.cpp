@@ -17,7 +17,6 @@
 #include "apps/lab/simulation/motion/default_rig.hpp"
 #include "apps/lab/simulation/motion/depth_sensor.hpp"
 #include "apps/lab/simulation/motion/traffic.hpp"
-#include "apps/lab/simulation/rendering/light_passages.hpp"
 #include "apps/lab/simulation/rendering/renderer.hpp"
 #include "apps/lab/simulation/rendering/sensor_effects.hpp"
 #include "apps/lab/simulation/rendering/surfaces.hpp"
@@ -44,10 +43,8 @@ World make_world(const SimulationOptions& options) {
   return make_vicon_room(options.seed);
 }
 
-DepthSensorOptions depth_sensor(const SensorRig& rig, bool is_ideal) {
+DepthSensorOptions depth_sensor(const SensorRig& rig) {
   DepthSensorOptions options;
-  options.ideal = is_ideal;
-  if (is_ideal) options.min_range_m = 0.0, options.max_range_m = 65.0;
   options.focal_px = rig.stereo.cameras[0].fx;
   options.baseline_m = rig.stereo.baseline_m();
   return options;
@@ -60,12 +57,6 @@ std::size_t depth_step(const SimulationOptions& options) {
 
 bool contains(const std::vector<ImageChannel>& channels, ImageChannel channel) {
   return std::ranges::find(channels, channel) != channels.end();
-}
-
-SensorEffectsConfig sensor_effects(const SimulationOptions& options) {
-  SensorEffectsConfig config = options.effects.sensor;
-  config.motion_blur = config.motion_blur || options.motion_blur;
-  return config;
 }
 
 // Calls body(0) to body(count - 1) from several threads. Rethrows the first exception.
@@ -105,11 +96,11 @@ class RobotCameras {
         left_(scenario.rig.stereo.cameras[0]),
         right_(scenario.rig.stereo.cameras[1]),
         meter_(shrunk(scenario.rig.stereo.cameras[0], ExposureControl::kMeterShrink)),
-        left_effects_(left_, sensor_effects(options), derived_seed(scenario.seed, kLeftDirt)),
-        right_effects_(right_, sensor_effects(options), derived_seed(scenario.seed, kRightDirt)),
-        passages_(sensor_effects(options), scenario.duration_s(),
+        left_effects_(left_, options.effects.sensor, derived_seed(scenario.seed, kLeftDirt)),
+        right_effects_(right_, options.effects.sensor, derived_seed(scenario.seed, kRightDirt)),
+        passages_(options.effects.sensor, scenario.duration_s(),
                   derived_seed(scenario.seed, kPassages)),
-        depth_sensor_(depth_sensor(scenario.rig, options.ideal_depth)) {}
+        depth_sensor_(depth_sensor(scenario.rig)) {}
 
   [[nodiscard]] const RecordingLayout& layout() const { return layout_; }
   [[nodiscard]] std::size_t frame_count() const { return scenario_.images.size(); }
@@ -144,7 +135,7 @@ class RobotCameras {
   // Sets the exposure of every frame, in order; call before the first record().
   void set_exposures(std::vector<Exposure> exposures) { exposures_ = std::move(exposures); }
 
-  // Renders frame `i` and writes the images that are missing. Throws RecordingError.
+  // Renders frame `i` and writes the images that are missing. Throws std::system_error.
   void record(std::size_t i) const {
     const Stamp stamp = scenario_.image_stamps[i];
     std::vector<ImageChannel> missing = channels(i);
@@ -316,7 +307,7 @@ class Simulation {
     };
     write(ImageChannel::kLeft, camera_yaml(left, options_.rate_hz, comment));
     write(ImageChannel::kRight, camera_yaml(rig.stereo.cameras[1], options_.rate_hz, comment));
-    const DepthSensorOptions depth = depth_sensor(rig, options_.ideal_depth);
+    const DepthSensorOptions depth = depth_sensor(rig);
     write(ImageChannel::kDepth, depth_yaml(left,
                                            {.rate_hz = options_.depth_rate_hz,
                                             .min_range_m = depth.min_range_m,
@@ -331,7 +322,7 @@ class Simulation {
   void meter() const {
     run_parallel(options_.threads, robots_.size(), [this](std::size_t r) {
       RobotCameras& cameras = *cameras_[r];
-      ExposureControl control(sensor_effects(options_), options_.rate_hz);
+      ExposureControl control(options_.effects.sensor, options_.rate_hz);
       std::vector<Exposure> exposures;
       for (std::size_t i = 0; i < cameras.frame_count(); ++i)
         exposures.push_back(control.next(cameras.meter(i), cameras.light(i)));

@@ -73,6 +73,7 @@ void read_options(const std::string& file, const ConfigSection& given, Simulatio
   fill_config(section, "", context, options);
   try {
     options.effects = load_effects(options.difficulty, options.settings);
+    options.effects.sensor.motion_blur |= options.motion_blur;
   } catch (const ConfigError& error) {
     problems.others += std::string(error.what()) + '\n';
   }
@@ -157,8 +158,8 @@ SimulationOptions completed(SimulationOptions options) {
   }
   complete_names(options);
   if (options.cameras == CameraKind::kRgbd) options.depth = true;
-  if (!options.depth && (options.depth_rate_hz > 0.0 || options.ideal_depth))
-    throw std::invalid_argument("--depth-rate and --ideal-depth need --depth or --rig rgbd");
+  if (!options.depth && options.depth_rate_hz > 0.0)
+    throw std::invalid_argument("--depth-rate needs --depth or --rig rgbd");
   if (options.depth_rate_hz <= 0.0) options.depth_rate_hz = options.rate_hz;
   const double steps = options.rate_hz / options.depth_rate_hz;
   if (steps < 1.0 || std::abs(steps - std::round(steps)) > 1e-6)
@@ -170,30 +171,33 @@ SimulationOptions completed(SimulationOptions options) {
   return options;
 }
 
-std::string name_of(WorldKind world) {
-  return Choices<WorldKind>{kWorlds}.name_of(world);
-}
+namespace {
 
-ParameterList parameters(const SimulationOptions& options) {
-  const auto yes = [](bool value) { return std::string(value ? "yes" : "no"); };
-  ParameterList list = {{"world", name_of(options.world)},
-                        {"seed", std::to_string(options.seed)},
-                        {"robots", std::to_string(options.robots)}};
-  if (options.is_recorded()) {
-    list.emplace_back("end", number_text(options.end_s));
-  } else {
-    list.emplace_back("duration", number_text(options.duration_s));
+// Visitor that lists every option except for those that the bytes do not depend on.
+class ParameterFields : public FieldVisitor<ParameterFields> {
+ public:
+  explicit ParameterFields(ParameterList& list) : list_(list) {}
+
+  template <typename T, typename Accepted>
+  void visit(const char* key, const T& value, const Accepted& accepted, const std::string&) {
+    const std::string name = key;
+    if constexpr (std::is_same_v<T, std::string>)
+      list_.emplace_back(name, value);
+    else if constexpr (!kIsList<T>)
+      if (name != "output" && name != "threads")
+        list_.emplace_back(name, yaml_text(value, accepted));
   }
-  list.emplace_back("rig", Choices<CameraKind>{kCameras}.name_of(options.cameras));
-  list.emplace_back("resolution",
-                    std::to_string(options.width) + 'x' + std::to_string(options.height));
-  list.emplace_back("rate", number_text(options.rate_hz));
-  list.emplace_back("depth", yes(options.depth));
-  if (options.depth) list.emplace_back("depth-rate", number_text(options.depth_rate_hz));
-  if (options.depth) list.emplace_back("ideal-depth", yes(options.ideal_depth));
-  list.emplace_back("labels", yes(options.labels));
-  list.emplace_back("motion-blur", yes(options.motion_blur));
-  list.emplace_back("difficulty", std::to_string(options.difficulty));
+
+ private:
+  ParameterList& list_;
+};
+
+}  // namespace
+
+ParameterList parameters(SimulationOptions options) {
+  ParameterList list;
+  ParameterFields fields(list);
+  options.visit_fields(fields);
   for (const std::string& setting : options.settings)
     list.emplace_back(setting.substr(0, setting.find('=')), setting);
   return list;

@@ -36,7 +36,6 @@ struct SimulationOptions {
   double rate_hz = 20.0;
   bool depth = false;
   double depth_rate_hz = 0.0;
-  bool ideal_depth = false;
   bool labels = false;
   bool motion_blur = false;
   int difficulty = 0;
@@ -70,7 +69,6 @@ struct SimulationOptions {
     visitor.field("depth", depth, "Also depth images of the left camera (16 bit, mm)");
     visitor.field("depth-rate", depth_rate_hz, {0.0, 200.0},
                   "Depth images per second, --rate divided by a whole number; 0: --rate");
-    visitor.field("ideal-depth", ideal_depth, "Depth without noise and holes");
     visitor.field("labels", labels, "Also class ids of the left camera's pixels");
     visitor.field("motion-blur", motion_blur, "Smear images along their motion");
     visitor.field(
@@ -79,8 +77,8 @@ struct SimulationOptions {
     visitor.field("set", settings,
                   "Keys of single effects over those of the difficulty: section.key=value");
     visitor.field("trajectory", truths, Input{},
-                  "Recorded motion: true poses of flights, one file per robot: EuRoC's state CSV "
-                  "or TUM text, also gzipped; in the frame of the world");
+                  "Recorded motion: true poses of flights, one file per robot: EuRoC's state CSV, "
+                  "also gzipped; in the frame of the world");
     visitor.field("imu", imus, Input{}, "The recorded inertial data, one CSV per --trajectory");
     visitor.field("names", names, "Names of the robots of recorded motion (default: the files')");
     visitor.field(
@@ -104,8 +102,6 @@ void define(CLI::App& app, SimulationOptions& options);
 
 /// All parameters that the bytes of the recordings depend on; neither the threads nor the output
 /// folder.
-[[nodiscard]] ParameterList parameters(const SimulationOptions& options);
-
-[[nodiscard]] std::string name_of(WorldKind world);
+[[nodiscard]] ParameterList parameters(SimulationOptions options);
 
 }  // namespace km

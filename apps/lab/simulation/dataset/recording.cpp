@@ -1,12 +1,9 @@
 #include "apps/lab/simulation/dataset/recording.hpp"
 
-#include <fcntl.h>
-#include <unistd.h>
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <cerrno>
-#include <cstring>
+#include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <span>
@@ -16,6 +13,7 @@
 #include <vector>
 
 #include "modules/core/json.hpp"
+#include "modules/core/write_file.hpp"
 #include "modules/images/image_codec.hpp"
 #include "modules/images/image_view.hpp"
 
@@ -24,72 +22,26 @@ namespace {
 
 constexpr int kJpegQuality = 92;
 
-void require_size(int width, int height, std::size_t pixels) {
-  if (width <= 0 || height <= 0 ||
-      pixels != static_cast<std::size_t>(width) * static_cast<std::size_t>(height))
-    throw std::invalid_argument("an image of " + std::to_string(width) + 'x' +
-                                std::to_string(height) + " has not " + std::to_string(pixels) +
-                                " pixels");
-}
+namespace fs = std::filesystem;
 
 }  // namespace
 
 std::vector<std::uint8_t> encode_gray(const GrayImage& image) {
-  require_size(image.width, image.height, image.pixels.size());
   return encode_jpeg(view(image), kJpegQuality);
 }
 
 std::vector<std::uint8_t> encode_depth(int width, int height,
                                        const std::vector<std::uint16_t>& depth_mm) {
-  require_size(width, height, depth_mm.size());
   return encode_png(view(width, height, CV_16UC1, depth_mm));
 }
 
 std::vector<std::uint8_t> encode_labels(int width, int height, const std::vector<LabelId>& labels) {
-  require_size(width, height, labels.size());
   return encode_png(view(width, height, CV_8UC1, labels));
 }
 
-namespace {
-
-const char* folder_name(ImageChannel channel) {
-  switch (channel) {
-    case ImageChannel::kLeft:
-      return "cam0";
-    case ImageChannel::kRight:
-      return "cam1";
-    case ImageChannel::kDepth:
-      return "depth0";
-    case ImageChannel::kLabels:
-      break;
-  }
-  return "label0";
-}
-
-namespace fs = std::filesystem;
-
-[[noreturn]] void fail(const fs::path& file, int error) {
-  const char* const help = error == ENOSPC || error == EDQUOT
-                               ? "; make room and run the same command again to continue"
-                               : "";
-  throw RecordingError(file.string() + ": cannot be written: " + std::strerror(error) + help);
-}
-
-// Returns 0, or the errno of the failure.
-int write_all(int descriptor, std::span<const std::uint8_t> bytes) {
-  while (!bytes.empty()) {
-    const ssize_t written = ::write(descriptor, bytes.data(), bytes.size());
-    if (written < 0 && errno == EINTR) continue;
-    if (written < 0) return errno;
-    bytes = bytes.subspan(static_cast<std::size_t>(written));
-  }
-  return 0;
-}
-
-}  // namespace
-
 std::filesystem::path RecordingLayout::folder(ImageChannel channel) const {
-  return mav0_ / folder_name(channel);
+  constexpr std::array kNames = {"cam0", "cam1", "depth0", "label0"};
+  return mav0_ / kNames.at(static_cast<std::size_t>(channel));
 }
 
 std::filesystem::path RecordingLayout::image(ImageChannel channel, Stamp stamp) const {
@@ -113,43 +65,22 @@ const char* RecordingLayout::image_extension(ImageChannel channel) {
   return lossless ? ".png" : ".jpg";
 }
 
-void write_whole_file(const fs::path& file, std::span<const std::uint8_t> bytes) {
-  fs::path part = file;
-  part += ".part";
-  int descriptor = ::open(part.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-  if (descriptor < 0 && errno == ENOENT) {
-    std::error_code error;
-    fs::create_directories(file.parent_path(), error);
-    if (error) fail(file.parent_path(), error.value());
-    descriptor = ::open(part.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-  }
-  if (descriptor < 0) fail(file, errno);
-  int error = write_all(descriptor, bytes);
-  if (::close(descriptor) != 0 && error == 0) error = errno;  // network disks report errors here
-  if (error == 0 && ::rename(part.c_str(), file.c_str()) != 0) error = errno;
-  if (error == 0) return;
-  ::unlink(part.c_str());
-  fail(file, error);
+void write_whole_file(const fs::path& file, std::string_view bytes) {
+  if (!fs::exists(file.parent_path())) fs::create_directories(file.parent_path());
+  write_file(file, bytes);
 }
 
-void write_whole_file(const fs::path& file, std::string_view text) {
+void write_whole_file(const fs::path& file, std::span<const std::uint8_t> bytes) {
   write_whole_file(file,
-                   std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size()));
+                   std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
 }
 
 bool is_whole_image(const fs::path& file) {
-  constexpr std::array<std::uint8_t, 8> kPngEnd = {'I', 'E', 'N', 'D', 0xAE, 0x42, 0x60, 0x82};
-  constexpr std::array<std::uint8_t, 2> kJpegEnd = {0xFF, 0xD9};
-  const int descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
-  if (descriptor < 0) return false;
-  std::array<std::uint8_t, 8> tail{};
-  const off_t size = ::lseek(descriptor, 0, SEEK_END);
-  const bool read = size > 8 && ::pread(descriptor, tail.data(), tail.size(), size - 8) == 8;
-  ::close(descriptor);
-  if (!read) return false;
-  return file.extension() == ".png"
-             ? tail == kPngEnd
-             : std::equal(kJpegEnd.begin(), kJpegEnd.end(), tail.end() - kJpegEnd.size());
+  std::ifstream stream(file, std::ios::binary);
+  std::array<char, 8> tail{};
+  if (!stream.seekg(-8, std::ios::end) || !stream.read(tail.data(), tail.size())) return false;
+  const std::string_view end(tail.data(), tail.size());
+  return file.extension() == ".png" ? end == "IEND\xAE\x42\x60\x82" : end.ends_with("\xFF\xD9");
 }
 
 namespace {

@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <filesystem>
 #include <span>
-#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -20,8 +19,7 @@
 
 namespace km {
 
-/// Encoded images. The same input gives the same bytes. All throw std::invalid_argument if the
-/// number of pixels is not width * height.
+/// Encoded images of width * height pixels. The same input gives the same bytes.
 
 /// JPEG at quality 92, as the recorded images used here. It correlates the noise of neighbouring
 /// pixels, which affects features and optical flow.
@@ -70,16 +68,9 @@ class RecordingLayout {
   std::filesystem::path mav0_;
 };
 
-/// A file of a recording that cannot be written. what() names the file and the reason.
-struct RecordingError : std::runtime_error {
-  using std::runtime_error::runtime_error;
-};
-
-/// Writes `bytes` under a temporary name beside `file` and renames it, so that an existing file is
-/// complete, whenever the program is stopped. Missing folders are made. Throws RecordingError,
-/// after which neither a new `file` nor the temporary one exists.
+/// As write_file(); missing folders are made.
 void write_whole_file(const std::filesystem::path& file, std::span<const std::uint8_t> bytes);
-void write_whole_file(const std::filesystem::path& file, std::string_view text);
+void write_whole_file(const std::filesystem::path& file, std::string_view bytes);
 
 /// True for a PNG or JPEG file that exists and has its end marker. After a crash of the machine, an
 /// existing file may be incomplete.

@@ -5,8 +5,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
-#include <stdexcept>
-#include <string>
 #include <utility>
 
 #include "apps/lab/simulation/world/seeded_random.hpp"
@@ -105,17 +103,7 @@ bool at_edge(std::span<const double> disparity, std::size_t width, std::size_t x
 
 std::vector<std::uint16_t> DepthSensor::measure(std::span<const float> depth_m, int width,
                                                 int height, std::uint64_t seed) const {
-  if (width <= 0 || height <= 0 ||
-      depth_m.size() != static_cast<std::size_t>(width) * static_cast<std::size_t>(height))
-    throw std::invalid_argument("depth sensor: " + std::to_string(depth_m.size()) + " depths for " +
-                                std::to_string(width) + "x" + std::to_string(height) + " pixels");
   std::vector<std::uint16_t> measured(depth_m.size(), 0);
-  if (options_.ideal) {
-    std::ranges::transform(depth_m, measured.begin(),
-                           [](float z) { return millimetres(static_cast<double>(z)); });
-    return measured;
-  }
-
   const double focal_baseline = options_.focal_px * options_.baseline_m;
   const auto columns = static_cast<std::size_t>(width), rows = static_cast<std::size_t>(height);
   const std::vector<double> disparity = disparities(depth_m, focal_baseline);

@@ -12,7 +12,6 @@ struct DepthSensorOptions {
   double baseline_m = 0.1;
   double min_range_m = 0.4;
   double max_range_m = 20.0;
-  bool ideal = false;  ///< Measures the true depth everywhere.
 };
 
 /// Depth images of a stereo camera from true ones.
@@ -24,7 +23,7 @@ class DepthSensor {
   /// for no depth. The disparity d = f b / z gets noise and is rounded to steps, so that the error
   /// grows with the square of range: sigma_z = z^2 / (f b) * sigma_d. There is no depth outside the
   /// range, where a nearer surface blocks the right camera's view, and at random at edges. `seed`
-  /// is that of the frame. Throws std::invalid_argument if depth_m.size() is not width * height.
+  /// is that of the frame.
   [[nodiscard]] std::vector<std::uint16_t> measure(std::span<const float> depth_m, int width,
                                                    int height, std::uint64_t seed) const;
 

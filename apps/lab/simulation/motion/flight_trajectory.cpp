@@ -4,8 +4,6 @@
 #include <cmath>
 #include <cstddef>
 #include <numbers>
-#include <stdexcept>
-#include <string>
 #include <utility>
 #include <vector>
 
@@ -150,17 +148,6 @@ constexpr double kRotationNoise_rad = 0.0005;
 constexpr double kJerk_mps3 = 100.0;
 constexpr double kRotationJerk = 1000.0;  // [rad/s^3]
 
-void check(std::span<const StampedPose> poses) {
-  if (poses.size() < 2)
-    throw std::invalid_argument("recorded trajectory: " + std::to_string(poses.size()) +
-                                " poses, at least 2 are needed");
-  for (std::size_t k = 1; k < poses.size(); ++k)
-    if (poses[k].stamp <= poses[k - 1].stamp)
-      throw std::invalid_argument("recorded trajectory: stamp " + std::to_string(poses[k].stamp) +
-                                  " of pose " + std::to_string(k) +
-                                  " is not after the one before it");
-}
-
 // The poses as rows of position and quaternion, neighbouring quaternions on one side of R^4.
 Eigen::MatrixXd pose_rows(std::span<const StampedPose> poses) {
   Eigen::MatrixXd rows(static_cast<Eigen::Index>(poses.size()), 7);
@@ -177,7 +164,6 @@ Eigen::MatrixXd pose_rows(std::span<const StampedPose> poses) {
 }  // namespace
 
 RecordedTrajectory fit_recording(std::span<const StampedPose> poses, Stamp epoch) {
-  check(poses);
   // The intervals are stretched a little, so that a whole number of them spans the recording.
   const double span_s = seconds_between(poses.front().stamp, poses.back().stamp);
   const double intervals = std::max(1.0, std::round(span_s / kFitInterval_s));

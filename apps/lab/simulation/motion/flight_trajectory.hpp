@@ -33,9 +33,8 @@ struct RecordedTrajectory {
 
 /// A smooth motion through recorded poses, by penalised and robust linear least squares. It passes
 /// within the noise of the poses. Time 0 of the trajectory is `epoch`, so that stamps of images and
-/// inertial data convert by seconds_between(epoch, stamp). `poses` ascend strictly in time; the
-/// curve covers the first to the last. Throws std::invalid_argument for fewer than two poses and
-/// stamps that do not ascend. O(poses).
+/// inertial data convert by seconds_between(epoch, stamp). The curve covers the first to the last
+/// pose. Precondition: `poses` are at least two and ascend strictly in time. O(poses).
 [[nodiscard]] RecordedTrajectory fit_recording(std::span<const StampedPose> poses, Stamp epoch);
 
 }  // namespace km

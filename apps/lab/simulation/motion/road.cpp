@@ -5,8 +5,6 @@
 #include <cmath>
 #include <cstddef>
 #include <numbers>
-#include <stdexcept>
-#include <string>
 #include <utility>
 #include <vector>
 
@@ -20,29 +18,10 @@ using Points = std::vector<Eigen::Vector2d>;
 constexpr double kSpacing_m = 0.25;
 constexpr double kEasing_m =
     0.8;  // standard deviation of the smoothing, for the time that steering takes
-constexpr double kShortest_m = 20.0;
-constexpr double kSamePoint_m = 1e-3;
 constexpr double kStraight = 1e-4;  // smallest angle of a corner [rad]
 
 double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   return a.x() * b.y() - a.y() * b.x();
-}
-
-[[noreturn]] void refuse_route(const std::string& problem) {
-  throw std::invalid_argument("route: " + problem);
-}
-
-Points without_repeats(const Points& points) {
-  Points kept;
-  for (const Eigen::Vector2d& point : points) {
-    if (!point.allFinite())
-      refuse_route("point " + std::to_string(&point - points.data()) + " is not finite");
-    if (kept.empty() || (point - kept.back()).norm() > kSamePoint_m) kept.push_back(point);
-  }
-  while (kept.size() > 1 && (kept.front() - kept.back()).norm() <= kSamePoint_m) kept.pop_back();
-  if (kept.size() < 3)
-    refuse_route(std::to_string(kept.size()) + " different points, at least 3 needed");
-  return kept;
 }
 
 // Points of the arc that rounds the corner at `corner`; the corner itself if the path is straight.
@@ -131,12 +110,7 @@ Points smoothed(const Points& points, double sigma_points) {
 
 // Control k of the spline is point k - 2, so that the curve starts at point 0.
 UniformSpline<2> closed_spline(const Route& route, double radius_m) {
-  const Points corners = without_repeats(route.points);
-  const double length = closed_length(corners);
-  if (length < kShortest_m)
-    refuse_route(std::to_string(length) + " m long, at least " + std::to_string(kShortest_m) +
-                 " needed");
-  const Points arcs = rounded(corners, radius_m);
+  const Points arcs = rounded(route.points, radius_m);
   const auto count = static_cast<std::size_t>(std::ceil(closed_length(arcs) / kSpacing_m));
   const Points eased = smoothed(resampled(arcs, count), kEasing_m / kSpacing_m);
   const Points even = resampled(eased, count);
@@ -168,22 +142,6 @@ UniformSpline<1> random_walk(double begin_m, double end_m, double roughness, std
   return {begin_m, kInterval_m, std::move(heights)};
 }
 
-// Values of a passenger car: eigenfrequencies, damping, and tilt per acceleration (about 4 and 5
-// degrees per g).
-constexpr double kHeave_hz = 1.5;
-constexpr double kPitch_hz = 1.6;
-constexpr double kRoll_hz = 1.4;
-constexpr double kDamping = 0.3;
-constexpr double kWheelHop_hz = 10.0;
-constexpr double kWheelDamping = 0.5;
-constexpr double kPitchGain = -0.007;  // [rad/(m/s^2)]: speeding up lifts the nose
-constexpr double kRollGain = 0.009;    // [rad/(m/s^2)]
-constexpr int kSubsteps = 5;
-
-constexpr double angular(double frequency_hz) {
-  return 2.0 * std::numbers::pi * frequency_hz;
-}
-
 }  // namespace
 
 RoutePath::RoutePath(const Route& route, double corner_radius_m)
@@ -199,33 +157,5 @@ RoutePath::Point RoutePath::at(double way_m) const {
 
 RoadProfile::RoadProfile(double begin_m, double end_m, double roughness, std::uint64_t seed)
     : curve_(random_walk(begin_m, end_m, roughness, seed)) {}
-
-Suspension::Suspension(const SprungBody& ground)
-    : heave_(ground.heave_m), pitch_(ground.pitch_rad), roll_(ground.roll_rad) {}
-
-// Semi-implicit Euler: stable for steps far below the periods.
-double Suspension::Axis::advance(double next_ground, double frequency_hz, double dt_s) {
-  const double a = angular(kWheelHop_hz), b = angular(frequency_hz);
-  const double h = dt_s / kSubsteps;
-  const double ground_step = (next_ground - ground_) / kSubsteps;
-  for (int k = 0; k < kSubsteps; ++k) {
-    ground_ = k + 1 == kSubsteps ? next_ground : ground_ + ground_step;
-    wheels_rate_ += h * (a * a * (ground_ - wheels_) - 2.0 * kWheelDamping * a * wheels_rate_);
-    wheels_ += h * wheels_rate_;
-    body_rate_ +=
-        h * (b * b * (wheels_ - body_) - 2.0 * kDamping * b * (body_rate_ - wheels_rate_));
-    body_ += h * body_rate_;
-  }
-  return body_;
-}
-
-SprungBody Suspension::step(const SprungBody& ground, double forward_mps2, double left_mps2,
-                            double dt_s) {
-  SprungBody body;
-  body.heave_m = heave_.advance(ground.heave_m, kHeave_hz, dt_s);
-  body.pitch_rad = pitch_.advance(ground.pitch_rad + kPitchGain * forward_mps2, kPitch_hz, dt_s);
-  body.roll_rad = roll_.advance(ground.roll_rad + kRollGain * left_mps2, kRoll_hz, dt_s);
-  return body;
-}
 
 }  // namespace km

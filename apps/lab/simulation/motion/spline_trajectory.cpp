@@ -61,35 +61,12 @@ SparseMatrix third_differences(std::size_t controls) {
 
 using Control = SplineTrajectory::Control;
 
-constexpr double kMinLength = 0.5;  // shortest quaternion of a control
-constexpr double kMaxLength = 2.0;
-constexpr double kMinCosine =
-    0.70710678118;  // smallest cosine of half the angle between neighbours
-
-[[noreturn]] void refuse_spline(const std::string& problem) {
-  throw std::invalid_argument("spline trajectory: " + problem);
-}
-
 // Controls with the signs of quaternions aligned. q and -q are the same rotation, but not the same
 // control.
-std::vector<Control> aligned(std::vector<Control> controls, double start_s, double interval_s) {
-  if (!std::isfinite(start_s)) refuse_spline("start " + std::to_string(start_s) + " s");
-  if (!(interval_s > 0.0) || !std::isfinite(interval_s))
-    refuse_spline("interval " + std::to_string(interval_s) + " s is not positive");
-  if (controls.size() < QuinticBasis::kOrder)
-    refuse_spline(std::to_string(controls.size()) + " controls, at least 6 are needed");
-  for (std::size_t k = 0; k < controls.size(); ++k) {
+std::vector<Control> aligned(std::vector<Control> controls) {
+  for (std::size_t k = 1; k < controls.size(); ++k) {
     auto q = controls[k].tail<4>();
-    const double length = q.norm();
-    if (!controls[k].allFinite() || length < kMinLength || length > kMaxLength)
-      refuse_spline("control " + std::to_string(k) + " is no pose");
-    if (k == 0) continue;
-    const auto previous = controls[k - 1].tail<4>();
-    const double cosine = q.dot(previous) / (length * previous.norm());
-    if (std::abs(cosine) < kMinCosine)
-      refuse_spline("more than 90 degrees between controls " + std::to_string(k - 1) + " and " +
-                    std::to_string(k));
-    if (cosine < 0.0) q = -q.eval();
+    if (q.dot(controls[k - 1].tail<4>()) < 0.0) q = -q.eval();
   }
   return controls;
 }
@@ -134,7 +111,7 @@ Eigen::MatrixXd fit_spline(std::span<const double> positions, const Eigen::Matri
 }
 
 SplineTrajectory::SplineTrajectory(double start_s, double interval_s, std::vector<Control> controls)
-    : curve_(start_s, interval_s, aligned(std::move(controls), start_s, interval_s)) {}
+    : curve_(start_s, interval_s, aligned(std::move(controls))) {}
 
 BodyMotion SplineTrajectory::motion(double t_s) const {
   if (!(start_s() <= t_s && t_s <= end_s()))

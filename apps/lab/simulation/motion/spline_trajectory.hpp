@@ -123,9 +123,8 @@ class SplineTrajectory final : public BodyTrajectory {
   using Control = Eigen::Matrix<double, 7, 1>;
 
   /// The curve over [start_s, start_s + (controls - 5) * interval_s], at `start_s` nearest to
-  /// control 2. Equal controls give a body at rest. Throws std::invalid_argument for fewer than 6
-  /// controls, an interval that is not positive, values that are not finite, and neighbouring
-  /// rotations more than 90 degrees apart.
+  /// control 2. Equal controls give a body at rest. Preconditions: at least 6 controls,
+  /// neighbouring rotations at most 90 degrees apart.
   SplineTrajectory(double start_s, double interval_s, std::vector<Control> controls);
 
   [[nodiscard]] double start_s() const override { return curve_.start(); }

@@ -51,6 +51,11 @@ class WalkToAndFro final : public BodyTrajectory {
   std::function<double(double, double)> ground_;
 };
 
+// Pose of a thing. Trajectories begin kMargin_s before the first image.
+SE3 pose_on(const BodyTrajectory& way, double t_s) {
+  return way.motion(std::clamp(t_s + kMargin_s, way.start_s(), way.end_s())).T_world_body;
+}
+
 // Space around a thing in its own frame that others must not enter.
 struct Space {
   double along_m, across_m;
@@ -76,9 +81,7 @@ class TrafficPlanner {
     const int cars = world_.ground_height ? config.cars : 0;
     for (int i = 0; i < cars; ++i) {
       if (!add_free([this] { return draw_car(); }, cars_)) continue;
-      constexpr VehicleKind kKinds[] = {VehicleKind::kSedan, VehicleKind::kHatchback,
-                                        VehicleKind::kEstate, VehicleKind::kVan};
-      add_vehicle(scene, looks.pick(kKinds), looks);
+      add_car(scene, looks);
     }
     for (int i = 0; i < config.people; ++i)
       if (add_free([this] { return draw_walker(); }, walkers_)) add_person(scene, looks);
@@ -106,7 +109,7 @@ class TrafficPlanner {
 
   bool is_free(const BodyTrajectory& way, bool is_car) const {
     for (double t = -kMargin_s; t <= duration_s_ + kMargin_s; t += kCheckStep_s)
-      if (is_blocked(way.motion(t).T_world_body, t, is_car)) return false;
+      if (is_blocked(pose_on(way, t), t, is_car)) return false;
     return true;
   }
 
@@ -122,7 +125,7 @@ class TrafficPlanner {
         return true;
     }
     for (const Way& car : cars_) {
-      const SE3 T_world_car = car->motion(t_s).T_world_body;
+      const SE3 T_world_car = pose_on(*car, t_s);
       if (is_inside(T_world_car, space, T_world_mover) ||
           (is_car && is_inside(T_world_mover, space, T_world_car)))
         return true;
@@ -140,8 +143,8 @@ class TrafficPlanner {
     vehicle.start_m = 300.0 * random_.unit();
     vehicle.standstill_s = 0.0;
     vehicle.rig_height_m = 0.0;
-    return std::make_unique<Shifted>(make_vehicle_trajectory(route, world_.ground_height, vehicle),
-                                     kMargin_s);
+    return std::make_unique<SplineTrajectory>(
+        make_vehicle_trajectory(route, world_.ground_height, vehicle));
   }
 
   Way draw_walker() {
@@ -179,23 +182,6 @@ class TrafficPlanner {
     return {at - 8.0 * forward + lateral_m * right, at + 8.0 * forward + lateral_m * right};
   }
 
-  // A trajectory that begins before time 0.
-  class Shifted final : public BodyTrajectory {
-   public:
-    Shifted(SplineTrajectory trajectory, double lead_s)
-        : trajectory_(std::move(trajectory)), lead_s_(lead_s) {}
-    [[nodiscard]] double start_s() const override { return trajectory_.start_s() - lead_s_; }
-    [[nodiscard]] double end_s() const override { return trajectory_.end_s() - lead_s_; }
-    [[nodiscard]] BodyMotion motion(double t_s) const override {
-      return trajectory_.motion(
-          std::clamp(t_s + lead_s_, trajectory_.start_s(), trajectory_.end_s()));
-    }
-
-   private:
-    SplineTrajectory trajectory_;
-    double lead_s_;
-  };
-
   const World& world_;
   const std::vector<RobotWay>& robots_;
   double duration_s_;
@@ -207,12 +193,8 @@ class TrafficPlanner {
 
 std::vector<SE3> Traffic::poses(double t_s) const {
   std::vector<SE3> poses;
-  for (const auto& way : ways) poses.push_back(way->motion(t_s).T_world_body);
+  for (const auto& way : ways) poses.push_back(pose_on(*way, t_s));
   return poses;
-}
-
-SurfaceClass Traffic::label(std::size_t i) const {
-  return shapes.materials.at(shapes.mesh.materials.at(shapes.objects.at(i).first_triangle)).label;
 }
 
 Traffic make_traffic(const World& world, const TrafficConfig& config,

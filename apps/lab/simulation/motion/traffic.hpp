@@ -28,11 +28,10 @@ struct TrafficConfig {
 /// Things that move, and where they are. Time 0 is the first image.
 struct Traffic {
   World shapes;  ///< Its objects are the things, each in its own frame; empty: nothing moves.
-  std::vector<std::unique_ptr<const BodyTrajectory>> ways;  ///< T_world_object of each object.
+  std::vector<std::unique_ptr<const BodyTrajectory>> ways;  ///< One for each object; see poses().
 
+  /// T_world_object of each object.
   [[nodiscard]] std::vector<SE3> poses(double t_s) const;
-  /// Class of object `i`.
-  [[nodiscard]] SurfaceClass label(std::size_t i) const;
 };
 
 /// Pose of a robot at a time since the first image.

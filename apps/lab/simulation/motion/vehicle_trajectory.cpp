@@ -112,12 +112,12 @@ std::vector<double> ways_in_time(const std::vector<double>& speeds, const SpeedP
   return ways;
 }
 
-// Convolution with a Gaussian of kPedalTime_s; the result is shorter by its reach at both ends.
-std::vector<double> smoothed(const std::vector<double>& values, int reach) {
+// Convolution with a Gaussian; the result is shorter by its reach at both ends.
+std::vector<double> smoothed(const std::vector<double>& values, double sigma_s, int reach) {
   std::vector<double> weights;
   double sum = 0.0;
   for (int d = -reach; d <= reach; ++d) {
-    const double x = d * kInterval_s / kPedalTime_s;
+    const double x = d * kInterval_s / sigma_s;
     weights.push_back(std::exp(-0.5 * x * x));
     sum += weights.back();
   }
@@ -151,7 +151,7 @@ std::vector<double> drive(const RoutePath& path, double speed_mps, const Vehicle
   std::vector<double> ways =
       smoothed(ways_in_time(speeds, plan, options.standstill_s + 2.0 * reach_s,
                             count + 2 * static_cast<std::size_t>(reach)),
-               reach);
+               kPedalTime_s, reach);
   for (double& way : ways) way += options.start_m;
   return ways;
 }
@@ -176,6 +176,10 @@ UniformSpline<1> wander(double begin_m, double end_m, std::uint64_t seed) {
     controls.emplace_back(kWander_m / kQuinticShrink * std::clamp(random.draw(), -2.0, 2.0));
   return {begin_m, kWanderInterval_m, std::move(controls)};
 }
+
+// Heave, pitch and roll of a body: height of the point midway between the wheels [m], nose down and
+// leaning right are positive [rad].
+using Posture = std::array<double, 3>;
 
 // Position on the ground of the vehicle's reference point, midway between its wheels.
 struct GroundPoint {
@@ -206,7 +210,7 @@ class Road {
   }
 
   // Heave, pitch and roll of a rigid body on four wheels without springs.
-  [[nodiscard]] SprungBody under_wheels(const GroundPoint& point, double way_m) const {
+  [[nodiscard]] Posture under_wheels(const GroundPoint& point, double way_m) const {
     const double front_left = wheel(point, way_m, 1.0, 1.0);
     const double front_right = wheel(point, way_m, 1.0, -1.0);
     const double rear_left = wheel(point, way_m, -1.0, 1.0);
@@ -244,14 +248,34 @@ class Road {
   RoadProfile left_, right_;
 };
 
+// The springs of a passenger car. Tilt per acceleration: about 4 and 5 degrees per g, nose up when
+// speeding up, leaning outwards in curves.
+constexpr double kSpringTime_s = 0.08;  // standard deviation of the smoothing
+constexpr double kPitchGain = -0.007;   // [rad/(m/s^2)]
+constexpr double kRollGain = 0.009;     // [rad/(m/s^2)]
+
+// The postures of a body on springs: each value smoothed in time. The first and the last one
+// continue outwards.
+void spring(std::vector<Posture>& postures) {
+  const int reach = static_cast<int>(std::ceil(kSmoothReach * kSpringTime_s / kInterval_s));
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    std::vector<double> values(static_cast<std::size_t>(reach), postures.front()[axis]);
+    for (const Posture& posture : postures) values.push_back(posture[axis]);
+    values.insert(values.end(), static_cast<std::size_t>(reach), postures.back()[axis]);
+    const std::vector<double> smooth = smoothed(values, kSpringTime_s, reach);
+    for (std::size_t k = 0; k < postures.size(); ++k) postures[k][axis] = smooth[k];
+  }
+}
+
 // Pose of the body, `height_m` above the reference point along the body's own z axis.
-SE3 body_pose(const GroundPoint& point, const SprungBody& body, double height_m) {
+SE3 body_pose(const GroundPoint& point, const Posture& posture, double height_m) {
+  const auto& [heave_m, pitch_rad, roll_rad] = posture;
   const double yaw = std::atan2(point.heading.y(), point.heading.x());
   const Eigen::Matrix3d R = (Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()) *
-                             Eigen::AngleAxisd(body.pitch_rad, Eigen::Vector3d::UnitY()) *
-                             Eigen::AngleAxisd(body.roll_rad, Eigen::Vector3d::UnitX()))
+                             Eigen::AngleAxisd(pitch_rad, Eigen::Vector3d::UnitY()) *
+                             Eigen::AngleAxisd(roll_rad, Eigen::Vector3d::UnitX()))
                                 .toRotationMatrix();
-  const Eigen::Vector3d ground(point.position.x(), point.position.y(), body.heave_m);
+  const Eigen::Vector3d ground(point.position.x(), point.position.y(), heave_m);
   return make_pose(R, ground + R * Eigen::Vector3d(0.0, 0.0, height_m));
 }
 
@@ -264,22 +288,24 @@ SplineTrajectory make_vehicle_trajectory(const Route& route, const GroundHeight&
       drive(RoutePath(route, kCornerRadius_m), route.speed_mps, options);
   const Road road(route, ground_height, options, ways.front(), ways.back());
 
-  std::vector<SE3> poses;
-  SprungBody body = road.under_wheels(road.point(ways.front()), ways.front());
-  Suspension suspension(body);
+  std::vector<GroundPoint> points;
+  std::vector<Posture> postures;
   for (std::size_t k = 0; k + 1 < ways.size(); ++k) {
     const double before = ways[k == 0 ? k : k - 1];
     const GroundPoint point = road.point(ways[k]);
     const double speed = (ways[k + 1] - before) / (2.0 * dt);
     const double forward = (ways[k + 1] - 2.0 * ways[k] + before) / (dt * dt);
-    if (k > 0)
-      body = suspension.step(road.under_wheels(point, ways[k]), forward,
-                             speed * speed * point.curvature, dt);
-    poses.push_back(body_pose(point, body, options.rig_height_m));
-    if (k == 0)
-      poses.insert(poses.end(), 2, poses.back());  // the vehicle is at rest before the
-                                                   // start
+    Posture posture = road.under_wheels(point, ways[k]);
+    posture[1] += kPitchGain * forward;
+    posture[2] += kRollGain * speed * speed * point.curvature;
+    points.push_back(point);
+    postures.push_back(posture);
   }
+  spring(postures);
+  // The vehicle is at rest before the start.
+  std::vector<SE3> poses(2, body_pose(points.front(), postures.front(), options.rig_height_m));
+  for (std::size_t k = 0; k < points.size(); ++k)
+    poses.push_back(body_pose(points[k], postures[k], options.rig_height_m));
   return spline_along(0.0, dt, poses);
 }
 

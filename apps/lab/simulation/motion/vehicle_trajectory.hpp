@@ -19,12 +19,11 @@ struct VehicleOptions {
 
 /// A vehicle that drives along `route`, once around and further, from time 0 to `duration_s` or a
 /// few milliseconds more. Body: x forward, y left, z up. Heading is the path's tangent. Pitch and
-/// roll are those of the ground under four wheels, filtered by a suspension. The suspension is
+/// roll are those of the ground under four wheels, smoothed by a suspension. The suspension is
 /// excited by the ground, the road's roughness and the vehicle's accelerations.
 ///
 /// The limits hold for the path of the point on the ground below the body; the body itself sways
-/// above it by a few centimetres. Throws std::invalid_argument for a route with fewer than three
-/// points or shorter than 20 m.
+/// above it by a few centimetres.
 [[nodiscard]] SplineTrajectory make_vehicle_trajectory(
     const Route& route, const std::function<double(double, double)>& ground_height,
     const VehicleOptions& options);

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+#include <opencv2/imgproc.hpp>
 
 #include "apps/lab/simulation/world/seeded_random.hpp"
 #include "modules/core/geometry.hpp"
@@ -66,9 +66,9 @@ void LensClutter::cover_with_dirt(const SensorEffectsConfig& config, std::uint64
 
 // A bright line for each drop, along its way relative to the camera while the shutter is open.
 std::vector<float> LensClutter::rain_cover(const Shot& shot) const {
-  std::vector<float> cover(static_cast<std::size_t>(camera_.width) *
-                           static_cast<std::size_t>(camera_.height));
+  cv::Mat1b cover(camera_.height, camera_.width, std::uint8_t{0});
   SeededRandom random(shot.rain_seed);
+  const SE3 T_cam_body = camera_.T_body_cam.inverse();
   const Eigen::Vector3d omega = shot.body_velocity.head<3>();
   for (int drop = 0; drop < rain_drops_; ++drop) {
     Eigen::Vector3d at;
@@ -76,39 +76,28 @@ std::vector<float> LensClutter::rain_cover(const Shot& shot) const {
     const Eigen::Vector3d velocity =
         kFall_mps * shot.down_body - shot.body_velocity.tail<3>() - omega.cross(at);
     const Eigen::Vector3d half_way = 0.5 * shot.exposure.time_s * velocity;
-    draw_streak(at - half_way, at + half_way, cover);
+    const Eigen::Vector3d from_cam = T_cam_body * (at - half_way);
+    const Eigen::Vector3d to_cam = T_cam_body * (at + half_way);
+    const double depth_m = std::min(from_cam.z(), to_cam.z());
+    if (depth_m < kNearestDrop_m) continue;
+    const auto from = camera_.project_ray(from_cam), to = camera_.project_ray(to_cam);
+    if (!from || !to) continue;
+    // A drop narrower than a pixel hides a part of it. A fast one is before each pixel only
+    // briefly.
+    const double width = camera_.fx * kDrop_m / depth_m;
+    const double length = std::max((*to - *from).norm(), 1.0);
+    const double opacity = std::min(width, 1.0) * std::clamp(8.0 / length, 0.3, 0.8);
+    constexpr int kSubpixelBits = 4;
+    const auto fixed = [](const Eigen::Vector2d& p) {
+      const Eigen::Vector2d limited = 16.0 * p.cwiseMax(-1e4).cwiseMin(1e4);
+      return cv::Point(static_cast<int>(limited.x()), static_cast<int>(limited.y()));
+    };
+    cv::line(cover, fixed(*from), fixed(*to), cv::Scalar(255.0 * opacity),
+             std::max(1, static_cast<int>(width + 0.5)), cv::LINE_AA, kSubpixelBits);
   }
-  return cover;
-}
-
-void LensClutter::draw_streak(const Eigen::Vector3d& from_body, const Eigen::Vector3d& to_body,
-                              std::vector<float>& cover) const {
-  const SE3 T_cam_body = camera_.T_body_cam.inverse();
-  const Eigen::Vector3d from_cam = T_cam_body * from_body, to_cam = T_cam_body * to_body;
-  const double depth_m = std::min(from_cam.z(), to_cam.z());
-  if (depth_m < kNearestDrop_m) return;
-  const auto from = camera_.project_ray(from_cam), to = camera_.project_ray(to_cam);
-  if (!from || !to) return;
-  const double width = camera_.fx * kDrop_m / depth_m;
-  const double radius = 0.5 * std::max(width, 1.0);
-  // A drop narrower than a pixel hides a part of it. A fast one is before each pixel only briefly.
-  const double length = (*to - *from).norm();
-  const double opacity = std::min(width, 1.0) * std::clamp(8.0 / std::max(length, 1.0), 0.3, 0.8);
-  const auto steps = static_cast<int>(std::min(std::ceil(2.0 * length), 1000.0));
-  for (int step = 0; step <= steps; ++step) {
-    const Eigen::Vector2d p = *from + step / std::max(1.0, 1.0 * steps) * (*to - *from);
-    const int x0 = static_cast<int>(std::floor(p.x() - radius)),
-              y0 = static_cast<int>(std::floor(p.y() - radius));
-    const int side = static_cast<int>(std::ceil(2.0 * radius)) + 1;
-    for (int y = std::max(y0, 0); y <= std::min(y0 + side, camera_.height - 1); ++y) {
-      for (int x = std::max(x0, 0); x <= std::min(x0 + side, camera_.width - 1); ++x) {
-        const double own = opacity * soft_disc((Eigen::Vector2d(x, y) - p).norm(), radius, 1.0);
-        float& here = cover[static_cast<std::size_t>(y) * static_cast<std::size_t>(camera_.width) +
-                            static_cast<std::size_t>(x)];
-        here = std::max(here, static_cast<float>(own));
-      }
-    }
-  }
+  cv::Mat1f shares;
+  cover.convertTo(shares, CV_32F, 1.0 / 255.0);
+  return {shares.begin(), shares.end()};
 }
 
 // Each light before the lens lifts the whole image, most around its own image, and leaves a row of

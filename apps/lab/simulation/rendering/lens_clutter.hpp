@@ -23,8 +23,6 @@ class LensClutter {
  private:
   void cover_with_dirt(const SensorEffectsConfig& config, std::uint64_t seed);
   [[nodiscard]] std::vector<float> rain_cover(const Shot& shot) const;
-  void draw_streak(const Eigen::Vector3d& from_body, const Eigen::Vector3d& to_body,
-                   std::vector<float>& cover) const;
   [[nodiscard]] std::vector<float> veil(const Shot& shot) const;
 
   Camera camera_;

@@ -7,8 +7,6 @@
 #include <numbers>
 #include <opencv2/core.hpp>
 #include <span>
-#include <stdexcept>
-#include <string>
 
 namespace km {
 namespace {
@@ -253,14 +251,12 @@ void lean(const Lanes3& normals, Leaning& leaning) {
 }
 
 // A sample's bytes of every lane, four to a word.
-template <std::size_t kWords>
-using SampleWords = std::array<BitLanes, kWords>;
+using SampleWords = std::array<BitLanes, 4>;
 
-template <std::size_t kWords>
 void fetch(const std::array<const std::uint8_t*, kLanes>& low, std::size_t offset,
-           SampleWords<kWords>& words) {
+           SampleWords& words) {
   for (std::size_t i = 0; i < kLanes; ++i)
-    for (std::size_t k = 0; k < kWords; ++k)
+    for (std::size_t k = 0; k < words.size(); ++k)
       std::memcpy(&words[k][i], low[i] + offset + 4 * k, sizeof(std::uint32_t));
 }
 
@@ -293,11 +289,6 @@ LightVolume::LightVolume(const World& world, const RayTracer& tracer, const Surf
     : lamps_(static_cast<int>(world.lighting.lamps.size())),
       ambient_scale_(kLargestAmbient / 255.0F),
       open_ambient_(world.lighting.ambient) {
-  if (lamps_ > kMaxLamps)
-    throw std::invalid_argument("world " + world.name + ": " + std::to_string(lamps_) +
-                                " lamps, at most " + std::to_string(kMaxLamps) + " are supported");
-  constexpr int kFewLamps = static_cast<int>(kFewLampsBytes) - kAxisDirections;
-  sample_bytes_ = lamps_ <= kFewLamps ? kFewLampsBytes : kManyLampsBytes;
   if (world.mesh.triangles.empty()) return;
   lay_out(world);
   const std::vector<std::uint8_t> wanted = mark(world.mesh, surfaces);
@@ -363,7 +354,7 @@ void LightVolume::bake(const World& world, const RayTracer& tracer, const Surfac
   std::vector<std::size_t> list;
   for (std::size_t i = 0; i < wanted.size(); ++i)
     if (wanted[i] != 0) list.push_back(i);
-  samples_.assign(wanted.size() * sample_bytes_, 0);
+  samples_.assign(wanted.size() * kSampleBytes, 0);
   std::vector<std::uint8_t> known(wanted.size(), 0);
   const std::vector<Eigen::Vector3f> corners = brick_corners();
   const int groups = static_cast<int>((list.size() + kLanes - 1) / kLanes);
@@ -376,7 +367,7 @@ void LightVolume::bake(const World& world, const RayTracer& tracer, const Surfac
       for (std::size_t i = begin; i < end; ++i) points.push_back(position(corners, list[i]));
       const std::vector<LightBake::Sample> baked = light.at(points);
       for (std::size_t i = begin; i < end; ++i) {
-        std::uint8_t* const bytes = samples_.data() + list[i] * sample_bytes_;
+        std::uint8_t* const bytes = samples_.data() + list[i] * kSampleBytes;
         for (std::size_t k = 0; k < kAxisDirections; ++k)
           bytes[k] = quantized(baked[i - begin].ambient[k] / kLargestAmbient);
         for (std::size_t k = 0; k < baked[i - begin].lamps.size(); ++k)
@@ -414,7 +405,7 @@ Eigen::Vector3f LightVolume::position(const std::vector<Eigen::Vector3f>& corner
 
 void LightVolume::fill_from_neighbours(std::vector<std::uint8_t>& known) {
   std::vector<std::uint8_t> filled = known;
-  std::vector<int> sum(sample_bytes_);
+  std::vector<int> sum(kSampleBytes);
   for (std::size_t sample = 0; sample < known.size(); ++sample) {
     if (known[sample] != 0) continue;
     const std::size_t first = sample / kBrickSamples * kBrickSamples;
@@ -430,12 +421,12 @@ void LightVolume::fill_from_neighbours(std::vector<std::uint8_t>& known) {
           const std::size_t other = first + static_cast<std::size_t>((z * kSide + y) * kSide + x);
           if (known[other] == 0) continue;
           ++count;
-          for (std::size_t i = 0; i < sample_bytes_; ++i)
-            sum[i] += samples_[other * sample_bytes_ + i];
+          for (std::size_t i = 0; i < kSampleBytes; ++i)
+            sum[i] += samples_[other * kSampleBytes + i];
         }
     if (count == 0) continue;
-    for (std::size_t i = 0; i < sample_bytes_; ++i)
-      samples_[sample * sample_bytes_ + i] = static_cast<std::uint8_t>(sum[i] / count);
+    for (std::size_t i = 0; i < kSampleBytes; ++i)
+      samples_[sample * kSampleBytes + i] = static_cast<std::uint8_t>(sum[i] / count);
     filled[sample] = 1;
   }
   known = std::move(filled);
@@ -472,7 +463,6 @@ void LightVolume::find_cells(const Lanes3& points, const Lanes3& normals, Cells&
 
 // Trilinear in the lattice. In direction, the squares of the normal's components weight the three
 // axis directions that are nearest to it (the ambient cube).
-template <std::size_t kWords>
 void LightVolume::interpolate(const Cells& cells, const Lanes3& normals, Light& light) const {
   const auto lamps = static_cast<std::size_t>(lamps_);
   std::array<const std::uint8_t*, kLanes> low;
@@ -483,7 +473,7 @@ void LightVolume::interpolate(const Cells& cells, const Lanes3& normals, Light& 
     baked[i] = brick < 0 ? 0 : 1;
     const std::size_t sample = static_cast<std::size_t>(std::max(brick, 0)) * kBrickSamples +
                                static_cast<std::size_t>(brick < 0 ? 0 : cells.corner[i]);
-    low[i] = samples_.data() + sample * 4 * kWords;
+    low[i] = samples_.data() + sample * kSampleBytes;
   }
   Leaning leaning;
   lean(normals, leaning);
@@ -492,8 +482,8 @@ void LightVolume::interpolate(const Cells& cells, const Lanes3& normals, Light& 
   for (std::size_t corner = 0; corner < 8; ++corner) {
     const std::size_t sample =
         (corner & 1U) + (corner >> 1U & 1U) * kSide + (corner >> 2U) * kSide * kSide;
-    SampleWords<kWords> words;
-    fetch(low, sample * 4 * kWords, words);
+    SampleWords words;
+    fetch(low, sample * kSampleBytes, words);
     Lanes weights;
     corner_weights(corner, cells.share, weights);
     add_ambient(words[0], words[1], weights, leaning, light.ambient);
@@ -516,10 +506,7 @@ void LightVolume::look_up(const Lanes3& points, const Lanes3& normals, Light& li
   run_wide([&] {
     Cells cells;
     find_cells(points, normals, cells);
-    if (sample_bytes_ == kFewLampsBytes)
-      interpolate<kFewLampsBytes / 4>(cells, normals, light);
-    else
-      interpolate<kManyLampsBytes / 4>(cells, normals, light);
+    interpolate(cells, normals, light);
   });
 }
 

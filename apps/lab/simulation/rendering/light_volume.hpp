@@ -29,7 +29,7 @@ class LightVolume {
     std::array<Lanes, kMaxLamps> lamp_visibility;  ///< 0 to 1; only the lamps of the world are set.
   };
 
-  /// Throws std::invalid_argument for more than kMaxLamps lamps.
+  /// Precondition: at most kMaxLamps lamps.
   LightVolume(const World& world, const RayTracer& tracer, const SurfaceTable& surfaces,
               const Sky& sky);
 
@@ -61,7 +61,6 @@ class LightVolume {
     Lanes3 share;
   };
   void find_cells(const Lanes3& points, const Lanes3& normals, Cells& cells) const;
-  template <std::size_t kWords>
   void interpolate(const Cells& cells, const Lanes3& normals, Light& light) const;
 
   float cell_m_ = 0.5F;
@@ -70,10 +69,8 @@ class LightVolume {
   Eigen::Vector3i bricks_ = Eigen::Vector3i::Zero();  ///< Along each axis.
   std::vector<std::int32_t> brick_index_;             ///< -1: no surface near.
   /// A sample is six directions, then the lamps.
-  static constexpr std::size_t kFewLampsBytes = 8;
-  static constexpr std::size_t kManyLampsBytes = 16;
-  static_assert(kAxisDirections + kMaxLamps == kManyLampsBytes);
-  std::size_t sample_bytes_ = kFewLampsBytes;
+  static constexpr std::size_t kSampleBytes = 16;
+  static_assert(kAxisDirections + kMaxLamps == kSampleBytes);
   std::vector<std::uint8_t> samples_;
   int lamps_ = 0;
   float ambient_scale_ = 1.0F;  ///< Irradiance of one step of 8 bit.

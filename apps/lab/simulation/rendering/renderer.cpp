@@ -7,8 +7,6 @@
 #include <limits>
 #include <optional>
 #include <span>
-#include <stdexcept>
-#include <string>
 
 #include "apps/lab/simulation/rendering/surface_shader.hpp"
 
@@ -71,9 +69,6 @@ class ViewPass {
         request_(request),
         width_(rays.camera().width),
         height_(rays.camera().height) {
-    if (T_world_body.size() != 1 && T_world_body.size() != static_cast<std::size_t>(height_))
-      throw std::invalid_argument("render: " + std::to_string(T_world_body.size()) + " poses for " +
-                                  std::to_string(height_) + " rows");
     for (const SE3& T : T_world_body) {
       const SE3 T_world_cam = T * rays.camera().T_body_cam;
       poses_.push_back(
@@ -505,12 +500,6 @@ class ViewPass {
 }  // namespace
 
 PixelRays::PixelRays(const Camera& camera) : camera_(camera) {
-  if (camera.width < 1 || camera.height < 1)
-    throw std::invalid_argument("camera: an image of " + std::to_string(camera.width) + " x " +
-                                std::to_string(camera.height) + " pixels");
-  if (!(camera.fx > 0.0 && camera.fy > 0.0))
-    throw std::invalid_argument("camera: focal lengths " + std::to_string(camera.fx) + ", " +
-                                std::to_string(camera.fy) + " are not both positive");
   const auto columns = static_cast<std::size_t>(stride());
   const std::size_t size = columns * static_cast<std::size_t>(camera.height + 1);
   bearings_.reserve(size);
@@ -531,8 +520,6 @@ PixelRays::PixelRays(const Camera& camera) : camera_(camera) {
 }
 
 Camera shrunk(const Camera& camera, int factor) {
-  if (factor < 1)
-    throw std::invalid_argument("shrunk: a factor of " + std::to_string(factor) + " is below 1");
   Camera small = camera;
   small.width = (camera.width + factor - 1) / factor;
   small.height = (camera.height + factor - 1) / factor;

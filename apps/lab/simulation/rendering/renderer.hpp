@@ -18,7 +18,6 @@ namespace km {
 /// (some 20 ms at 752x480), and shared by all its views. Immutable.
 class PixelRays {
  public:
-  /// Throws std::invalid_argument for an empty image or a focal length that is not positive.
   explicit PixelRays(const Camera& camera);
 
   [[nodiscard]] const Camera& camera() const { return camera_; }
@@ -76,8 +75,7 @@ class Renderer {
   [[nodiscard]] RenderedView render(const PixelRays& rays, const SE3& T_world_body,
                                     const RenderRequest& request) const;
   /// One view whose row y is seen from T_world_body[y], as by a rolling shutter, with the surfaces
-  /// `moved` in addition to the world's. Throws std::invalid_argument unless there is one pose, or
-  /// one for each row.
+  /// `moved` in addition to the world's. One pose holds for all rows.
   [[nodiscard]] RenderedView render(const PixelRays& rays, std::span<const SE3> T_world_body,
                                     const RenderRequest& request,
                                     const MovedSurfaces* moved = nullptr) const;

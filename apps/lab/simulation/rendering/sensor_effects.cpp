@@ -4,8 +4,8 @@
 #include <array>
 #include <cmath>
 #include <numeric>
-#include <stdexcept>
-#include <string>
+
+#include "apps/lab/simulation/world/seeded_random.hpp"
 
 namespace km {
 namespace {
@@ -169,14 +169,10 @@ std::mt19937 generator(std::uint64_t seed) {
 
 ExposureControl::ExposureControl(const SensorEffectsConfig& config, double rate_hz)
     : config_(checked(config)) {
-  if (!(rate_hz > 0.0) || !std::isfinite(rate_hz))
-    throw std::invalid_argument("ExposureControl: a rate of " + std::to_string(rate_hz) + " Hz");
   share_per_frame_ = 1.0 - std::pow(1.0 - kAdaptation, kAdaptationRate_hz / rate_hz);
 }
 
 Exposure ExposureControl::next(const RenderedView& scene, double light) {
-  if (scene.radiance.empty())
-    throw std::invalid_argument("ExposureControl: a view without radiance");
   if (!started_) {
     log_gain_ = std::log(solve_gain(scene.radiance) / light);
     started_ = true;
@@ -191,6 +187,30 @@ Exposure ExposureControl::next(const RenderedView& scene, double light) {
   exposure.gain = std::exp(log_gain_);
   exposure.time_s = std::min(exposure.gain * config_.unit_exposure_s, config_.max_exposure_s);
   return exposure;
+}
+
+LightPassages::LightPassages(const SensorEffectsConfig& config, double duration_s,
+                             std::uint64_t seed) {
+  checked(config);
+  if (!(config.passage_every_s > 0.0) || config.passage_light == 1.0) return;
+  SeededRandom random(seed);
+  for (double at = 0.0;;) {
+    // Intervals from half to one and a half of the mean; a passage ends before the next begins.
+    at = std::max(at + config.passage_every_s * (0.5 + random.unit()),
+                  passages_.empty() ? 0.0 : passages_.back().end_s);
+    if (at > duration_s) return;
+    const double sign = random.chance(0.5) ? 1.0 : -1.0;
+    passages_.push_back({at, at + config.passage_s, sign * std::log(config.passage_light)});
+  }
+}
+
+double LightPassages::factor(double t_s) const {
+  for (const Passage& passage : passages_) {
+    if (t_s < passage.begin_s || t_s > passage.end_s) continue;
+    const double inside_s = std::min(t_s - passage.begin_s, passage.end_s - t_s);
+    return std::exp(passage.log_light * std::min(1.0, inside_s / kRamp_s));
+  }
+  return 1.0;
 }
 
 std::vector<float> lens_blurred(const std::vector<float>& image, int width, int height) {
@@ -307,19 +327,6 @@ RenderRequest SensorEffects::request() const {
   return {.radiance = true, .depth = config_.motion_blur, .labels = false};
 }
 
-void SensorEffects::require_complete(const RenderedView& view) const {
-  const Camera& camera = rays_.camera();
-  if (view.width != camera.width || view.height != camera.height)
-    throw std::invalid_argument("SensorEffects: a view of " + std::to_string(view.width) + " x " +
-                                std::to_string(view.height) + " for a camera of " +
-                                std::to_string(camera.width) + " x " +
-                                std::to_string(camera.height));
-  if (view.radiance.size() != relative_light_.size())
-    throw std::invalid_argument("SensorEffects: the view lacks radiance");
-  if (config_.motion_blur && view.depth_m.size() != relative_light_.size())
-    throw std::invalid_argument("SensorEffects: motion blur needs the view's depth");
-}
-
 std::vector<float> SensorEffects::on_sensor(const RenderedView& view, const Shot& shot) const {
   std::vector<float> seen = lens_blurred(view.radiance, view.width, view.height);
   if (config_.motion_blur && !shot.body_velocity.isZero() && shot.exposure.time_s > 0.0)
@@ -339,7 +346,6 @@ std::uint8_t SensorEffects::quantized(float signal) const {
 }
 
 GrayImage SensorEffects::gray(const RenderedView& view, const Shot& shot) const {
-  require_complete(view);
   const std::vector<float> linear = on_sensor(view, shot);
   std::mt19937 random = generator(shot.noise_seed);
   GrayImage image{view.width, view.height, std::vector<std::uint8_t>(linear.size())};

@@ -29,12 +29,11 @@ class ExposureControl {
  public:
   static constexpr int kMeterShrink = 8;
 
-  /// `rate_hz`: rate of the frames. Throws ConfigError, and std::invalid_argument if the rate is
-  /// not positive.
+  /// `rate_hz`: rate of the frames. Throws ConfigError.
   ExposureControl(const SensorEffectsConfig& config, double rate_hz);
 
   /// Returns the exposure of the frame that sees `scene`, from its `radiance` times `light`. The
-  /// first frame gets the target level at once. Throws std::invalid_argument without radiance.
+  /// first frame gets the target level at once.
   [[nodiscard]] Exposure next(const RenderedView& scene, double light = 1.0);
 
  private:
@@ -42,6 +41,27 @@ class ExposureControl {
   double share_per_frame_ = 1.0;
   double log_gain_ = 0.0;
   bool started_ = false;
+};
+
+/// Passages of a robot through dark and bright places: a factor of all light over time. Each
+/// passage is dark or bright by chance. Its light comes and goes within kRamp_s, evenly in its
+/// logarithm. Immutable.
+class LightPassages {
+ public:
+  static constexpr double kRamp_s = 0.4;
+
+  /// Passages within `duration_s`. Throws ConfigError.
+  LightPassages(const SensorEffectsConfig& config, double duration_s, std::uint64_t seed);
+
+  /// Factor at `t_s`; 1 outside all passages.
+  [[nodiscard]] double factor(double t_s) const;
+
+ private:
+  struct Passage {
+    double begin_s = 0.0, end_s = 0.0;
+    double log_light = 0.0;
+  };
+  std::vector<Passage> passages_;  // ascending, without overlap
 };
 
 /// Time of row `row` of `height` rows after the frame's stamp [s], which is the middle of the
@@ -82,13 +102,12 @@ class SensorEffects {
   /// Request to the renderer for gray(): the radiance, and the depth if there is motion blur.
   [[nodiscard]] RenderRequest request() const;
 
-  /// Throws std::invalid_argument if `view` lacks what request() names or is of another size.
+  /// Precondition: `view` has what request() names.
   [[nodiscard]] GrayImage gray(const RenderedView& view, const Shot& shot) const;
 
  private:
   static constexpr int kResponseSteps = 1024;
 
-  void require_complete(const RenderedView& view) const;
   [[nodiscard]] std::vector<float> on_sensor(const RenderedView& view, const Shot& shot) const;
   [[nodiscard]] std::uint8_t quantized(float signal) const;
 

@@ -6,37 +6,18 @@
 
 #include "apps/lab/simulation/rendering/surfaces.hpp"
 #include "apps/lab/simulation/world/canvas.hpp"
+#include "apps/lab/simulation/world/terrain.hpp"
 
 namespace km {
 namespace {
 
 constexpr int kSize = 768;  // the horizon's circle touches the border: some 0.15 degrees a texel
 
-float hashed(int x, int y) {
-  auto h =
-      static_cast<std::uint32_t>(x) * 0x8DA6B343U ^ static_cast<std::uint32_t>(y) * 0xD8163841U;
-  h = (h ^ (h >> 15)) * 0x2C1B3C6DU;
-  h = (h ^ (h >> 12)) * 0x297A2D39U;
-  return static_cast<float>((h ^ (h >> 15)) >> 8) * 0x1p-24F;
-}
-
-float value_noise(float x, float y) {
-  const float fx = std::floor(x);
-  const float fy = std::floor(y);
-  const int ix = static_cast<int>(fx);
-  const int iy = static_cast<int>(fy);
-  const auto smooth = [](float t) { return t * t * (3.0F - 2.0F * t); };
-  const float sx = smooth(x - fx);
-  const float low = std::lerp(hashed(ix, iy), hashed(ix + 1, iy), sx);
-  const float high = std::lerp(hashed(ix, iy + 1), hashed(ix + 1, iy + 1), sx);
-  return std::lerp(low, high, smooth(y - fy));
-}
-
 float cloud_noise(float x, float y) {
   float sum = 0.0F;
   float amplitude = 0.5F;
   for (int octave = 0; octave < 5; ++octave) {
-    sum += amplitude * value_noise(x, y);
+    sum += amplitude * (0.5F + 0.5F * ground_noise(x, y, 1.0F, 0));
     amplitude *= 0.5F;
     // Rotated a little, so that the lattices of the octaves do not coincide.
     const float turned = 1.7F * x - 1.1F * y + 17.3F;
@@ -46,22 +27,16 @@ float cloud_noise(float x, float y) {
   return sum;  // 0 to 1, mean 0.5
 }
 
-// Share of the view that a layer of flat clouds covers, and how bright it is.
-struct Clouds {
-  float cover = 0.0F;
-  float brightness = 0.0F;
-};
-
-Clouds clouds(const Eigen::Vector3f& d) {
+// The sky behind a layer of flat clouds.
+Eigen::Vector3f clouded(const Eigen::Vector3f& d, const Eigen::Vector3f& sky) {
   const float distance = 1.0F / (d.z() + 0.12F);
   const float x = 1.3F * d.x() * distance;
   const float y = 1.3F * d.y() * distance;
   const float density = cloud_noise(x, y);
   const float thickness = smooth_step(0.46F, 0.75F, density);
-  Clouds result;
-  result.cover = std::min(1.0F, 1.6F * thickness) * smooth_step(0.01F, 0.1F, d.z());
-  result.brightness = 2.6F - 1.1F * smooth_step(0.5F, 0.8F, cloud_noise(x + 0.15F, y + 0.1F));
-  return result;
+  const float cover = std::min(1.0F, 1.6F * thickness) * smooth_step(0.01F, 0.1F, d.z());
+  const float bright = 2.6F - 1.1F * smooth_step(0.5F, 0.8F, cloud_noise(x + 0.15F, y + 0.1F));
+  return sky + cover * (bright * Eigen::Vector3f(1.0F, 1.0F, 1.03F) - sky);
 }
 
 Eigen::Vector3f sky_color(const Eigen::Vector3f& d, const Lighting& lighting) {
@@ -74,9 +49,7 @@ Eigen::Vector3f sky_color(const Eigen::Vector3f& d, const Lighting& lighting) {
   const float toward_sun = std::max(0.0F, d.dot(lighting.to_sun));
   const float glow = 0.7F * std::pow(toward_sun, 8.0F) + 4.0F * std::pow(toward_sun, 350.0F);
   sky += glow * Eigen::Vector3f(1.0F, 0.93F, 0.8F);
-  const Clouds layer = clouds(d);
-  const Eigen::Vector3f cloud = layer.brightness * Eigen::Vector3f(1.0F, 1.0F, 1.03F);
-  return sky + layer.cover * (cloud - sky);
+  return clouded(d, sky);
 }
 
 // Inverse of the stereographic projection of the unit disc.

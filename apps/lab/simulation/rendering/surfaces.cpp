@@ -5,29 +5,9 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <stdexcept>
-#include <string>
 
 namespace km {
 namespace {
-
-void require_indices(const World& world, const SurfaceMesh& mesh) {
-  const auto fail = [&world](const std::string& what) {
-    throw std::invalid_argument("world " + world.name + ": " + what);
-  };
-  if (mesh.normals.size() != mesh.vertices.size() || mesh.uv.size() != mesh.vertices.size())
-    fail("normals or texture coordinates do not match the vertices");
-  if (mesh.materials.size() != mesh.triangles.size())
-    fail("there is not one material per triangle");
-  for (const auto& triangle : mesh.triangles)
-    for (const std::uint32_t vertex : triangle)
-      if (vertex >= mesh.vertices.size()) fail("no vertex " + std::to_string(vertex));
-  for (const std::uint16_t material : mesh.materials)
-    if (material >= world.materials.size()) fail("no material " + std::to_string(material));
-  for (const Material& material : world.materials)
-    if (material.base >= world.textures.size() || material.detail >= world.textures.size())
-      fail("no texture " + std::to_string(std::max(material.base, material.detail)));
-}
 
 ShadingMaterial shading_material(const World& world, const Material& material) {
   ShadingMaterial result;
@@ -299,7 +279,6 @@ void mean_of_taps(const TextureLanes& textures, const Taps& taps, int most, Lane
 }  // namespace
 
 SurfaceTable::SurfaceTable(const World& world, const SurfaceMesh& mesh) : mesh_(&mesh) {
-  require_indices(world, mesh);
   materials_.reserve(world.materials.size());
   for (const Material& material : world.materials)
     materials_.push_back(shading_material(world, material));
@@ -365,16 +344,12 @@ namespace {
 
 // Moves the vertices of each object once, with all triangles that use them.
 SurfaceMesh moved(const World& shapes, std::span<const SE3> poses) {
-  if (poses.size() != shapes.objects.size())
-    throw std::invalid_argument("moved surfaces: " + std::to_string(poses.size()) + " poses for " +
-                                std::to_string(shapes.objects.size()) + " objects");
   SurfaceMesh mesh = shapes.mesh;
   std::vector<bool> is_moved(mesh.vertices.size(), false);
-  std::size_t triangles = 0;
   for (std::size_t i = 0; i < poses.size(); ++i) {
     const WorldObject& object = shapes.objects[i];
     const Eigen::Isometry3f T(poses[i].matrix().cast<float>());
-    for (std::size_t t = object.first_triangle; t < object.end_triangle; ++t, ++triangles) {
+    for (std::size_t t = object.first_triangle; t < object.end_triangle; ++t) {
       for (const std::uint32_t v : mesh.triangles.at(t)) {
         if (is_moved.at(v)) continue;
         is_moved[v] = true;
@@ -383,8 +358,6 @@ SurfaceMesh moved(const World& shapes, std::span<const SE3> poses) {
       }
     }
   }
-  if (triangles != mesh.triangles.size())
-    throw std::invalid_argument("moved surfaces: triangles without an object");
   return mesh;
 }
 

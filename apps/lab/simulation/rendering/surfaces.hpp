@@ -51,7 +51,7 @@ struct ShadingMaterial {
 /// All triangles and materials of a world, laid out for shading. Immutable.
 class SurfaceTable {
  public:
-  /// `world` must outlive the table. Throws std::invalid_argument for an index out of range.
+  /// `world` must outlive the table.
   explicit SurfaceTable(const World& world) : SurfaceTable(world, world.mesh) {}
   /// Surfaces of `mesh` with the materials of `world`; both must outlive the table.
   SurfaceTable(const World& world, const SurfaceMesh& mesh);
@@ -145,8 +145,7 @@ struct Taps {
 class MovedSurfaces {
  public:
   /// `shapes`: a world whose objects are the things, each in its own frame. `poses[i]` is the pose
-  /// of shapes.objects[i]. `shapes` must outlive this. Throws std::invalid_argument unless there is
-  /// one pose for each object, and an object has all triangles.
+  /// of shapes.objects[i], to which all triangles belong. `shapes` must outlive this.
   MovedSurfaces(const World& shapes, std::span<const SE3> poses);
   MovedSurfaces(const MovedSurfaces&) = delete;
   MovedSurfaces& operator=(const MovedSurfaces&) = delete;

@@ -65,58 +65,6 @@ void add_octave(int cells_u, int cells_v, float deviation, SeededRandom& random,
   }
 }
 
-struct CellPoint {
-  float x, y;  // position relative to the corner of the current cell [cells]
-  std::uint32_t id;
-};
-
-/// The points of a cell and of the eight around it.
-std::array<CellPoint, 9> neighbours(const std::vector<CellPoint>& points, int cells, int column,
-                                    int row) {
-  std::array<CellPoint, 9> around{};
-  std::size_t i = 0;
-  for (int dy = -1; dy <= 1; ++dy) {
-    for (int dx = -1; dx <= 1; ++dx) {
-      const int x = (column + dx + cells) % cells;
-      const int y = (row + dy + cells) % cells;
-      CellPoint point = points[static_cast<std::size_t>(y * cells + x)];
-      point.x += static_cast<float>(dx);
-      point.y += static_cast<float>(dy);
-      around[i++] = point;
-    }
-  }
-  return around;
-}
-
-/// Distances of the texels of one cell, whose first is (x0, y0).
-void measure_cell(const std::array<CellPoint, 9>& around, int x0, int y0, int stride,
-                  CellNoise& noise) {
-  const float texel = 1.0F / static_cast<float>(stride);
-  for (int dy = 0; dy < stride; ++dy) {
-    const float y = (static_cast<float>(dy) + 0.5F) * texel;
-    for (int dx = 0; dx < stride; ++dx) {
-      const float x = (static_cast<float>(dx) + 0.5F) * texel;
-      float first = 1e9F;  // squared distances
-      float second = 1e9F;
-      std::uint32_t id = 0;
-      for (const CellPoint& point : around) {
-        const float to_x = point.x - x;
-        const float to_y = point.y - y;
-        const float distance = to_x * to_x + to_y * to_y;
-        if (distance < first) id = point.id;
-        second = std::min(second, std::max(first, distance));
-        first = std::min(first, distance);
-      }
-      const auto i =
-          static_cast<std::size_t>(y0 + dy) * static_cast<std::size_t>(noise.nearest.size()) +
-          static_cast<std::size_t>(x0 + dx);
-      noise.id[i] = id;
-      noise.nearest.values()[i] = std::sqrt(first);
-      noise.edge.values()[i] = std::sqrt(second) - std::sqrt(first);
-    }
-  }
-}
-
 }  // namespace
 
 void NoiseField::standardize() {
@@ -147,26 +95,6 @@ NoiseField fractal_noise(int size, const FractalNoise& noise, SeededRandom& rand
   }
   field.standardize();
   return field;
-}
-
-CellNoise cell_noise(int size, int cells, SeededRandom& random) {
-  const auto count = static_cast<std::size_t>(cells) * static_cast<std::size_t>(cells);
-  std::vector<CellPoint> points;
-  points.reserve(count);
-  for (std::size_t i = 0; i < count; ++i) {
-    const float x = random.uniform(0.0F, 1.0F);
-    points.push_back({x, random.uniform(0.0F, 1.0F), static_cast<std::uint32_t>(i)});
-  }
-  CellNoise noise{NoiseField(size), NoiseField(size), {}};
-  noise.id.resize(noise.nearest.values().size());
-  const int stride = size / cells;
-  for (int row = 0; row < cells; ++row) {
-    for (int column = 0; column < cells; ++column) {
-      const std::array<CellPoint, 9> around = neighbours(points, cells, column, row);
-      measure_cell(around, column * stride, row * stride, stride, noise);
-    }
-  }
-  return noise;
 }
 
 NoiseField relief(const NoiseField& height) {

@@ -101,14 +101,6 @@ struct FractalNoise {
 /// Mean 0, standard deviation 1.
 [[nodiscard]] NoiseField fractal_noise(int size, const FractalNoise& noise, SeededRandom& random);
 
-/// Distances to scattered points, one in each of cells x cells squares; `cells` divides the size.
-struct CellNoise {
-  NoiseField nearest;             ///< Distance to the nearest point, in cells.
-  NoiseField edge;                ///< Distance to the second nearest less that to the nearest.
-  std::vector<std::uint32_t> id;  ///< Index of the nearest point, 0 to cells^2 - 1.
-};
-[[nodiscard]] CellNoise cell_noise(int size, int cells, SeededRandom& random);
-
 /// Shading of a surface of this height lit along +u +v: the slope, mean 0, standard deviation 1.
 [[nodiscard]] NoiseField relief(const NoiseField& height);
 

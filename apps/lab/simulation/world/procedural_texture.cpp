@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <stdexcept>
 
 #include "apps/lab/simulation/world/canvas.hpp"
 #include "apps/lab/simulation/world/printed_textures.hpp"
@@ -14,145 +13,110 @@ namespace {
 using Eigen::Vector2f;
 using Eigen::Vector3f;
 
-/// Brightness of each cell of a cell noise, drawn uniformly.
-std::vector<float> shades(int count, float low, float high, SeededRandom& random) {
-  std::vector<float> result(static_cast<std::size_t>(count));
-  for (float& shade : result) shade = random.uniform(low, high);
-  return result;
+using Rgb = std::array<float, 3>;
+
+Vector3f color(const Rgb& rgb) {
+  return {rgb[0], rgb[1], rgb[2]};
 }
 
-Canvas asphalt(int size, SeededRandom& random) {
-  const NoiseField wear = fractal_noise(size, {.cells_u = 4, .cells_v = 4, .gain = 0.9F}, random);
-  const NoiseField place = fractal_noise(size, {.gain = 0.5F, .finest = 64}, random);
-  const CellNoise stones = cell_noise(size, size / 8, random);
-  const std::vector<float> stone_shade = shades(size / 8 * (size / 8), 0.55F, 1.7F, random);
-  const CellNoise plates = cell_noise(size, 4, random);
+/// Ground, bark or foliage: noise with spots on it, such as stones, blades and leaves.
+struct Speckles {
+  FractalNoise noise;
+  float contrast;
+  Rgb rgb;
+  int spots;
+  float least, largest;  ///< Half length of a spot, in tiles; small ones are more frequent.
+  float narrow;          ///< Width of the narrowest spot as a share of its length.
+  float dark, bright;    ///< Factors of the colour of spots.
+  Rgb spot_rgb;
+};
+
+template <const Speckles& look>
+Canvas speckled(int size, SeededRandom& random) {
+  const NoiseField noise = fractal_noise(size, look.noise, random);
   Canvas canvas = Canvas::painted(size, [&](int x, int y) -> Vector3f {
-    const auto i = static_cast<std::size_t>(y * size + x);
-    float shade = 0.11F * (1.0F + 0.13F * wear(x, y));
-    if (stones.nearest.values()[i] < 0.38F) shade *= stone_shade[stones.id[i]];
-    // Cracks run between plates, bent by the noise, where the road is worn.
-    const auto bent = static_cast<int>(14.0F * place(x, y));
-    if (plates.edge(x + bent, y - bent) < 0.012F && place(x + size / 2, y + size / 3) > 0.3F)
-      shade *= 0.35F;
-    return shade * Vector3f(1.0F, 0.99F, 0.96F);
+    return std::max(1.0F + look.contrast * noise(x, y), 0.2F) * color(look.rgb);
   });
-  for (int i = 0; i < 40; ++i) {  // drops of oil
-    const Vector2f at(random.uniform(0.0F, 1.0F), random.uniform(0.0F, 1.0F));
-    const float radius = random.uniform(0.001F, 0.006F);
-    canvas.ellipse(at, {radius, radius * random.uniform(0.6F, 1.4F)}, 0.0F,
-                   Vector3f::Constant(random.uniform(0.04F, 0.07F)));
-  }
-  return canvas;
-}
-
-Canvas concrete(int size, SeededRandom& random) {
-  const NoiseField blotches = fractal_noise(size, {.gain = 0.85F}, random);
-  const CellNoise pores = cell_noise(size, size / 16, random);
-  const std::vector<float> pore_size =
-      shades(size / 16 * (size / 16), -0.35F, 0.16F, random);  // most have none
-  const std::vector<float> slab_shade = shades(4, 0.92F, 1.06F, random);
-  const int half = size / 2;
-  return Canvas::painted(size, [&](int x, int y) -> Vector3f {
-    const auto i = static_cast<std::size_t>(y * size + x);
-    const auto slab = static_cast<std::size_t>(x / half + 2 * (y / half));
-    float shade = 0.42F * slab_shade[slab] * (1.0F + 0.085F * blotches(x, y));
-    if (pores.nearest.values()[i] < pore_size[pores.id[i]]) shade *= 0.55F;
-    const int to_joint = std::min({x % half, y % half});
-    if (to_joint < size / 256) shade *= 0.4F;
-    return shade * Vector3f(1.0F, 0.98F, 0.94F);
-  });
-}
-
-Canvas pavers(int size, SeededRandom& random) {
-  constexpr int kSlabs = 8;
-  const NoiseField grain = fractal_noise(size, {.gain = 0.95F}, random);
-  const std::vector<float> slab_shade = shades(kSlabs * kSlabs, 0.78F, 1.14F, random);
-  const int slab = size / kSlabs;
-  Canvas canvas = Canvas::painted(size, [&](int x, int y) -> Vector3f {
-    const auto index = static_cast<std::size_t>(y / slab * kSlabs + x / slab);
-    float shade = 0.34F * slab_shade[index] * (1.0F + 0.11F * grain(x, y));
-    const int in_x = x % slab;
-    const int in_y = y % slab;
-    if (in_x == 0 || in_y == 0) shade *= 0.4F;
-    if (in_x == 1 || in_y == 1) shade *= 1.12F;  // the lit edge of the slab
-    return shade * Vector3f(1.0F, 0.97F, 0.92F);
-  });
-  for (int i = 0; i < 120; ++i) {  // chewing gum and dirt
-    const Vector2f at(random.uniform(0.0F, 1.0F), random.uniform(0.0F, 1.0F));
-    const float radius = random.uniform(0.0015F, 0.005F);
-    canvas.ellipse(at, {radius, 0.8F * radius}, 0.0F,
-                   Vector3f::Constant(random.uniform(0.08F, 0.25F)));
-  }
-  return canvas;
-}
-
-Canvas grass(int size, SeededRandom& random) {
-  const NoiseField growth = fractal_noise(size, {.gain = 0.8F}, random);
-  const NoiseField fine = fractal_noise(size, {.cells_u = 32, .cells_v = 32, .gain = 1.1F}, random);
-  const auto bare = [&](int x, int y) { return smooth_step(0.9F, 1.6F, growth(x, y)); };
-  Canvas canvas = Canvas::painted(size, [&](int x, int y) -> Vector3f {
-    const float shade = 1.0F + 0.25F * fine(x, y) + 0.12F * growth(x, y);
-    const Vector3f green = shade * Vector3f(0.055F, 0.085F, 0.026F);
-    const Vector3f earth = (1.0F + 0.2F * fine(x, y)) * Vector3f(0.17F, 0.12F, 0.075F);
-    return green + bare(x, y) * (earth - green);
-  });
-  const auto n = static_cast<float>(size);
-  for (int i = 0; i < size * size / 24; ++i) {
-    const Vector2f foot(random.uniform(0.0F, 1.0F), random.uniform(0.0F, 1.0F));
-    if (random.unit() < bare(static_cast<int>(foot.x() * n), static_cast<int>(foot.y() * n)))
-      continue;
-    const float angle = random.uniform(0.0F, 6.2832F);
-    const float shade = random.uniform(0.45F, 2.0F);
-    const float dry = random.uniform(0.0F, 0.06F);
-    const Vector3f color = shade * Vector3f(0.06F + dry, 0.1F + 0.5F * dry, 0.03F);
-    const auto length = static_cast<float>(4 + random.below(8));
-    for (float t = 0.0F; t < length; t += 0.9F) {
-      canvas.texel(static_cast<int>(foot.x() * n + t * std::cos(angle)),
-                   static_cast<int>(foot.y() * n + t * std::sin(angle))) = color;
-    }
-  }
-  return canvas;
-}
-
-Canvas soil(int size, SeededRandom& random) {
-  const NoiseField ground = fractal_noise(size, {.gain = 0.95F}, random);
-  const NoiseField slope = relief(fractal_noise(size, {.gain = 0.6F}, random));
-  const NoiseField damp = fractal_noise(size, {.gain = 0.6F, .finest = 64}, random);
-  Canvas canvas = Canvas::painted(size, [&](int x, int y) -> Vector3f {
-    const float wet = smooth_step(0.3F, 1.5F, damp(x, y));
-    const float shade = (1.0F + 0.14F * ground(x, y) + 0.16F * slope(x, y)) * (1.0F - 0.4F * wet);
-    return shade * Vector3f(0.25F, 0.19F, 0.13F);
-  });
-  for (int i = 0; i < 900; ++i) {  // stones, each with its shadow
-    const Vector2f at(random.uniform(0.0F, 1.0F), random.uniform(0.0F, 1.0F));
-    const float radius = 0.0012F + 0.006F * std::pow(random.uniform(0.0F, 1.0F), 4.0F);
-    const Vector2f axes(radius, radius * random.uniform(0.6F, 1.0F));
+  for (int i = 0; i < look.spots; ++i) {
+    const float u = random.uniform(0.0F, 1.0F);
+    const Vector2f at(u, random.uniform(0.0F, 1.0F));
+    const float share = random.uniform(0.0F, 1.0F);
+    const float length = look.least + (look.largest - look.least) * share * share * share;
+    const float width = length * random.uniform(look.narrow, 1.5F * look.narrow);
     const float angle = random.uniform(0.0F, 3.1416F);
-    canvas.ellipse(at - Vector2f(0.4F * radius, 0.4F * radius), axes, angle,
-                   Vector3f(0.09F, 0.07F, 0.05F));
-    canvas.ellipse(at, axes, angle, random.uniform(0.2F, 0.5F) * Vector3f(1.0F, 0.95F, 0.88F));
+    canvas.ellipse(at, {length, width}, angle,
+                   random.uniform(look.dark, look.bright) * color(look.spot_rgb));
   }
   return canvas;
 }
 
-Canvas gravel(int size, SeededRandom& random) {
-  const int cells = size / 16;
-  const CellNoise pebbles = cell_noise(size, cells, random);
-  const CellNoise sand = cell_noise(size, size / 4, random);
-  const NoiseField grain = fractal_noise(size, {.gain = 1.0F}, random);
-  const std::vector<float> shade_of = shades(cells * cells, 0.18F, 0.6F, random);
-  const std::vector<float> sand_shade = shades(size / 4 * (size / 4), 0.1F, 0.4F, random);
+/// Rows of bricks, blocks, slabs or tiles with joints between them.
+struct Masonry {
+  int rows, columns;
+  float shift;         ///< Shift of every second row, in columns.
+  float joint;         ///< Width of joints, in rows.
+  float dark, bright;  ///< Factors of the colour of bricks.
+  float grain;         ///< Contrast within one.
+  float arch;          ///< Contrast from the sides to the middle of one.
+  Rgb rgb;
+  float joint_shade;
+};
+
+template <const Masonry& look>
+Canvas masonry(int size, SeededRandom& random) {
+  std::vector<float> shades;
+  for (int i = 0; i < look.rows * look.columns; ++i)
+    shades.push_back(random.uniform(look.dark, look.bright));
+  const NoiseField bend = fractal_noise(size, {.cells_u = 16, .cells_v = 16}, random);
+  const NoiseField grain = fractal_noise(size, {.cells_u = 8, .cells_v = 8, .gain = 1.0F}, random);
+  const auto n = static_cast<float>(size);
   return Canvas::painted(size, [&](int x, int y) -> Vector3f {
-    const auto i = static_cast<std::size_t>(y * size + x);
-    const bool is_pebble = pebbles.edge.values()[i] > 0.12F && pebbles.nearest.values()[i] < 0.6F;
-    // Lit from +u +v: brighter where the pebble's top falls off to that side.
-    const float lit = pebbles.nearest(x - 1, y - 1) - pebbles.nearest(x + 1, y + 1);
-    const float shade =
-        is_pebble ? shade_of[pebbles.id[i]] * (1.0F - 1.6F * lit) : 0.6F * sand_shade[sand.id[i]];
-    return shade * (1.0F + 0.08F * grain(x, y)) * Vector3f(1.0F, 0.96F, 0.9F);
+    const auto rows = static_cast<float>(look.rows), columns = static_cast<float>(look.columns);
+    const float v = rows * (static_cast<float>(y) + 0.6F * bend(x, y)) / n + rows;
+    const int row = static_cast<int>(v) % look.rows;
+    const float from = row % 2 == 0 ? 0.0F : look.shift;
+    const float u =
+        columns * (static_cast<float>(x) + 0.6F * bend(x + size / 2, y + size / 3)) / n + columns +
+        from;
+    const int column = static_cast<int>(u) % look.columns;
+    const float in_v = v - std::floor(v), in_u = u - std::floor(u);
+    if (in_v < look.joint || in_u < look.joint * columns / rows)
+      return look.joint_shade * (1.0F + 0.08F * grain(x, y)) * Vector3f(1.0F, 0.97F, 0.9F);
+    const float edge = in_v > 0.92F ? 1.12F : 1.0F;  // the lit edge
+    const float round = 1.0F + look.arch * (std::sin(3.14159F * in_u) - 0.6F);
+    const float shade = shades[static_cast<std::size_t>(row * look.columns + column)];
+    return edge * round * shade * (1.0F + look.grain * grain(x, y)) * color(look.rgb);
   });
 }
+
+constexpr Speckles kAsphaltLook = {
+    {4, 4, 0.9F}, 0.13F, {0.11F, 0.109F, 0.106F}, 9000, 0.0009F, 0.004F, 0.7F,
+    0.5F,         1.7F,  {0.11F, 0.109F, 0.106F}};
+constexpr Speckles kSoilLook = {
+    {4, 4, 0.95F}, 0.25F, {0.25F, 0.19F, 0.13F}, 900, 0.0012F, 0.007F, 0.6F,
+    0.3F,          1.6F,  {0.3F, 0.28F, 0.26F}};
+constexpr Speckles kGravelLook = {
+    {4, 4, 1.0F}, 0.15F, {0.16F, 0.154F, 0.144F}, 9000, 0.004F, 0.014F, 0.6F,
+    0.45F,        1.5F,  {0.4F, 0.385F, 0.36F}};
+constexpr Speckles kGrassLook = {
+    {4, 4, 0.8F}, 0.3F, {0.07F, 0.09F, 0.033F}, 40000, 0.003F, 0.006F, 0.15F,
+    0.45F,        2.0F, {0.085F, 0.11F, 0.035F}};
+constexpr Speckles kLeavesLook = {
+    {4, 4, 0.8F}, 0.4F, {0.012F, 0.02F, 0.008F}, 6000, 0.008F, 0.019F, 0.4F,
+    0.3F,         1.3F, {0.085F, 0.145F, 0.035F}};
+constexpr Speckles kBarkLook = {
+    {16, 2, 0.85F}, 0.35F, {0.19F, 0.15F, 0.11F}, 0, 0.0F, 0.0F, 0.0F, 0.0F, 0.0F, {}};
+
+constexpr Masonry kConcreteLook = {
+    2, 2, 0.0F, 0.008F, 0.92F, 1.06F, 0.085F, 0.0F, {0.42F, 0.41F, 0.395F}, 0.17F};
+constexpr Masonry kPaversLook = {
+    8, 8, 0.0F, 0.03F, 0.78F, 1.14F, 0.11F, 0.0F, {0.34F, 0.33F, 0.31F}, 0.14F};
+constexpr Masonry kBrickLook = {
+    16, 5, 0.5F, 0.14F, 0.6F, 1.3F, 0.13F, 0.0F, {0.3F, 0.135F, 0.085F}, 0.36F};
+constexpr Masonry kStoneLook = {
+    8, 6, 0.37F, 0.05F, 0.7F, 1.2F, 0.12F, 0.0F, {0.38F, 0.36F, 0.32F}, 0.16F};
+constexpr Masonry kTilesLook = {
+    8, 10, 0.5F, 0.1F, 0.7F, 1.25F, 0.12F, 0.5F, {0.29F, 0.13F, 0.08F}, 0.06F};
 
 Canvas plaster(int size, SeededRandom& random) {
   const NoiseField bumps =
@@ -164,129 +128,6 @@ Canvas plaster(int size, SeededRandom& random) {
     const float shade = 0.78F * (1.0F + 0.035F * bumps(x, y) + 0.03F * stains(x, y));
     return shade * (1.0F - 0.22F * dirt) * Vector3f(1.0F, 0.985F, 0.96F);
   });
-}
-
-Canvas brick(int size, SeededRandom& random) {
-  constexpr int kCourses = 16;
-  constexpr int kBricks = 5;
-  std::array<float, kCourses * kBricks> shade_of{};
-  std::array<float, kCourses * kBricks> redness{};
-  for (std::size_t i = 0; i < shade_of.size(); ++i) {
-    shade_of[i] = random.chance(0.12) ? random.uniform(0.35F, 0.6F) : random.uniform(0.75F, 1.3F);
-    redness[i] = random.uniform(0.8F, 1.2F);
-  }
-  const NoiseField bend = fractal_noise(size, {.cells_u = 16, .cells_v = 16}, random);
-  const NoiseField grain = fractal_noise(size, {.cells_u = 8, .cells_v = 8, .gain = 1.0F}, random);
-  const auto n = static_cast<float>(size);
-  return Canvas::painted(size, [&](int x, int y) -> Vector3f {
-    const float v = kCourses * (static_cast<float>(y) + 0.6F * bend(x, y)) / n;
-    const int course = static_cast<int>(std::floor(v)) & (kCourses - 1);
-    const float offset = course % 2 == 0 ? 0.0F : 0.5F;
-    const float u =
-        kBricks * (static_cast<float>(x) + 0.6F * bend(x + size / 2, y + size / 3)) / n + offset;
-    const auto brick = static_cast<int>(std::floor(u) + kBricks) % kBricks;
-    const float in_v = v - std::floor(v);
-    const float in_u = u - std::floor(u);
-    const bool mortar = in_v < 0.14F || in_u < 0.045F;
-    if (mortar) return (0.36F + 0.03F * grain(x, y)) * Vector3f(1.0F, 0.97F, 0.9F);
-    const auto i = static_cast<std::size_t>(course * kBricks + brick);
-    const float edge = in_v < 0.2F ? 0.85F : (in_v > 0.94F ? 1.12F : 1.0F);
-    const float shade = edge * shade_of[i] * (1.0F + 0.13F * grain(x, y));
-    return shade * Vector3f(0.30F * redness[i], 0.135F, 0.085F);
-  });
-}
-
-Canvas stone_blocks(int size, SeededRandom& random) {
-  constexpr int kCourses = 8;
-  constexpr int kMaxBlocks = 6;
-  struct Course {
-    std::array<float, kMaxBlocks> end{};  // end of each block, in tiles; the last is 1
-    std::array<float, kMaxBlocks> shade{};
-    float shift = 0.0F;
-  };
-  std::array<Course, kCourses> courses;
-  for (Course& course : courses) {
-    float total = 0.0F;
-    for (float& end : course.end) end = total += random.uniform(0.6F, 1.5F);
-    for (float& end : course.end) end /= total;
-    for (float& shade : course.shade) shade = random.uniform(0.7F, 1.2F);
-    course.shift = random.uniform(0.0F, 1.0F);
-  }
-  const NoiseField bend = fractal_noise(size, {.cells_u = 16, .cells_v = 16}, random);
-  const NoiseField grain = fractal_noise(size, {.cells_u = 8, .cells_v = 8, .gain = 0.95F}, random);
-  const NoiseField slope = relief(grain);
-  const auto n = static_cast<float>(size);
-  return Canvas::painted(size, [&](int x, int y) -> Vector3f {
-    const float v = kCourses * (static_cast<float>(y) + 1.0F * bend(x, y)) / n;
-    const Course& course = courses[static_cast<std::size_t>(std::floor(v)) & (kCourses - 1)];
-    float u = (static_cast<float>(x) + 1.0F * bend(x + size / 2, y + size / 3)) / n + course.shift;
-    u -= std::floor(u);
-    std::size_t block = 0;
-    while (u > course.end[block] && block + 1 < kMaxBlocks) ++block;
-    const float from = block == 0 ? 0.0F : course.end[block - 1];
-    const float in_v = v - std::floor(v);
-    const bool joint = in_v < 0.05F || u - from < 0.006F;
-    const float relief_shade = 1.0F + 0.1F * grain(x, y) + 0.06F * slope(x, y);
-    const float shade = joint ? 0.16F : 0.38F * course.shade[block] * relief_shade;
-    return shade * Vector3f(1.0F, 0.95F, 0.84F);
-  });
-}
-
-Canvas roof_tiles(int size, SeededRandom& random) {
-  constexpr int kRows = 8;
-  constexpr int kColumns = 10;
-  std::array<float, kRows * kColumns> shade_of{};
-  for (float& shade : shade_of) shade = random.uniform(0.7F, 1.25F);
-  const NoiseField moss = fractal_noise(size, {.gain = 0.9F}, random);
-  const auto n = static_cast<float>(size);
-  return Canvas::painted(size, [&](int x, int y) -> Vector3f {
-    const float v = kRows * static_cast<float>(y) / n;
-    const int row = static_cast<int>(v);
-    const float u = kColumns * static_cast<float>(x) / n + (row % 2 == 0 ? 0.0F : 0.5F);
-    const int column = static_cast<int>(u) % kColumns;
-    const float in_v = v - static_cast<float>(row);
-    const float in_u = u - std::floor(u);
-    const float round = 0.62F + 0.5F * std::sin(3.14159F * in_u);  // each tile is arched
-    const float shadow = in_v > 0.88F ? 0.45F : (in_v < 0.06F ? 1.2F : 1.0F);
-    const auto i = static_cast<std::size_t>(row * kColumns + column);
-    const float shade = shade_of[i] * round * shadow * (1.0F + 0.12F * moss(x, y));
-    const float green = 0.25F * smooth_step(1.0F, 2.4F, moss(x, y));
-    return shade * Vector3f(0.29F * (1.0F - green), 0.13F, 0.08F);
-  });
-}
-
-Canvas bark(int size, SeededRandom& random) {
-  const NoiseField ridges =
-      fractal_noise(size, {.cells_u = 16, .cells_v = 2, .gain = 0.75F}, random);
-  const NoiseField grain = fractal_noise(size, {.cells_u = 16, .cells_v = 4, .gain = 1.0F}, random);
-  return Canvas::painted(size, [&](int x, int y) -> Vector3f {
-    const float furrow = smooth_step(0.45F, 0.0F, std::abs(ridges(x, y)));
-    const float slope = ridges(x, y) - ridges(x - 2, y);
-    const float shade = (1.0F + 0.16F * grain(x, y) + 0.5F * slope) * (1.0F - 0.65F * furrow);
-    return shade * Vector3f(0.19F, 0.15F, 0.11F);
-  });
-}
-
-Canvas leaves(int size, SeededRandom& random) {
-  const NoiseField depth = fractal_noise(size, {.gain = 0.8F}, random);
-  Canvas canvas = Canvas::painted(size, [&](int x, int y) -> Vector3f {
-    return std::max(1.0F + 0.4F * depth(x, y), 0.2F) * Vector3f(0.012F, 0.02F, 0.008F);
-  });
-  constexpr int kLeafCount = 5200;
-  for (int i = 0; i < kLeafCount; ++i) {
-    const float height = static_cast<float>(i) / kLeafCount;  // later leaves lie further out
-    const Vector2f at(random.uniform(0.0F, 1.0F), random.uniform(0.0F, 1.0F));
-    const float length = random.uniform(0.008F, 0.019F);
-    const float angle = random.uniform(0.0F, 3.1416F);
-    const float lit = random.uniform(0.5F, 1.3F) * (0.3F + 0.7F * height);
-    const Vector3f color =
-        lit * Vector3f(random.uniform(0.06F, 0.11F), random.uniform(0.12F, 0.17F), 0.035F);
-    const Vector2f axes(length, length * random.uniform(0.35F, 0.6F));
-    canvas.ellipse(at, axes, angle, color);
-    const Vector2f half(0.9F * length * std::cos(angle), 0.9F * length * std::sin(angle));
-    canvas.line(at - half, at + half, 0.0012F, 1.35F * color);  // the midrib
-  }
-  return canvas;
 }
 
 /// Threads crossing every `pitch` texels: -1 to 1.
@@ -479,18 +320,18 @@ constexpr Recipe kStains = Recipe::kDetailStains;
 // below several dozens of either.
 constexpr Entry kEntries[] = {
     {{Recipe::kPlain, "plain", 256, 2.0F, kFlat, 1.0F}, 0, plain},
-    {{Recipe::kAsphalt, "asphalt", 1024, 4.0F, kStains, 9.31F}, 1, asphalt},
-    {{Recipe::kConcrete, "concrete", 512, 4.0F, kGrain, 0.83F}, 2, concrete},
-    {{Recipe::kPavers, "pavers", 512, 4.0F, kGrain, 0.83F}, 3, pavers},
+    {{Recipe::kAsphalt, "asphalt", 1024, 4.0F, kStains, 9.31F}, 1, speckled<kAsphaltLook>},
+    {{Recipe::kConcrete, "concrete", 512, 4.0F, kGrain, 0.83F}, 2, masonry<kConcreteLook>},
+    {{Recipe::kPavers, "pavers", 512, 4.0F, kGrain, 0.83F}, 3, masonry<kPaversLook>},
     {{Recipe::kPlaster, "plaster", 512, 4.0F, kGrain, 0.77F}, 4, plaster},
-    {{Recipe::kBrick, "brick", 512, 1.2F, kStains, 5.93F}, 5, brick},
-    {{Recipe::kStoneBlocks, "stone_blocks", 512, 3.0F, kGrain, 0.71F}, 6, stone_blocks},
-    {{Recipe::kRoofTiles, "roof_tiles", 512, 2.0F, kStains, 6.37F}, 7, roof_tiles},
-    {{Recipe::kGrass, "grass", 1024, 4.0F, kStains, 11.7F}, 8, grass},
-    {{Recipe::kSoil, "soil", 512, 6.0F, kGrain, 0.97F}, 9, soil},
-    {{Recipe::kGravel, "gravel", 512, 2.0F, kStains, 7.19F}, 10, gravel},
-    {{Recipe::kBark, "bark", 512, 1.0F, kStains, 2.83F}, 11, bark},
-    {{Recipe::kLeaves, "leaves", 512, 2.0F, kStains, 5.37F}, 12, leaves},
+    {{Recipe::kBrick, "brick", 512, 1.2F, kStains, 5.93F}, 5, masonry<kBrickLook>},
+    {{Recipe::kStoneBlocks, "stone_blocks", 512, 3.0F, kGrain, 0.71F}, 6, masonry<kStoneLook>},
+    {{Recipe::kRoofTiles, "roof_tiles", 512, 2.0F, kStains, 6.37F}, 7, masonry<kTilesLook>},
+    {{Recipe::kGrass, "grass", 1024, 4.0F, kStains, 11.7F}, 8, speckled<kGrassLook>},
+    {{Recipe::kSoil, "soil", 512, 6.0F, kGrain, 0.97F}, 9, speckled<kSoilLook>},
+    {{Recipe::kGravel, "gravel", 512, 2.0F, kStains, 7.19F}, 10, speckled<kGravelLook>},
+    {{Recipe::kBark, "bark", 512, 1.0F, kStains, 2.83F}, 11, speckled<kBarkLook>},
+    {{Recipe::kLeaves, "leaves", 512, 2.0F, kStains, 5.37F}, 12, speckled<kLeavesLook>},
     {{Recipe::kPaintedMetal, "painted_metal", 512, 2.0F, kGrain, 0.61F}, 13, painted_metal},
     {{Recipe::kCorrugatedMetal, "corrugated_metal", 512, 2.0F, kStains, 5.71F},
      14,
@@ -513,10 +354,7 @@ constexpr Entry kEntries[] = {
 static_assert(std::size(kEntries) == kRecipeCount);
 
 const Entry& entry_of(Recipe recipe) {
-  const auto index = static_cast<std::size_t>(recipe);
-  if (index >= std::size(kEntries))
-    throw std::invalid_argument("no recipe has number " + std::to_string(index));
-  return kEntries[index];
+  return kEntries[static_cast<std::size_t>(recipe)];
 }
 
 }  // namespace

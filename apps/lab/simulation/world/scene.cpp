@@ -5,8 +5,6 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <stdexcept>
-#include <string>
 #include <utility>
 
 namespace km {
@@ -21,42 +19,6 @@ constexpr float kLeastHeight_m =
 bool has_area(const Vector3f& ab, const Vector3f& ac) {
   const float longest = std::max({ab.norm(), ac.norm(), (ac - ab).norm()});
   return ab.cross(ac).norm() > kLeastHeight_m * longest;
-}
-
-float cross2(const Vector2f& a, const Vector2f& b) {
-  return a.x() * b.y() - a.y() * b.x();
-}
-
-bool inside_triangle(const Vector2f& p, const Vector2f& a, const Vector2f& b, const Vector2f& c) {
-  return cross2(b - a, p - a) > 0.0F && cross2(c - b, p - b) > 0.0F && cross2(a - c, p - c) > 0.0F;
-}
-
-/// Ears of a simple counter-clockwise polygon (Meisters, "Polygons have ears", 1975).
-std::vector<std::array<std::size_t, 3>> triangulated(std::span<const Vector2f> outline) {
-  std::vector<std::size_t> left(outline.size());
-  for (std::size_t i = 0; i < left.size(); ++i) left[i] = i;
-  std::vector<std::array<std::size_t, 3>> triangles;
-  while (left.size() > 3) {
-    const std::size_t n = left.size();
-    std::size_t ear = n;
-    for (std::size_t i = 0; i < n && ear == n; ++i) {
-      const Vector2f& a = outline[left[(i + n - 1) % n]];
-      const Vector2f& b = outline[left[i]];
-      const Vector2f& c = outline[left[(i + 1) % n]];
-      if (cross2(b - a, c - b) < 0.0F) continue;
-      const bool empty = std::ranges::none_of(
-          left, [&](std::size_t k) { return inside_triangle(outline[k], a, b, c); });
-      if (empty) ear = i;
-    }
-    if (ear == n) {
-      throw std::invalid_argument("Scene: an outline of " + std::to_string(outline.size()) +
-                                  " points is not simple and counter-clockwise");
-    }
-    triangles.push_back({left[(ear + n - 1) % n], left[ear], left[(ear + 1) % n]});
-    left.erase(left.begin() + static_cast<std::ptrdiff_t>(ear));
-  }
-  triangles.push_back({left[0], left[1], left[2]});
-  return triangles;
 }
 
 /// Two unit vectors that make a right-handed frame with the unit vector `axis` as third.
@@ -83,12 +45,6 @@ Vector2f planar_uv(const Vector3f& p, const Vector3f& n) {
   return {p.dot(u), p.dot(n.cross(u))};
 }
 
-bool equal(const Material& a, const Material& b) {
-  return a.label == b.label && a.tint == b.tint && a.base == b.base && a.detail == b.detail &&
-         a.base_period_m == b.base_period_m && a.detail_period_m == b.detail_period_m &&
-         a.specular == b.specular && a.glow == b.glow;
-}
-
 }  // namespace
 
 MaterialId Scene::paint(SurfaceClass label, Recipe recipe, const Vector3f& tint, float scale,
@@ -104,13 +60,10 @@ MaterialId Scene::paint(SurfaceClass label, Recipe recipe, const Vector3f& tint,
   material.specular = specular;
   material.glow = glow;
 
-  const auto known = std::find_if(materials_.begin(), materials_.end(),
-                                  [&](const Material& other) { return equal(other, material); });
-  const auto index = static_cast<std::size_t>(known - materials_.begin());
-  if (index > std::numeric_limits<std::uint16_t>::max())
-    throw std::length_error("a world has at most 65535 materials");
+  const auto known = std::ranges::find(materials_, material);
+  const auto index = static_cast<MaterialId>(known - materials_.begin());
   if (known == materials_.end()) materials_.push_back(material);
-  return static_cast<std::uint16_t>(index);
+  return index;
 }
 
 Scene::Object::Object(Scene& scene) : scene_(scene) {
@@ -193,15 +146,6 @@ void Scene::box(const Vector3f& low, const Vector3f& high, MaterialId material, 
   side(kSideTop, corner(0, 0, 1), corner(1, 0, 1), corner(1, 1, 1), corner(0, 1, 1));
 }
 
-void Scene::polygon(std::span<const Vector2f> outline, float z, MaterialId material, bool up) {
-  const auto at = [&](std::size_t i) { return Vector3f(outline[i].x(), outline[i].y(), z); };
-  for (const auto& [a, b, c] : triangulated(outline))
-    if (up)
-      triangle(at(a), at(b), at(c), material);
-    else
-      triangle(at(a), at(c), at(b), material);
-}
-
 void Scene::extrude(std::span<const Vector2f> outline, float z_low, float z_high,
                     MaterialId material) {
   for (std::size_t i = 0; i < outline.size(); ++i) {
@@ -210,8 +154,17 @@ void Scene::extrude(std::span<const Vector2f> outline, float z_low, float z_high
     quad({a.x(), a.y(), z_low}, {b.x(), b.y(), z_low}, {b.x(), b.y(), z_high},
          {a.x(), a.y(), z_high}, material);
   }
-  polygon(outline, z_high, material, true);
-  polygon(outline, z_low, material, false);
+  const auto at = [&](std::size_t i, float z) {
+    return Vector3f(outline[i].x(), outline[i].y(), z);
+  };
+  const auto cap = [&](std::size_t a, std::size_t b, std::size_t c, float z) {
+    triangle(at(a, z), at(b, z), at(c, z), material);
+  };
+  const std::size_t last = outline.size() - 1;
+  for (std::size_t k = 0; k + 3 < outline.size(); ++k) cap(last, k, k + 1, z_high);
+  cap(last - 2, last - 1, last, z_high);
+  for (std::size_t k = 0; k + 3 < outline.size(); ++k) cap(last, k + 1, k, z_low);
+  cap(last - 2, last, last - 1, z_low);
 }
 
 void Scene::grid(int rows, int columns, const std::function<GridPoint(int, int)>& point,

@@ -55,7 +55,7 @@ class Scene {
 
   /// The material of `recipe` with the recipe's natural periods times `scale`, its colours times
   /// `tint`. The same request twice gives the same index. A texture is generated when the first
-  /// material needs it. Throws std::length_error beyond 65535 materials.
+  /// material needs it.
   [[nodiscard]] MaterialId paint(SurfaceClass label, Recipe recipe,
                                  const Eigen::Vector3f& tint = Eigen::Vector3f::Ones(),
                                  float scale = 1.0F, float specular = 0.0F, float glow = 0.0F);
@@ -118,10 +118,7 @@ class Scene {
   void box(const Eigen::Vector3f& low, const Eigen::Vector3f& high, MaterialId material,
            unsigned sides = kSidesAll);
 
-  /// A simple polygon, counter-clockwise, in the plane z, facing up or down.
-  void polygon(std::span<const Eigen::Vector2f> outline, float z, MaterialId material,
-               bool up = true);
-  /// The prism over a simple polygon, counter-clockwise, from z_low to z_high, ends closed.
+  /// The prism over a convex polygon, counter-clockwise, from z_low to z_high, ends closed.
   void extrude(std::span<const Eigen::Vector2f> outline, float z_low, float z_high,
                MaterialId material);
 

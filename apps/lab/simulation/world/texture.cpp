@@ -3,32 +3,11 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <stdexcept>
-#include <string>
 
 namespace km {
 namespace {
 
 const Eigen::Vector3f kRec709{0.2126F, 0.7152F, 0.0722F};
-
-void require_valid(int size, const std::vector<Eigen::Vector3f>& rgb, int max_size) {
-  if (size < 1 || size > max_size || !std::has_single_bit(static_cast<unsigned>(size))) {
-    throw std::invalid_argument("texture: size " + std::to_string(size) +
-                                " is no power of two from 1 to " + std::to_string(max_size));
-  }
-  const auto wanted = static_cast<std::size_t>(size) * static_cast<std::size_t>(size);
-  if (rgb.size() != wanted) {
-    throw std::invalid_argument("texture: " + std::to_string(rgb.size()) + " texels given, " +
-                                std::to_string(wanted) + " needed");
-  }
-  for (const Eigen::Vector3f& texel : rgb) {
-    if (!((texel.array() >= 0.0F).all() && (texel.array() <= 1.0F).all())) {  // also NaN
-      throw std::invalid_argument("texture: an albedo of (" + std::to_string(texel.x()) + ", " +
-                                  std::to_string(texel.y()) + ", " + std::to_string(texel.z()) +
-                                  ") is outside [0, 1]");
-    }
-  }
-}
 
 /// Each texel of the next level is the mean of four.
 std::vector<Eigen::Vector3f> halved(int n, const std::vector<Eigen::Vector3f>& rgb) {
@@ -51,7 +30,6 @@ std::uint32_t quantized(float value, float step) {
 }  // namespace
 
 Texture::Texture(int size, const std::vector<Eigen::Vector3f>& rgb) {
-  require_valid(size, rgb, 1 << kMaxLogSize);
   log_size_ = std::countr_zero(static_cast<unsigned>(size));
   float brightest = 0.0F;
   float brightest_channel = 0.0F;

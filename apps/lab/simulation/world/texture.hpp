@@ -13,7 +13,7 @@ namespace km {
 class Texture {
  public:
   /// `size` is a power of two, at most 4096; `rgb` holds size * size linear albedos in [0, 1], row
-  /// by row (u runs along a row). Throws std::invalid_argument otherwise.
+  /// by row (u runs along a row).
   Texture(int size, const std::vector<Eigen::Vector3f>& rgb);
 
   /// Mean albedo of the tile.
@@ -32,8 +32,6 @@ class Texture {
   }
 
  private:
-  static constexpr int kMaxLogSize = 12;
-
   void append_level(int n, const std::vector<Eigen::Vector3f>& rgb);
 
   int log_size_ = 0;

@@ -124,25 +124,6 @@ struct WallWindow {
   float top_m = 2.9F;
 };
 
-/// A wall with skirting and, if `window` is set, an opening with frame, a bright outside
-/// and curtains that let light through.
-void add_wall(Scene& scene, float length_m, float height_m, const WallWindow* window,
-              SeededRandom& random);
-
-/// A printed sheet of boards that hangs from `top_m` to just above the floor.
-void add_plank_sheet(Scene& scene, float width_m, float top_m);
-/// Dark ribbed foam, leaning.
-void add_foam_panel(Scene& scene, float width_m, float height_m);
-/// A print of 0.3 to 0.9 m edge, centred at height `center_m`.
-void add_poster(Scene& scene, float edge_m, float center_m, SeededRandom& random);
-/// A heavy curtain from `top_m` to the floor.
-void add_curtain(Scene& scene, float width_m, float top_m, SeededRandom& random);
-
-/// Ceiling at z = height over [0, width] x [0, depth], with trusses, lamps and cameras below it;
-/// returns the lamps' centres in the current frame.
-std::vector<Eigen::Vector3f> add_ceiling(Scene& scene, float width_m, float depth_m, float height_m,
-                                         SeededRandom& random);
-
 // Irradiance that would make a white surface in the room as bright as the outside is, and as the
 // day makes the thin curtains.
 constexpr float kOutside = 4.0F;
@@ -261,6 +242,8 @@ void add_camera(Scene& scene, const Vector3f& position, float yaw) {
   scene.cylinder({0, -0.08F, 0}, {0, -0.11F, 0}, 0.03F, 0.03F, 12, black);
 }
 
+/// A wall with skirting and, if `window` is set, an opening with frame, a bright outside
+/// and curtains that let light through.
 void add_wall(Scene& scene, float length_m, float height_m, const WallWindow* window,
               SeededRandom& random) {
   // Window walls are freshly painted, the others have seen much use.
@@ -287,6 +270,7 @@ void add_wall(Scene& scene, float length_m, float height_m, const WallWindow* wi
   add_window(scene, *window, random);
 }
 
+/// A printed sheet of boards that hangs from `top_m` to just above the floor.
 void add_plank_sheet(Scene& scene, float width_m, float top_m) {
   const auto print = scene.paint(SurfaceClass::kWall, kWoodPlanks, {1.45F, 1.5F, 1.6F}, 0.5F);
   const auto edge = scene.plain(SurfaceClass::kWall, {0.8F, 0.8F, 0.8F});
@@ -299,6 +283,7 @@ void add_plank_sheet(Scene& scene, float width_m, float top_m) {
   scene.box({0.06F, -0.03F, -half}, {top_m, -0.012F, half}, print, kSideFront);
 }
 
+/// Dark ribbed foam, leaning.
 void add_foam_panel(Scene& scene, float width_m, float height_m) {
   const Scene::Object object(scene);
   const auto foam =
@@ -310,6 +295,7 @@ void add_foam_panel(Scene& scene, float width_m, float height_m) {
   scene.box({-half, -0.05F, 0.0F}, {half, 0.0F, height_m}, foam);
 }
 
+/// A print of 0.3 to 0.9 m edge, centred at height `center_m`.
 void add_poster(Scene& scene, float edge_m, float center_m, SeededRandom& random) {
   const auto print = scene.paint(SurfaceClass::kWall, kPosters, Vector3f::Ones(), edge_m);
   const auto scope = scene.at({-0.5F * edge_m, 0.0F, center_m - 0.5F * edge_m});
@@ -319,6 +305,7 @@ void add_poster(Scene& scene, float edge_m, float center_m, SeededRandom& random
   scene.set_uv_offset(Vector2f::Zero());
 }
 
+/// A heavy curtain from `top_m` to the floor.
 void add_curtain(Scene& scene, float width_m, float top_m, SeededRandom& random) {
   const float shade = random.uniform(0.25F, 0.5F);
   const auto cloth =
@@ -327,6 +314,8 @@ void add_curtain(Scene& scene, float width_m, float top_m, SeededRandom& random)
       .add(add_folds, width_m, 0.04F, top_m, -0.09F, cloth, random);
 }
 
+/// Ceiling at z = height over [0, width] x [0, depth], with trusses, lamps and cameras below it;
+/// returns the lamps' centres in the current frame.
 std::vector<Vector3f> add_ceiling(Scene& scene, float width_m, float depth_m, float height_m,
                                   SeededRandom& random) {
   const auto plaster = scene.paint(SurfaceClass::kCeiling, kPlaster, {1.0F, 1.0F, 0.98F});
@@ -361,18 +350,13 @@ constexpr float kRoomHeight_m = 4.0F;
 const Vector3f kCorner(-4.6F, -3.5F, 0.0F);
 constexpr float kHalf_m = 0.5F * kEdge_m;
 
-/// The part of a wall whose middle is at x, as a frame for objects in front of it.
-Isometry3f at_wall(float x) {
-  return standing_at({x, 0.0F, 0.0F}, 0.0F);
-}
-
 /// Mattresses on both sides of a window, a radiator below it, a checkerboard.
 void furnish_mattress_wall(Scene& scene, SeededRandom& random) {
   const WallWindow window{random.uniform(1.6F, 1.9F), 1.5F, 0.9F, 2.9F};
   add_wall(scene, kEdge_m, kRoomHeight_m, &window, random);
-  scene.at(at_wall(window.center_m)).add(add_radiator, 1.3F);
+  scene.at({window.center_m, 0.0F, 0.0F}).add(add_radiator, 1.3F);
   for (float x = -2.9F; x < 0.8F; x += random.uniform(1.05F, 1.2F)) {
-    scene.at(at_wall(x))
+    scene.at({x, 0.0F, 0.0F})
         .add(add_leaning_mattress, Vector3f(1.0F, 0.17F, random.uniform(1.9F, 2.1F)),
              random.uniform(0.12F, 0.3F), random);
   }
@@ -385,12 +369,13 @@ void furnish_mattress_wall(Scene& scene, SeededRandom& random) {
 /// A sheet with a print of boards, foam, a leaning mattress, a shelf.
 void furnish_plank_wall(Scene& scene, SeededRandom& random) {
   add_wall(scene, kEdge_m, kRoomHeight_m, nullptr, random);
-  scene.at(at_wall(random.uniform(-0.3F, 0.3F))).add(add_plank_sheet, 3.3F, 2.5F);
-  scene.at(at_wall(2.5F)).add(add_foam_panel, 1.0F, 1.15F);
-  scene.at(at_wall(-2.6F)).add(add_leaning_mattress, Vector3f(1.5F, 0.17F, 0.9F), 0.2F, random);
-  scene.at(at_wall(3.4F)).add(add_shelf, 0.8F, 1.75F, random);
+  scene.at({random.uniform(-0.3F, 0.3F), 0.0F, 0.0F}).add(add_plank_sheet, 3.3F, 2.5F);
+  scene.at({2.5F, 0.0F, 0.0F}).add(add_foam_panel, 1.0F, 1.15F);
+  scene.at({-2.6F, 0.0F, 0.0F})
+      .add(add_leaning_mattress, Vector3f(1.5F, 0.17F, 0.9F), 0.2F, random);
+  scene.at({3.4F, 0.0F, 0.0F}).add(add_shelf, 0.8F, 1.75F, random);
   for (const float x : {-2.9F, -2.2F, 2.4F}) {
-    scene.at(at_wall(x))
+    scene.at({x, 0.0F, 0.0F})
         .add(add_poster, random.chance(0.5) ? 0.6F : 0.45F, random.uniform(1.6F, 2.0F), random);
   }
   scene.at({-3.5F, -0.25F, 0.0F}).add(add_stand, 2.1F, random);
@@ -400,23 +385,24 @@ void furnish_plank_wall(Scene& scene, SeededRandom& random) {
 void furnish_window_wall(Scene& scene, SeededRandom& random) {
   const WallWindow window{random.uniform(0.9F, 1.3F), 1.7F, 0.9F, 2.95F};
   add_wall(scene, kEdge_m, kRoomHeight_m, &window, random);
-  scene.at(at_wall(window.center_m))
+  scene.at({window.center_m, 0.0F, 0.0F})
       .add(add_leaning_mattress, Vector3f(2.0F, 0.17F, 0.95F), 0.25F, random);
-  scene.at(at_wall(2.7F)).add(add_leaning_mattress, Vector3f(0.9F, 0.17F, 1.95F), 0.2F, random);
-  scene.at(at_wall(random.uniform(-0.8F, -0.4F))).add(add_ladder, 2.5F);
+  scene.at({2.7F, 0.0F, 0.0F})
+      .add(add_leaning_mattress, Vector3f(0.9F, 0.17F, 1.95F), 0.2F, random);
+  scene.at({random.uniform(-0.8F, -0.4F), 0.0F, 0.0F}).add(add_ladder, 2.5F);
   for (const float x : {-1.7F, -2.4F}) {
-    scene.at(at_wall(x))
+    scene.at({x, 0.0F, 0.0F})
         .add(add_poster, random.chance(0.5) ? 0.6F : 0.45F, random.uniform(1.4F, 1.8F), random);
   }
-  scene.at(at_wall(-3.3F)).add(add_curtain, 1.2F, 2.8F, random);
+  scene.at({-3.3F, 0.0F, 0.0F}).add(add_curtain, 1.2F, 2.8F, random);
 }
 
 /// Desks, chairs, cartons and a cabinet: where the operators sit.
 void furnish_desk_wall(Scene& scene, SeededRandom& random) {
   add_wall(scene, kEdge_m, kRoomHeight_m, nullptr, random);
-  scene.at(at_wall(-2.6F)).add(add_desk, random);
-  scene.at(at_wall(random.uniform(0.4F, 0.7F))).add(add_table, 1.5F, 0.5F, 6, random);
-  scene.at(at_wall(2.4F)).add(add_shelf, 1.2F, 1.9F, random);
+  scene.at({-2.6F, 0.0F, 0.0F}).add(add_desk, random);
+  scene.at({random.uniform(0.4F, 0.7F), 0.0F, 0.0F}).add(add_table, 1.5F, 0.5F, 6, random);
+  scene.at({2.4F, 0.0F, 0.0F}).add(add_shelf, 1.2F, 1.9F, random);
   for (const float x : {-1.4F, -0.8F})
     scene.at({x, -0.3F, 0.0F}, random.uniform(-0.25F, 0.25F)).add(add_chair, random);
   for (float x = 0.0F; x < 1.3F; x += 0.45F) {  // below the table
@@ -424,7 +410,7 @@ void furnish_desk_wall(Scene& scene, SeededRandom& random) {
         .add(add_carton, Vector3f(0.38F, 0.3F, random.uniform(0.2F, 0.36F)), random);
   }
   for (const float x : {-3.0F, -2.0F, -0.3F, 0.9F}) {
-    scene.at(at_wall(x))
+    scene.at({x, 0.0F, 0.0F})
         .add(add_poster, random.uniform(0.4F, 0.8F), random.uniform(1.6F, 2.1F), random);
   }
   scene.at({3.6F, -0.3F, 0.0F}).add(add_bucket, random);

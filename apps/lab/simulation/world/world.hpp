@@ -69,6 +69,8 @@ struct Material {
   float specular = 0.0F;         ///< Share of mirrored sky, 0 to 1 (windows, car paint).
   float glow = 0.0F;             ///< Light it sends out by itself, as if it got so much irradiance
                                  ///< more (lamps, screens, curtains before a window).
+
+  bool operator==(const Material&) const = default;
 };
 
 /// Lights of a world: the sun and the sky outdoors, lamps and a constant ambient term indoors.
@@ -83,6 +85,8 @@ struct Lighting {
   std::vector<Lamp> lamps;
   float haze_distance_m = 0.0F;  ///< Distance at which contrast falls to 1/e; 0: clear air.
 };
+
+inline constexpr float kLanesApart_m = 3.2F;  ///< Distance between the middles of two lanes.
 
 /// A closed way along which vehicles drive, centre line of their lane in driving direction, right
 /// hand traffic. The last point joins the first.
@@ -121,8 +125,8 @@ struct World {
 [[nodiscard]] World make_vicon_room(std::uint64_t seed);
 
 /// The closed way `right_m` to the right of the closed centre line through `nodes` in driving
-/// direction, both without rounded corners. Nodes may be visited more than once. Throws
-/// std::invalid_argument for fewer than three nodes, two neighbours at one place, or a turn back.
+/// direction, both without rounded corners. Nodes may be visited more than once. Preconditions: at
+/// least three nodes, no two neighbours at one place, no turn back.
 [[nodiscard]] std::vector<Eigen::Vector2d> right_hand_lane(std::span<const Eigen::Vector2d> nodes,
                                                            double right_m);
 

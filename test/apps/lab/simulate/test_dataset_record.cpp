@@ -22,19 +22,6 @@ std::string refusal(const fs::path& folder, const DatasetRecord& wanted = kWante
 
 }  // namespace
 
-TEST_CASE("A new folder is made and found again with its state", "[simulate]") {
-  const TemporaryFolder folder;
-  const fs::path path = folder.path() / "new/recordings";
-  CHECK_FALSE(open_dataset(path, kWanted).complete);
-  DatasetRecord again = open_dataset(path, kWanted);
-  CHECK_FALSE(again.complete);
-  again.complete = true;
-  write_record(path, again);
-  CHECK(open_dataset(path, kWanted).complete);
-  CHECK_THAT(folder.read("new/recordings/simulation.json"),
-             Catch::Contains("\"complete\": true"));  // as config/docker/entrypoint looks for it
-}
-
 TEST_CASE("A folder with other content or parameters is refused", "[simulate]") {
   const TemporaryFolder folder;
   SECTION("files of others") {

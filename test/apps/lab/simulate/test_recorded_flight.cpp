@@ -65,16 +65,6 @@ TEST_CASE("Recorded states and samples are read, gzipped or not", "[simulate]") 
   CHECK_THAT(flight.fingerprint, Catch::Contains(truth.filename().string()));
 }
 
-TEST_CASE("True poses may be TUM text", "[simulate]") {
-  const TemporaryFolder folder;
-  const auto truth = folder.write("t.txt", "# t p q\n1.5 1 2 3 0 0 0 1\n1.6 1 2 4 0 0 1 0\n");
-  const auto imu = folder.write("i.csv", "1400000000,0,0,0,0,0,0\n1700000000,0,0,0,0,0,0\n");
-  const RecordedFlight flight = read_recorded_flight(truth, imu);
-  CHECK(flight.truth[1].stamp == 1'600'000'000);
-  CHECK(flight.truth[1].T_world_body.linear().diagonal() == Eigen::Vector3d(-1, -1, 1));
-  CHECK(flight.truth[1].velocity_world.isZero());
-}
-
 TEST_CASE("Recordings that cannot be used are refused by file and line", "[simulate]") {
   CHECK_THAT(refusal_of_flight(kEuroc + "3000,1,2,x,1,0,0,0\n", kImu),
              Catch::Contains("truth.csv line 5: 'x' is not a number"));

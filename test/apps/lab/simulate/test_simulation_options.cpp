@@ -53,7 +53,7 @@ TEST_CASE("Bad arguments are refused with their name and value", "[simulate]") {
       Row{{"--rate", "nan"}, "rate = "}, Row{{"--duration", "-5"}, "duration = "},
       Row{{"--rig", "mono"}, "rgbd"}, Row{{"--seed", "-1"}, "seed = "},
       Row{{"--depth", "--depth-rate", "7"}, "--rate 20 is not a multiple of --depth-rate 7"},
-      Row{{"--depth-rate", "5"}, "--depth-rate and --ideal-depth need --depth"},
+      Row{{"--depth-rate", "5"}, "--depth-rate needs --depth"},
       Row{{"--end", "3"}, "need --trajectory"},
       Row{{"--set", "timing.drift=7"}, "unknown key timing.drift"},
       Row{{"--set", "sensor.dirt=7"}, "sensor.dirt = 7 is outside 0 .. 1"},

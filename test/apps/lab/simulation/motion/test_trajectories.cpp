@@ -6,7 +6,6 @@
 #include <complex>
 #include <limits>
 #include <numbers>
-#include <random>
 #include <vector>
 
 #include "apps/lab/simulation/motion/flight_trajectory.hpp"
@@ -15,73 +14,9 @@
 #include "apps/lab/simulation/motion/vehicle_trajectory.hpp"
 #include "apps/lab/simulation/world/seeded_random.hpp"
 #include "modules/core/lie.hpp"
-#include "modules/evaluation/trajectory_file.hpp"
-#include "test/support/shared_data.hpp"
 
 namespace km {
 namespace {
-
-using Control = SplineTrajectory::Control;
-
-/// Largest differences between the derivatives a trajectory states and central differences of its
-/// poses and velocities.
-struct DerivativeErrors {
-  double velocity = 0.0;          ///< [m/s]
-  double acceleration = 0.0;      ///< [m/s^2]
-  double angular_velocity = 0.0;  ///< [rad/s]
-};
-
-DerivativeErrors derivative_errors(const BodyTrajectory& trajectory, int samples, double h_s) {
-  std::mt19937_64 engine(5);
-  DerivativeErrors worst;
-  const double span = trajectory.end_s() - trajectory.start_s() - 2.0 * h_s;
-  for (int k = 0; k < samples; ++k) {
-    const double unit = static_cast<double>(engine() >> 11) * 0x1.0p-53;
-    const double t = trajectory.start_s() + h_s + span * unit;
-    const BodyMotion now = trajectory.motion(t);
-    const BodyMotion before = trajectory.motion(t - h_s);
-    const BodyMotion after = trajectory.motion(t + h_s);
-    const Eigen::Vector3d velocity =
-        (after.T_world_body.translation() - before.T_world_body.translation()) / (2.0 * h_s);
-    const Eigen::Vector3d acceleration =
-        (after.velocity_world - before.velocity_world) / (2.0 * h_s);
-    const Eigen::Matrix3d R_now_T = now.T_world_body.linear().transpose();
-    const Eigen::Vector3d rate = (so3_log(R_now_T * after.T_world_body.linear()) -
-                                  so3_log(R_now_T * before.T_world_body.linear())) /
-                                 (2.0 * h_s);
-    worst.velocity = std::max(worst.velocity, (velocity - now.velocity_world).norm());
-    worst.acceleration =
-        std::max(worst.acceleration, (acceleration - now.acceleration_world).norm());
-    worst.angular_velocity =
-        std::max(worst.angular_velocity, (rate - now.angular_velocity_body).norm());
-  }
-  return worst;
-}
-
-// A lively motion: steps of about 0.2 m and 12 degrees between controls.
-std::vector<Control> lively_controls(std::uint64_t seed, int count) {
-  GaussianRandom random{SeededRandom(seed)};
-  SE3 T = SE3::Identity();
-  std::vector<Control> controls;
-  for (int k = 0; k < count; ++k) {
-    Vector6 step;
-    step << 0.12 * random.draw3(), 0.12 * random.draw3();
-    T = T * se3_exp(step);
-    controls.push_back(spline_control(T));
-  }
-  return controls;
-}
-
-TEST_CASE("A spline states the derivatives of its own poses", "[motion]") {
-  const std::uint64_t seed = GENERATE(1U, 2U, 3U);
-  CAPTURE(seed);
-  const SplineTrajectory trajectory(3.0, 0.2, lively_controls(seed, 60));
-  // Central differences err by h^2 / 6 times the third derivative, here below 1e3 units: 2e-6.
-  const DerivativeErrors errors = derivative_errors(trajectory, 400, 1e-4);
-  CHECK(errors.velocity < 2e-6);
-  CHECK(errors.acceleration < 2e-5);
-  CHECK(errors.angular_velocity < 2e-6);
-}
 
 const Eigen::AlignedBox3d kRoom(Eigen::Vector3d(-3.0, -2.5, 0.2), Eigen::Vector3d(3.0, 2.5, 3.0));
 
@@ -257,23 +192,6 @@ TEST_CASE("Outliers do not bend a fit", "[motion]") {
   }
 }
 
-TEST_CASE("The fit to V1_01's truth passes within 1 mm and 0.1 degrees of its poses", "[motion]") {
-  const auto mav0 = shared_data("euroc/V1_01_easy/mav0");
-  if (!mav0) return;
-  const auto poses = read_trajectory(*mav0 / "state_groundtruth_estimate0/data.csv");
-  const RecordedTrajectory fitted = fit_recording(poses, poses.front().stamp);
-  double position_m = 0.0, rotation_rad = 0.0;
-  for (const StampedPose& pose : poses) {
-    const double t_s =
-        std::min(seconds_between(fitted.epoch, pose.stamp), fitted.trajectory.end_s());
-    const SE3 error = pose.T.inverse() * fitted.trajectory.motion(t_s).T_world_body;
-    position_m = std::max(position_m, error.translation().norm());
-    rotation_rad = std::max(rotation_rad, angle_of(error.linear()));
-  }
-  CHECK(position_m < 1e-3);
-  CHECK(rotation_rad < 0.1 * M_PI / 180.0);
-}
-
 const Route kBlock{{{0, 0}, {80, 0}, {80, 50}, {0, 50}}, 6.0};
 
 // Distance of a point from the closed polyline.
@@ -305,21 +223,6 @@ TEST_CASE("A path follows its route and rounds its corners", "[motion]") {
   CHECK(farthest == Approx(radius * (1.0 - std::sqrt(0.5))).margin(0.15));
   CHECK(sharpest <= 1.05 / radius);  // smoothing tightens short arcs a little
   CHECK(sharpest > 0.9 / radius);
-}
-
-TEST_CASE("A path's parameter is the way, its tangent and curvature its derivatives", "[motion]") {
-  const RoutePath path(kBlock, 5.0);
-  constexpr double kStep_m = 1e-3;
-  for (double s = 0.5; s < path.length_m(); s += 0.37) {
-    const auto before = path.at(s - kStep_m), now = path.at(s), after = path.at(s + kStep_m);
-    const Eigen::Vector2d slope = (after.position - before.position) / (2.0 * kStep_m);
-    const Eigen::Vector2d bend = (after.tangent - before.tangent) / (2.0 * kStep_m);
-    CAPTURE(s);
-    CHECK((slope - now.tangent).norm() < 2e-3);  // the way is exact to 0.2 %
-    CHECK(now.tangent.norm() == Approx(1.0));
-    const Eigen::Vector2d left(-now.tangent.y(), now.tangent.x());
-    CHECK(bend.dot(left) == Approx(now.curvature).margin(1e-3));
-  }
 }
 
 // One-sided spectral density of the heights near `frequency` [cycles/m], averaged over windows.

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "apps/lab/simulation/rendering/light_passages.hpp"
 #include "apps/lab/simulation/rendering/sensor_effects.hpp"
 #include "apps/lab/simulation/rendering/surfaces.hpp"
 #include "apps/lab/simulation/world/objects.hpp"
@@ -47,8 +46,6 @@ TEST_CASE("The exposure starts at its target and follows a change of light with 
     last = level;
   }
   CHECK(last == Approx(kTarget).epsilon(0.01));
-  CHECK_THROWS_AS(ExposureControl({}, 0.0), std::invalid_argument);
-  CHECK_THROWS_AS(control.next(RenderedView{}), std::invalid_argument);
 }
 
 Shot shot(double gain, std::uint64_t seed = 0) {
@@ -200,7 +197,7 @@ TEST_CASE("A moved car is at its pose in the images of labels and depth",
   const Renderer renderer(world);
   Scene scene;
   SeededRandom random(3);
-  add_vehicle(scene, VehicleKind::kSedan, random);
+  add_prop(scene, Prop::kHatchback, random);
   World shapes;
   scene.move_to(shapes);
   const SE3 T_world_car =

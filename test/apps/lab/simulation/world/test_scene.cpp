@@ -40,11 +40,11 @@ TEST_CASE("Closed shapes face outwards and have the volume and area of the solid
     volume = 24.0;
     area = 52.0;
   }
-  SECTION("prism over an L") {
-    const Vector2f outline[] = {{0, 0}, {2, 0}, {2, 1}, {1, 1}, {1, 3}, {0, 3}};
+  SECTION("prism over a house's front") {
+    const Vector2f outline[] = {{0, 0}, {8, 0}, {8, 3}, {4, 6}, {0, 3}};
     scene.extrude(outline, -1.0F, 1.0F, 1);
-    volume = 8.0;
-    area = 2.0 * 4.0 + 2.0 * 10.0;
+    volume = 2.0 * 36.0;
+    area = 2.0 * 36.0 + 2.0 * 24.0;
   }
   SECTION("cylinder") {
     scene.cylinder({1, 1, 1}, {1, 3, 1}, 0.5F, 0.5F, 64, 0);

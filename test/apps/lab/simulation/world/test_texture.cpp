@@ -18,20 +18,6 @@ std::vector<float> texels(const Texture& texture) {
   return values;
 }
 
-struct Moments {
-  double mean = 0.0;
-  double variance = 0.0;
-};
-
-Moments moments(const std::vector<float>& values) {
-  Moments result;
-  for (const float value : values) result.mean += value;
-  result.mean /= static_cast<double>(values.size());
-  for (const float value : values) result.variance += (value - result.mean) * (value - result.mean);
-  result.variance /= static_cast<double>(values.size());
-  return result;
-}
-
 /// Mean absolute difference between each column (or row) and the next, the last one to the first.
 std::vector<double> steps(const std::vector<float>& values, int n, bool along_rows) {
   std::vector<double> result;
@@ -49,40 +35,24 @@ std::vector<double> steps(const std::vector<float>& values, int n, bool along_ro
   return result;
 }
 
-TEST_CASE(
-    "A recipe's tile is its seed's own, has no seam, and the mean and contrast of the material",
-    "[simulation][texture]") {
+TEST_CASE("A recipe's tile is its seed's own, has structure and no seam", "[simulation][texture]") {
   const auto recipe = static_cast<Recipe>(GENERATE(range(0, kRecipeCount)));
   CAPTURE(traits_of(recipe).name);
   const Texture texture = make_texture(recipe, 3);
   const std::vector<float> values = texels(texture);
   const int size = 1 << texture.gray_texels().log_size;
   REQUIRE(size == traits_of(recipe).size);
-  const Moments all = moments(values);
-  const double contrast = std::sqrt(all.variance) / all.mean;
   const bool fixed = recipe == Recipe::kChecker || recipe == Recipe::kDetailFlat;
   CHECK((texels(make_texture(recipe, 4)) == values) == fixed);
-  if (recipe == Recipe::kDetailFlat) {
-    CHECK(all.mean == Approx(0.5));
-    return;
-  }
+  if (recipe == Recipe::kDetailFlat) return;
   for (const bool along_rows : {true, false}) {
     CAPTURE(along_rows);
     std::vector<double> step = steps(values, size, along_rows);
     const double seam = step.back();
     step.pop_back();
-    CHECK(seam <= 1.05 * *std::max_element(step.begin(), step.end()));
-  }
-  CHECK(contrast > 0.01);
-  if (recipe == Recipe::kMarkerTape) {  // white on black
-    CHECK(all.mean == Approx(0.1).margin(0.05));
-  } else if (recipe > Recipe::kDetailFlat) {
-    CHECK(all.mean == Approx(0.5).margin(0.005));  // scaled by two it changes no mean
-    CHECK(contrast < 0.15);
-  } else {
-    CHECK(all.mean > 0.05);
-    CHECK(all.mean < 0.9);
-    CHECK(contrast < 1.0);
+    const double largest = *std::max_element(step.begin(), step.end());
+    CHECK(largest > 1e-4);
+    CHECK(seam <= 1.05 * largest);
   }
 }
 
