@@ -1,12 +1,15 @@
 #include <catch2/catch.hpp>
+
 #include <chrono>
 #include <cmath>
 #include <future>
 #include <stdexcept>
+#include <string>
 #include <thread>
 #include <utility>
 #include <vector>
 
+#include "modules/sensors/load_shedding.hpp"
 #include "modules/sensors/node/sensors_node.hpp"
 
 namespace km {
@@ -160,6 +163,147 @@ TEST_CASE("A reader that throws ends the node with its exception", "[sensors]") 
   node.stop();
   CHECK_THROWS_WITH(std::rethrow_exception(node.error()), "disk gone");
   CHECK(run.stamps.size() == 3);
+}
+
+namespace {
+
+constexpr double kPeriod_s = 0.05;
+constexpr double kMaxLag_s = 0.5;
+
+// One odometry that needs `cost_s` for each image, simulated in virtual time. Images are due every
+// 50 ms. The reader decides about an image when the queue has room for it.
+struct Playback {
+  double cost_s = 0.0;
+  double share_per_s = 0.9;  // share of features that survive a second
+  bool waits = true;         // a recording: its clock waits as the last resort
+
+  LoadShedding shedding{kMaxLag_s};
+  std::vector<FrameUse> uses{};
+  std::vector<int> gaps{};  // images from one used image to the next
+  std::vector<ShedLoad> loads{};
+  double waited_s = 0.0, worst_lag_s = 0.0;
+
+  void play(int images) {
+    constexpr std::size_t kRoom = 4;
+    struct Running {
+      ProcessedFrame frame;
+      double end_s = 0.0;
+    };
+    std::vector<Running> queue;
+    double now_s = start_s;
+    int last_used = -1;
+    const auto finish_until = [&](double until_s) {
+      while (!queue.empty() && queue.front().end_s <= until_s) {
+        shedding.finish(queue.front().frame);
+        queue.erase(queue.begin());
+      }
+    };
+    for (int k = 0; k < images; ++k) {
+      const double due_s = start_s + k * kPeriod_s + waited_s;
+      now_s = std::max(now_s, due_s);
+      if (queue.size() == kRoom) now_s = std::max(now_s, queue.front().end_s);
+      finish_until(now_s);
+      if (const double pause_s = shedding.pause_s(due_s, now_s); waits && pause_s > 0.0) {
+        shedding.pause(pause_s);
+        waited_s += pause_s;
+      }
+      worst_lag_s = std::max(worst_lag_s, shedding.lag_s(now_s));
+      const Stamp stamp = first_stamp + nanoseconds(k * kPeriod_s);
+      uses.push_back(shedding.use_next(stamp, start_s + k * kPeriod_s + waited_s, now_s));
+      loads.push_back(shedding.load());
+      if (uses.back() == FrameUse::kNone) continue;
+      if (last_used >= 0) gaps.push_back(k - last_used);
+      const int gap = last_used >= 0 ? k - last_used : 1;
+      last_used = k;
+      const double begin_s = queue.empty() ? now_s : std::max(now_s, queue.back().end_s);
+      queue.push_back({{stamp, std::pow(share_per_s, gap * kPeriod_s)}, begin_s + cost_s});
+    }
+    start_s += images * kPeriod_s + waited_s;
+    first_stamp += nanoseconds(images * kPeriod_s);
+    waited_s = 0.0;
+  }
+
+  double start_s = 100.0;
+  Stamp first_stamp = 1'000'000'000;
+};
+
+int first_with(const Playback& run, auto&& is) {
+  for (std::size_t k = 0; k < run.loads.size(); ++k)
+    if (is(run.loads[k])) return static_cast<int>(k);
+  return -1;
+}
+
+}  // namespace
+
+TEST_CASE("The map loses its frames first and then odometry every second image and both recover",
+          "[sensors]") {
+  Playback run{.cost_s = 0.07};
+  run.play(400);
+  const int map = first_with(run, [](const ShedLoad& load) { return load.map; });
+  const int half = first_with(run, [](const ShedLoad& load) { return load.stride > 1; });
+  REQUIRE(map > 0);
+  REQUIRE(half > map);
+  for (int k = 0; k < map; ++k) CHECK(run.uses[static_cast<std::size_t>(k)] == FrameUse::kAll);
+  for (const ShedLoad& load : run.loads) CHECK((load.stride == 1 || load.map));
+  for (const int gap : run.gaps)
+    CHECK(gap <= 2);  // a stride of 2 suffices, and images are used evenly
+  CHECK(run.worst_lag_s < 2.0 * kMaxLag_s);
+
+  run.cost_s = 0.01;
+  run.uses.clear();
+  run.play(1000);
+  CHECK(run.uses.back() == FrameUse::kAll);
+  CHECK(run.shedding.load() == ShedLoad{});
+
+  Playback fast{.cost_s = 0.045};  // a robot that is fast enough drops no images
+  fast.play(2000);
+  for (const FrameUse use : fast.uses) REQUIRE(use == FrameUse::kAll);
+  CHECK(fast.waited_s == 0.0);
+}
+
+TEST_CASE("Odometry keeps the images that it needs and the recording waits", "[sensors]") {
+  // A fifth of the features is lost from image to image. 0.64 of them survive to the second image,
+  // 0.41 to the fourth.
+  Playback run{.cost_s = 0.25, .share_per_s = std::pow(0.8, 1.0 / kPeriod_s)};
+  run.play(1000);
+  CHECK(run.shedding.max_stride() == 3);
+  for (const int gap : run.gaps) CHECK(gap <= 3);
+  CHECK(run.worst_lag_s <= 2.0 * kMaxLag_s + run.cost_s);
+}
+
+TEST_CASE("Live images that come too late are dropped", "[sensors]") {
+  Playback run{.cost_s = 0.5, .waits = false};
+  run.play(1000);
+  CHECK(run.worst_lag_s < 2.0 * kMaxLag_s + 5 * run.cost_s);
+  CHECK(run.shedding.load().map);
+  CHECK(run.shedding.load().stride == LoadShedding::kMaxStride);
+}
+
+TEST_CASE("A step that has to be repeated is undone less and less often", "[sensors]") {
+  Playback run{.cost_s = 0.06};
+  run.play(4000);
+  int changes = 0;
+  for (std::size_t k = 1; k < run.loads.size(); ++k)
+    changes += run.loads[k].stride != run.loads[k - 1].stride ? 1 : 0;
+  CHECK(changes >= 2);
+  CHECK(changes < 40);  // 200 s; with a constant waiting time about one a second
+}
+
+TEST_CASE("A share of tracked features that is no number is ignored", "[sensors]") {
+  const double share = GENERATE(std::nan(""), HUGE_VAL, -1.0);
+  CAPTURE(share);
+  LoadShedding shedding(kMaxLag_s);
+  for (int k = 0; k < 3; ++k) {
+    const Stamp stamp = nanoseconds(kPeriod_s * k);
+    CHECK(shedding.use_next(stamp, kPeriod_s * k, kPeriod_s * k) == FrameUse::kAll);
+    shedding.finish({stamp, share});
+  }
+  CHECK(shedding.max_stride() == LoadShedding::kMaxStride);
+}
+
+TEST_CASE("An impossible lag is refused", "[sensors]") {
+  CHECK_THROWS_AS(LoadShedding(-0.1), std::invalid_argument);
+  CHECK_THROWS_AS(LoadShedding(std::nan("")), std::invalid_argument);
 }
 
 }  // namespace km
