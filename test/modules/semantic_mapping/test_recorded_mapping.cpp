@@ -28,8 +28,7 @@ TEST_CASE("Two halves of a recorded kitchen agree where they overlap", "[semanti
   REQUIRE(a.vertices.size() > 5000);
 
   const MeshInput other{"second half", b};
-  const MeshError error =
-      mesh_error(a, {&other, 1}, {.icp = false, .registration = {}, .crop_m = 0.2}).merged;
+  const MeshError error = mesh_error(a, {&other, 1}, {.icp = false, .crop_m = 0.2}).merged;
   const DistanceSummary& apart = error.truth.surface;
   CAPTURE(error.coverage, apart.median_m, apart.mean_m, apart.p95_m);
   // Accuracy that poses and depths permit: another program's meshes of these halves are 9.7 mm
