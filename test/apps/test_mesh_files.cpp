@@ -51,7 +51,7 @@ TEST_CASE("A mesh is moved to the optimised pose of its first keyframe", "[robot
   bench.keyframes.publish({.id = {2, 1}, .T_odom_kf = SE3::Identity()});
   bench.trajectory.publish({2, 2, {SE3::Identity()}});  // not yet joined to the team
   bench.maps.publish(triangle());
-  bench.optimized.publish({.mesh = triangle().mesh, .trajectory = {}, .report = {}});
+  bench.optimized.publish(OptimizedMesh{{.mesh = triangle().mesh, .report = {}, .superseded = {}}});
   bench.node.stop();
   REQUIRE(bench.node.error() == nullptr);
   bench.node.finish(Trajectory{2, 0, {T_world_first, SE3::Identity()}});
@@ -84,7 +84,7 @@ TEST_CASE("A mesh that cannot be written is named, and no end of the run", "[rob
   std::filesystem::create_directory(file);
   bench.node.start();
   bench.maps.publish(triangle());
-  bench.optimized.publish({.mesh = triangle().mesh, .trajectory = {}, .report = {}});
+  bench.optimized.publish(OptimizedMesh{{.mesh = triangle().mesh, .report = {}, .superseded = {}}});
   bench.node.stop();
   CHECK(bench.node.error() == nullptr);
   CHECK(bench.written("mesh_optimized.ply").vertices == triangle().mesh.vertices);
