@@ -37,9 +37,9 @@ struct CampPlan {
   explicit CampPlan(std::uint64_t plan_seed) : seed(plan_seed) {
     SeededRandom random = SeededRandom::stream(seed, 50);
     for (std::size_t i = 0; i < x.size(); ++i)
-      x[i] = 50.0F * (static_cast<float>(i) - 1.5F) + random.uniform(-3.0F, 3.0F);
+      x[i] = 53.0F * (static_cast<float>(i) - 1.5F) + random.uniform(-3.0F, 3.0F);
     for (std::size_t j = 0; j < y.size(); ++j)
-      y[j] = 46.0F * (static_cast<float>(j) - 1.0F) + random.uniform(-3.0F, 3.0F);
+      y[j] = 44.0F * (static_cast<float>(j) - 1.0F) + random.uniform(-3.0F, 3.0F);
   }
 
   [[nodiscard]] Vector2f yard_center(std::size_t column, std::size_t row) const {

@@ -88,7 +88,7 @@ TEST_CASE("The ordinary reader reads a recording, and missing images are made ag
   // As a run leaves it that was stopped.
   std::string record = folder.read("r/simulation.json");
   CHECK_THAT(record, Catch::Contains("\"complete\": true"));  // as config/docker/entrypoint looks
-  record.replace(record.find("true"), 4, "false");
+  record.replace(record.rfind("true"), 4, "false");
   folder.write("r/simulation.json", record);
   fs::remove_all(output / "robot1/mav0/cam1/data");
   fs::resize_file(output / "robot0/mav0/cam0/data/1001000000000.jpg", 100);
