@@ -147,31 +147,6 @@ std::optional<double> DistanceField::at_voxel(const Eigen::Vector3i& voxel) {
   return signed_distance(*block, in.x(), in.y(), in.z());
 }
 
-std::optional<PointDistance> DistanceField::at(const Eigen::Vector3d& point) {
-  const Eigen::Vector3d scaled = point / voxel_m_;
-  constexpr double kFarthest = BlockMap::kReach * static_cast<double>(kBlockSide);
-  if (!(scaled.cwiseAbs().maxCoeff() < kFarthest)) return std::nullopt;
-  const Eigen::Vector3d low = scaled.array().floor();
-  const Eigen::Vector3d t = scaled - low;
-  PointDistance result;
-  for (int corner = 0; corner < 8; ++corner) {
-    const Eigen::Vector3i offset(corner & 1, corner >> 1 & 1, corner >> 2 & 1);
-    const auto distance = at_voxel(low.cast<int>() + offset);
-    if (!distance) return std::nullopt;
-    // Weight of the corner along each axis, and its derivative.
-    Eigen::Vector3d weight, slope;
-    for (int k = 0; k < 3; ++k) {
-      weight[k] = offset[k] == 1 ? t[k] : 1.0 - t[k];
-      slope[k] = (offset[k] == 1 ? 1.0 : -1.0) / voxel_m_;
-    }
-    result.distance_m += weight.prod() * *distance;
-    result.gradient += *distance * Eigen::Vector3d(slope.x() * weight.y() * weight.z(),
-                                                   weight.x() * slope.y() * weight.z(),
-                                                   weight.x() * weight.y() * slope.z());
-  }
-  return result;
-}
-
 std::vector<DistanceField::SlicePoint> DistanceField::slice(double z_m) {
   const int voxel_z = static_cast<int>(std::lround(z_m / voxel_m_));
   std::vector<Eigen::Vector3i> positions, outdated;

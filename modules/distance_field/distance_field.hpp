@@ -15,15 +15,6 @@
 
 namespace km {
 
-/// Distance at a point, see DistanceField::at().
-struct PointDistance {
-  /// Signed distance to the nearest surface [m], negative behind it. At most max_distance_m, which
-  /// stands for this distance or more.
-  double distance_m = 0.0;
-  /// Derivative of the distance with respect to the point; zero where it has its maximum.
-  Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
-};
-
 /// Euclidean signed distances to the nearest surface, on the voxels of the mapper's TSDF.
 ///
 /// Surface voxels are voxels behind a surface with an observed voxel in front of it beside them
@@ -49,10 +40,6 @@ class DistanceField {
 
   /// Replaces what is known of these blocks.
   void set(const SpaceChanges& changes);
-
-  /// Distance and gradient at a point of the map's frame, by trilinear interpolation of the eight
-  /// voxels around it. nullopt if one of them was never observed: the distance is unknown.
-  [[nodiscard]] std::optional<PointDistance> at(const Eigen::Vector3d& point);
 
   /// Signed distance of a voxel [m]; nullopt if it was never observed.
   [[nodiscard]] std::optional<double> at_voxel(const Eigen::Vector3i& voxel);

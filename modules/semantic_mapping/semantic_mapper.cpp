@@ -43,18 +43,6 @@ bool fits(const Image& image, const Pixels& pixels, const Camera& camera) {
 
 }  // namespace
 
-const char* to_string(IntegrationStatus status) {
-  switch (status) {
-    case IntegrationStatus::kIntegrated:
-      return "integrated";
-    case IntegrationStatus::kDepthSizeDiffers:
-      return "depth image of another size than the camera's";
-    case IntegrationStatus::kPoseUnusable:
-      return "pose not finite or not a rotation";
-  }
-  return "unknown";
-}
-
 struct SemanticMapper::State {
   // A block in view and the kind of its update.
   struct Update {

@@ -23,10 +23,6 @@ enum class IntegrationStatus {
   kPoseUnusable,      ///< The pose is not finite or not rigid; the frame is skipped.
 };
 
-/// "integrated", "depth image of another size than the camera's", "pose not finite or not a
-/// rotation"
-[[nodiscard]] const char* to_string(IntegrationStatus status);
-
 /// Counts of one call of integrate(). All but status are zero for a skipped frame.
 struct [[nodiscard]] IntegrationReport {
   IntegrationStatus status = IntegrationStatus::kIntegrated;

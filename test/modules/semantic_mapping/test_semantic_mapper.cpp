@@ -60,6 +60,7 @@ TEST_CASE("All pixels of a fisheye image with bearings are used", "[semantic_map
       depth.millimetres.push_back(static_cast<std::uint16_t>(1000 + u));
   const DepthView& view = maker.make(depth, nullptr);
   CHECK(view.width <= 2 * camera.width + 2);
+  CHECK(std::ranges::count(view.pixels, 0U) == 1);      // the one for points outside
   for (const double x : {-1.5, -0.5, 0.0, 0.7, 1.9}) {  // tangents, up to 62 degrees
     const int u = static_cast<int>(std::lround(static_cast<double>(view.cx) + 40.0 * x));
     const int v = static_cast<int>(std::lround(static_cast<double>(view.cy)));

@@ -21,11 +21,11 @@ struct Bench {
   MappingProgress last;
   std::unique_ptr<SemanticMappingNode> node;
 
-  explicit Bench(Overflow overflow = Overflow::kBlock) {
+  Bench() {
     maps.subscribe([this](const auto& message) { meshes.push_back(message); });
     progress.subscribe([this](const auto& message) { last = *message; });
     node = std::make_unique<SemanticMappingNode>(settings(), small_camera(), two_classes(), 3.0,
-                                                 overflow,
+                                                 Overflow::kBlock,
                                                  SemanticMappingTopics{.frames = frames,
                                                                        .superseded = superseded,
                                                                        .maps = maps,
@@ -84,18 +84,6 @@ TEST_CASE("Unusable frames are counted by reason", "[semantic_mapping_node]") {
   CHECK(bench.last.wrong_size == 1);
   CHECK(bench.last.bad_pose == 1);
   CHECK(bench.last.off_palette_pixels == 160 * 120);
-}
-
-TEST_CASE("A mapper that is too slow drops the oldest frames and counts them",
-          "[semantic_mapping_node]") {
-  Bench bench(Overflow::kDropOldest);
-  for (int i = 0; i < 10; ++i) bench.frames.publish(frame(i));  // without waiting
-  bench.node->start();
-  bench.node->stop();
-  CHECK(bench.last.integrated + bench.last.too_late == 10);
-  CHECK(bench.last.too_late == 8);
-  CHECK(bench.meshes.size() == 1);
-  CHECK(bench.meshes.back()->seen_by.front()[0] == 4);  // frames 8 and 9
 }
 
 TEST_CASE("Superseded surface is dropped with the next frame", "[semantic_mapping_node]") {

@@ -2,42 +2,12 @@
 #include <array>
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <map>
 #include <random>
-#include <tuple>
 
-#include "modules/semantic_mapping/block_map.hpp"
 #include "modules/semantic_mapping/voxel_labels.hpp"
 
 namespace km {
 namespace {
-
-TEST_CASE("The block map has the same content as a std::map", "[semantic_mapping]") {
-  const unsigned seed = GENERATE(1U, 2U);
-  CAPTURE(seed);
-  std::mt19937 rng(seed);
-  std::uniform_int_distribution<int> coordinate(-12, 12);
-  std::uniform_int_distribution<int> action(0, 2);
-  BlockMap map;
-  std::map<std::tuple<int, int, int>, const VoxelBlock*> expected;
-  for (int i = 0; i < 20000; ++i) {
-    const int x = coordinate(rng), y = coordinate(rng), z = coordinate(rng);
-    const Eigen::Vector3i at(x, y, z);
-    const auto found = expected.find({x, y, z});
-    REQUIRE(map.find(at) == (found == expected.end() ? nullptr : found->second));
-    if (found != expected.end() && action(rng) == 0) {
-      map.erase(at);
-      expected.erase(found);
-    } else if (found == expected.end() && action(rng) != 0) {
-      expected[{x, y, z}] = &map.insert(at);
-    }
-    REQUIRE(map.size() == expected.size());
-  }
-  CHECK(expected.size() > 1000);  // so that positions share buckets
-  for (const auto& [at, block] : expected)
-    CHECK(map.find({std::get<0>(at), std::get<1>(at), std::get<2>(at)}) == block);
-  for (const auto& block : map.blocks()) CHECK(map.find(block->position) == block.get());
-}
 
 constexpr unsigned kOne = VoxelLabels::kVotesPerWeight;  // votes of weight 1
 
