@@ -102,18 +102,6 @@ TEST_CASE("Bytes: a varint above 64 bits or its type fails", "[core]") {
   CHECK(in.failed());
 }
 
-TEST_CASE("Bytes: a failed reader gives zeros and stays failed", "[core]") {
-  const Bytes bytes{1, 2, 3};
-  ByteReader in(bytes);
-  CHECK(in.u32() == 0);
-  CHECK(in.failed());
-  CHECK(in.u8() == 0);
-  CHECK(in.bytes(1).empty());
-  CHECK(in.count(10, 1) == 0);
-  CHECK(in.left() == 0);
-  CHECK_FALSE(in.done());
-}
-
 TEST_CASE("Bytes: counts that exceed the remaining bytes are refused", "[core]") {
   ByteWriter out;
   out.varint(3);

@@ -27,14 +27,6 @@ TEST_CASE("Unprojecting inverts projecting over the whole image", "[core]") {
     }
 }
 
-TEST_CASE("Without distortion a bearing is linear in the pixel", "[core]") {
-  Camera camera = euroc_left();
-  camera.lens = {};
-  const auto bearing = camera.unproject({camera.cx + 458.654, camera.cy});
-  REQUIRE(bearing.has_value());
-  CHECK((*bearing - Eigen::Vector2d(1, 0)).norm() < 1e-12);
-}
-
 TEST_CASE("A pixel without a bearing has none", "[core]") {
   CHECK_FALSE(euroc_left().unproject({1e6, 1e6}).has_value());
   CHECK_FALSE(euroc_left().unproject({std::nan(""), 100.0}).has_value());

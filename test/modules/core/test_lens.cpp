@@ -195,17 +195,6 @@ TEST_CASE("Bearings end at 80 degrees", "[core][lens]") {
   CHECK(kTumVi.undistorted({256.0 / 190.97, 0.0}).has_value());
 }
 
-TEST_CASE("A lens keeps its coefficients and is ideal without any", "[core][lens]") {
-  CHECK(Lens().is_ideal());
-  CHECK(Lens(LensModel::kRadialTangential, {0, 0, 0, 0, 0}) == Lens());
-  CHECK_FALSE(kEuroc.is_ideal());
-  CHECK_FALSE(Lens(LensModel::kEquidistant, {0, 0, 0, 0}).is_ideal());
-  CHECK(kOmni.coefficients().size() == 5);
-  CHECK(kOmni.coefficients()[0] == 0.80065662);
-  CHECK(kRational.coefficients().size() == 8);
-  CHECK_FALSE(kEuroc == kTumVi);
-}
-
 TEST_CASE("Invalid coefficients of a lens are refused", "[core][lens]") {
   const auto refuses = [](LensModel model, const std::vector<double>& k) {
     CHECK_THROWS_AS(Lens(model, k), std::invalid_argument);

@@ -7,17 +7,6 @@
 namespace km {
 namespace {
 
-TEST_CASE("A covariance gives the weights of its block traces", "[precision]") {
-  Matrix6 covariance = Matrix6::Zero();
-  covariance.diagonal() << 0.01, 0.02, 0.03, 0.1, 0.2, 0.3;
-  covariance(0, 3) = covariance(3, 0) = 0.01;  // cross terms do not count
-
-  const Precision precision = precision_of(covariance);
-
-  CHECK(precision.kappa == Approx(3.0 / (2.0 * 0.06)));
-  CHECK(precision.tau == Approx(3.0 / 0.6));
-}
-
 TEST_CASE("Weights are equal after conversion to a covariance and back", "[precision]") {
   const Precision there{10000.0, 100.0};
   const Matrix6 covariance = covariance_of(there);

@@ -30,10 +30,4 @@ TEST_CASE("Eigenvalues ascend and belong to orthonormal eigenvectors", "[core]")
         rounding * eigen.values.cwiseAbs().maxCoeff());
 }
 
-TEST_CASE("Only the lower triangle of a symmetric matrix is read", "[core]") {
-  Eigen::MatrixXd A(2, 2);
-  A << 2.0, 77.0, 1.0, 2.0;
-  CHECK(symmetric_eigen(A).values(0) == Approx(1.0));
-}
-
 }  // namespace km

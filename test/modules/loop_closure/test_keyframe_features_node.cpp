@@ -100,14 +100,5 @@ TEST_CASE("features are seen from where the cameras were found to be", "[keyfram
                                                         small_rig().cameras[0].T_body_cam));
 }
 
-TEST_CASE("keyframes out of order, and images that do not fit the rig, are misuse",
-          "[keyframe_features_node]") {
-  Chain chain;
-  CHECK_THROWS_AS(chain.node.step(KeyframeOdometry{.id = {4, 1}}), std::invalid_argument);
-  chain.node.step(KeyframeOdometry{.id = {4, 0}});
-  const LocatedFrame empty{std::make_shared<const StereoFrame>(), 0, SE3::Identity()};
-  CHECK_THROWS_AS(chain.node.step(empty), std::invalid_argument);
-}
-
 }  // namespace
 }  // namespace km

@@ -80,26 +80,6 @@ TEST_CASE("a candidate seen twice is verified once, and a keyframe fetched once"
   CHECK(robot.closures.size() == 2);
 }
 
-TEST_CASE("a lost request or reply is made up for after the time-out", "[loop_closure_node]") {
-  const bool lose_reply = GENERATE(false, true);
-  CAPTURE(lose_reply);
-  Meeting meeting(3);
-  auto& [scene, robot, peer] = meeting;
-  robot.tick(100.0);
-  robot.give(scene.candidate());
-  REQUIRE(robot.requests.size() == 1);
-  if (lose_reply) peer.node.step(robot.requests[0].message);
-  robot.requests.clear();
-  peer.replies.clear();
-  robot.tick(101.9);
-  CHECK(robot.requests.empty());
-  robot.tick(102.0);
-  REQUIRE(robot.requests.size() == 1);
-  deliver(robot, peer);
-  CHECK(robot.closures.size() == 1);
-  CHECK(stages_of(robot.reports) == Stages{kCandidate, kRequested, kVerified});
-}
-
 TEST_CASE("a robot compares no pair that its peer compares or has verified",
           "[loop_closure_node]") {
   Meeting meeting(24);

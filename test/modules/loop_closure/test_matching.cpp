@@ -102,30 +102,6 @@ TEST_CASE("numbers of a network are rounded to a fourteenth of their range", "[m
     CHECK(zero == 0);
 }
 
-TEST_CASE("keyframes are compared by the network of both, otherwise by ORB", "[matching]") {
-  std::mt19937 rng(3);
-  KeyframePair pair = make_keyframe_pair(rng, 3, {}, 0.0);
-  for (int i = 0; i < 3; ++i)
-    pair.from.matched.push_back(random_descriptor<MatchedDescriptor>(rng));
-  pair.from.network = 7;
-  CHECK(common_network(pair.from, pair.to) == 0);
-  const auto bits = orb_bits(pair.from.descriptors);
-  for (std::size_t i = 0; i < bits.size(); ++i)
-    CHECK(std::equal(bits[i].begin(), bits[i].end(), pair.from.descriptors[i].begin()));
-  CHECK(matched_by(0, pair.from) == bits);
-  CHECK(matched_by(7, pair.to).empty());
-  CHECK(matched_by(7, pair.from) == pair.from.matched);
-  KeyframeFeatures received;  // has no tests of ORB
-  received.matched = pair.from.matched;
-  CHECK(matched_by(0, received) == received.matched);
-  received.network = 7;
-  CHECK(common_network(pair.from, received) == 7);
-  CHECK(matched_by(7, received) == received.matched);
-  received.network = 8;
-  CHECK(common_network(pair.from, received) == 0);
-  CHECK(matched_by(0, received).empty());
-}
-
 TEST_CASE("without a second descriptor there is no ratio and no match", "[matching]") {
   const auto network = GENERATE(as<std::uint16_t>(), 0, 7);
   const auto none = features_of({}, network), one = features_of({{}}, network),

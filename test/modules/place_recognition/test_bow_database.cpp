@@ -101,16 +101,6 @@ TEST_CASE("The inverted index finds the same images as comparing every pair",
   CHECK(std::equal(few.begin(), few.end(), found.begin()));
 }
 
-TEST_CASE("An empty database, range or vector matches nothing", "[place_recognition]") {
-  BowDatabase database(10);
-  CHECK(database.query(toy_vector({4})).empty());
-  CHECK(database.add({}) == 0);
-  CHECK(database.add(toy_vector({4})) == 1);
-  CHECK(database.query({}).empty());
-  CHECK(database.query(toy_vector({4}), {.last = 1}).empty());
-  CHECK(database.query(toy_vector({4}), {.last = 2}).size() == 1);
-}
-
 TEST_CASE("An invalid vector is refused and changes nothing", "[place_recognition]") {
   BowDatabase database(10);
   const auto check_refused = [&](const BowVector& vector, const char* reason) {

@@ -55,79 +55,70 @@ void require_ascending(const TrackedFrame& frame) {
   REQUIRE(ascending);
 }
 
-TEST_CASE("Features of a moving camera stay on their landmarks to a tenth of a pixel", "[vio]") {
-  const Vector6 motion = GENERATE(twist(0, 0, 0, 0.02, 0.01, 0),     // sideways, 3 px
-                                  twist(0.01, 0.02, 0.03, 0, 0, 0),  // turning only
-                                  twist(0.01, -0.02, 0.01, 0.01, 0, 0.03));
-  const bool gyro = GENERATE(true, false);
-  CAPTURE(motion.transpose(), gyro);
-  const StereoRig rig = test_rig();
-  const TexturedPlane plane;
-  FeatureTracker tracker(rig, small_image_config());
+// Errors of eight images of a moving camera: of features within 50 degrees of the axis and beyond,
+// and of right points.
+struct TrackErrors {
+  std::vector<double> px, wide_px, right_px;
+};
 
+TrackErrors errors_of_tracking(const StereoRig& rig, const TexturedPlane& plane,
+                               const Vector6& motion, bool gyro) {
+  const auto& [left, right] = rig.cameras;
+  FeatureTracker tracker(rig, small_image_config());
   std::map<std::uint64_t, Eigen::Vector3d> landmarks;  // First position of each feature.
-  std::vector<double> errors_px;
-  constexpr int kFrames = 8;
-  for (int i = 0; i < kFrames; ++i) {
+  TrackErrors errors;
+  for (int i = 0; i < 8; ++i) {
     const SE3 T_world_body = camera_pose(i, motion);
     const Eigen::Matrix3d R = gyro ? so3_exp(motion.head<3>()) : Eigen::Matrix3d::Identity();
     const TrackedFrame frame = tracker.track(plane.render(rig, T_world_body, i * kFrameNs), R);
     require_ascending(frame);
     REQUIRE(frame.stamp == i * kFrameNs);
     for (const TrackedFeature& feature : frame.features) {
-      const auto [landmark, is_new] =
-          landmarks.try_emplace(feature.id, plane.meet(T_world_body, feature.left));
-      CHECK(is_new == (feature.length == 1));
-      if (is_new) continue;
-      const Eigen::Vector2d expected = (T_world_body.inverse() * landmark->second).hnormalized();
-      errors_px.push_back(rig.cameras[0].fx * (expected - feature.left).norm());
-    }
-  }
-  // Up to seven steps of drift on 8-bit images; a wrong pixel convention would show as 0.5 px.
-  REQUIRE(errors_px.size() > 6 * 50);
-  CHECK(quantile(errors_px, 0.5) < 0.05);
-  CHECK(quantile(errors_px, 0.95) < 0.2);
-}
-
-TEST_CASE("Through a fisheye lens features stay on their landmarks, and pairs have depth",
-          "[vio]") {
-  const StereoRig rig = fisheye_rig();
-  const Camera& left = rig.cameras[0];
-  const TexturedPlane plane{2.0, 0.25, 1};  // cells of 19 px in the middle, 3 px at 65 degrees
-  FeatureTracker tracker(rig, small_image_config());
-  const Vector6 motion = twist(0.01, -0.02, 0.01, 0.01, 0, 0.03);
-  std::map<std::uint64_t, Eigen::Vector3d> landmarks;
-  std::vector<double> errors_px, wide_errors_px, depth_errors_px;
-  for (int i = 0; i < 8; ++i) {
-    const SE3 T_world_body = camera_pose(i, motion);
-    const TrackedFrame frame =
-        tracker.track(plane.render(rig, T_world_body, i * kFrameNs), so3_exp(motion.head<3>()));
-    for (const TrackedFeature& feature : frame.features) {
-      const Eigen::Vector2d px = left.project(feature.left).value();
-      const Eigen::Vector3d seen = T_world_body.inverse() * plane.meet(T_world_body, feature.left);
+      const Eigen::Vector3d seen = plane.meet(T_world_body, feature.left);
+      const Eigen::Vector3d by_right = T_world_body.inverse() * seen - Eigen::Vector3d(0.11, 0, 0);
       if (feature.right)
-        depth_errors_px.push_back(
-            (rig.cameras[1].project(*feature.right).value() -
-             rig.cameras[1].project_ray(seen - Eigen::Vector3d(0.11, 0, 0)).value())
-                .norm());
-      const auto [landmark, is_new] =
-          landmarks.try_emplace(feature.id, plane.meet(T_world_body, feature.left));
+        errors.right_px.push_back(
+            (right.project(*feature.right).value() - right.project_ray(by_right).value()).norm());
+      const auto [landmark, is_new] = landmarks.try_emplace(feature.id, seen);
+      CHECK(is_new == (feature.length == 1));
       if (is_new) continue;
       const auto expected = left.project_ray(T_world_body.inverse() * landmark->second);
       REQUIRE(expected.has_value());
       const bool wide = feature.left.norm() > std::tan(50.0 * M_PI / 180.0);
-      (wide ? wide_errors_px : errors_px).push_back((*expected - px).norm());
+      (wide ? errors.wide_px : errors.px)
+          .push_back((*expected - left.project(feature.left).value()).norm());
     }
   }
-  REQUIRE(errors_px.size() > 100);
-  CHECK(quantile(errors_px, 0.5) < 0.05);
-  CHECK(quantile(errors_px, 0.95) < 0.2);
-  REQUIRE(wide_errors_px.size() > 200);  // the texture is too fine for the pixels there
-  CHECK(quantile(wide_errors_px, 0.5) < 0.1);
-  CHECK(quantile(wide_errors_px, 0.95) < 1.0);
-  REQUIRE(depth_errors_px.size() > 4 * 50);
-  CHECK(quantile(depth_errors_px, 0.5) < 0.05);
-  CHECK(quantile(depth_errors_px, 0.95) < 0.2);
+  return errors;
+}
+
+TEST_CASE("Features of a moving camera stay on their landmarks to a tenth of a pixel", "[vio]") {
+  const Vector6 motion = GENERATE(twist(0, 0, 0, 0.02, 0.01, 0),     // sideways, 3 px
+                                  twist(0.01, 0.02, 0.03, 0, 0, 0),  // turning only
+                                  twist(0.01, -0.02, 0.01, 0.01, 0, 0.03));
+  const bool gyro = GENERATE(true, false);
+  CAPTURE(motion.transpose(), gyro);
+  const TrackErrors errors = errors_of_tracking(test_rig(), TexturedPlane{}, motion, gyro);
+  // Up to seven steps of drift on 8-bit images; a wrong pixel convention would show as 0.5 px.
+  REQUIRE(errors.px.size() > 6 * 50);
+  CHECK(quantile(errors.px, 0.5) < 0.05);
+  CHECK(quantile(errors.px, 0.95) < 0.2);
+}
+
+TEST_CASE("Through a fisheye lens features stay on their landmarks, and pairs have depth",
+          "[vio]") {
+  const TexturedPlane plane{2.0, 0.25, 1};  // cells of 19 px in the middle, 3 px at 65 degrees
+  const TrackErrors errors =
+      errors_of_tracking(fisheye_rig(), plane, twist(0.01, -0.02, 0.01, 0.01, 0, 0.03), true);
+  REQUIRE(errors.px.size() > 100);
+  CHECK(quantile(errors.px, 0.5) < 0.05);
+  CHECK(quantile(errors.px, 0.95) < 0.2);
+  REQUIRE(errors.wide_px.size() > 200);  // the texture is too fine for the pixels there
+  CHECK(quantile(errors.wide_px, 0.5) < 0.1);
+  CHECK(quantile(errors.wide_px, 0.95) < 1.0);
+  REQUIRE(errors.right_px.size() > 4 * 50);
+  CHECK(quantile(errors.right_px, 0.5) < 0.05);
+  CHECK(quantile(errors.right_px, 0.95) < 0.2);
 }
 
 TEST_CASE("Stereo matches of a plane have its depth", "[vio]") {

@@ -43,19 +43,6 @@ void thought_slow(OdometryState& state) {
 
 constexpr int kTenSeconds = 200;  // 10 s
 
-TEST_CASE("Idling rotors do not prevent rest", "[vio][rest]") {
-  const SyntheticMotion motion = standing();
-  SyntheticWorld world(motion, 1);
-  auto frames = world.frames(40, kNoisePx);
-  for (InertialFrame& frame : frames)
-    for (ImuSample& sample : frame.samples) {  // at 35 Hz
-      const double phase = 220.0 * seconds_between(0, sample.stamp);
-      sample.gyro.x() += 0.1 * std::sin(phase);
-      sample.accel.y() += 1.5 * std::cos(phase);
-    }
-  CHECK(images_before_rest(frames, motion) == 20);
-}
-
 TEST_CASE("A slow rotation is not detected as rest", "[vio][rest]") {
   SyntheticMotion motion = standing();
   motion.turn_amplitude(2) = 0.1;  // 0.01 rad/s at most, 0.005 at both ends
