@@ -112,20 +112,6 @@ TEST_CASE("A descriptor gets the word that plain descent finds", "[place_recogni
     CHECK(words[i] == word_of_leaf(vocabulary.data(), leaf_of(vocabulary.data(), image[i])));
 }
 
-TEST_CASE("A bag counts every descriptor once, words ascending", "[place_recognition]") {
-  World world(1);
-  const Vocabulary vocabulary(train_vocabulary(world.images(30, 300), {.depth = 4}));
-  const auto image = world.image(1000);
-  std::vector<std::uint32_t> words = vocabulary.words(image);
-  std::sort(words.begin(), words.end());
-  std::vector<std::uint32_t> from_bag;
-  for (const auto& [word, count] : vocabulary.count(image))
-    from_bag.insert(from_bag.end(), count, word);
-  CHECK(from_bag == words);
-  CHECK(vocabulary.count({}).empty());
-  CHECK(vocabulary.transform({}).words.empty());
-}
-
 TEST_CASE("Few different descriptors become one word each", "[place_recognition]") {
   const Images images = {{ladder(0), ladder(100), ladder(200), ladder(100), ladder(200)}};
   const VocabularyData data = train_vocabulary(images, {.branching = 5, .depth = 4});

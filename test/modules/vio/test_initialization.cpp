@@ -45,19 +45,6 @@ TEST_CASE("A start in motion finds gravity, velocities and the gyro's bias", "[v
   CHECK(start.states.front().T_odom_body.translation().norm() == 0.0);
 }
 
-TEST_CASE("A start at rest has no velocity and uses the gyro's mean as its bias", "[vio]") {
-  SyntheticMotion motion = SyntheticMotion::standing();
-  motion.gyro_bias = {0.02, -0.01, 0.03};
-  SyntheticWorld world(motion, 1);
-  const StartGuess start = guess(world.frames(kImages, 0.1));
-  REQUIRE(start.status == StartStatus::kAtRest);
-  for (const OdometryState& state : start.states) {
-    CHECK(state.v_odom.norm() == 0.0);
-    CHECK((state.gyro_bias - motion.gyro_bias).norm() < 1e-12);
-    CHECK((state.T_odom_body.linear().row(2) - Eigen::RowVector3d(0, 0, 1)).norm() < 1e-9);
-  }
-}
-
 TEST_CASE("Images at rest with inertial data of a motion are not detected as rest", "[vio]") {
   SyntheticWorld still(SyntheticMotion::standing(), 3), moving(SyntheticMotion{}, 3);
   auto frames = still.frames(kImages, 0.1);
