@@ -7,7 +7,6 @@
 
 #include "apps/program_options.hpp"
 #include "apps/publish/message_player.hpp"
-#include "apps/publish/recorded_messages.hpp"
 #include "modules/absolute_fixes/fix_reader.hpp"
 #include "modules/core/text_table.hpp"
 #include "modules/recordings/open_bag.hpp"

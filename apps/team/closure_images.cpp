@@ -11,7 +11,7 @@
 #include "modules/images/image_view.hpp"
 #include "modules/recordings/open_bag.hpp"
 #include "modules/recordings/ros_messages.hpp"
-#include "modules/sensors/euroc_folder.hpp"
+#include "modules/sensors/folder_layouts.hpp"
 #include "modules/sensors/node/open_folder.hpp"
 #include "modules/sensors/node/rig_file.hpp"
 #include "modules/sensors/sensor_messages.hpp"

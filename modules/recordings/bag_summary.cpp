@@ -8,7 +8,7 @@
 #include <optional>
 #include <string_view>
 
-#include "modules/recordings/channel_table.hpp"
+#include "modules/recordings/bag_reader.hpp"
 #include "modules/recordings/ros_messages.hpp"
 
 namespace km {

@@ -14,7 +14,6 @@
 
 #include "modules/core/decoded.hpp"
 #include "modules/recordings/bag_reader.hpp"
-#include "modules/recordings/channel_table.hpp"
 
 namespace km {
 

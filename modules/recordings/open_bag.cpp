@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "modules/core/input_file.hpp"
-#include "modules/recordings/channel_table.hpp"
+#include "modules/recordings/bag_reader.hpp"
 #include "modules/recordings/chunked_file.hpp"
 #include "modules/recordings/mcap_records.hpp"
 

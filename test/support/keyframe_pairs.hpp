@@ -4,7 +4,7 @@
 #include <utility>
 #include <vector>
 
-#include "modules/sensors/euroc_folder.hpp"
+#include "modules/sensors/folder_layouts.hpp"
 #include "modules/sensors/text_file.hpp"
 
 namespace km {

@@ -2,7 +2,6 @@
 
 #include <filesystem>
 
-#include "modules/sensors/euroc_folder.hpp"
 #include "modules/sensors/folder_layouts.hpp"
 #include "modules/sensors/node/rig_calibration.hpp"
 

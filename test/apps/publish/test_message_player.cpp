@@ -5,7 +5,6 @@
 #include <thread>
 
 #include "apps/publish/message_player.hpp"
-#include "apps/publish/recorded_messages.hpp"
 #include "modules/recordings/ros_messages.hpp"
 #include "runtime/dds/ros_subscription.hpp"
 #include "test/modules/sensors/euroc_folder.hpp"

@@ -53,18 +53,6 @@ std::vector<StereoMatches> seen_by(const StereoRig& truth, double wrong_share = 
 
 }  // namespace
 
-TEST_CASE("Points of a pair lie on the lines of its own calibration", "[diagnosis]") {
-  const StereoFit fit = fit_of(seen_by(rig()), rig());
-  CHECK(fit.points == 400);
-  CHECK(fit.inlier_ratio == Approx(0.9).margin(0.05));
-  CHECK(fit.error_px < 0.6);
-  CHECK(fit.depth_m > 1.0);
-  CHECK(fit.depth_m < 4.0);
-  const StereoAlternative best = best_alternative(seen_by(rig()), rig());
-  CHECK(best.fault == StereoFault::kNone);
-  CHECK(best.fit.inlier_ratio == fit.inlier_ratio);
-}
-
 TEST_CASE("A fault of the pair's calibration is identified", "[diagnosis]") {
   const StereoFault fault = GENERATE(StereoFault::kInvertedPair, StereoFault::kInvertedCameras,
                                      StereoFault::kInvertedLeft, StereoFault::kInvertedRight);
@@ -128,19 +116,6 @@ TEST_CASE("The rotation between two images is found with any translation", "[dia
   CHECK(found->inlier_ratio > 0.95);
   // Across the image its error is ten times that of a bearing: see the header.
   CHECK((found->rotation - rotation).norm() < 5.0 * kSigma);
-}
-
-TEST_CASE("Too few or random points give no rotation", "[diagnosis]") {
-  std::mt19937 rng(6);
-  const Eigen::Vector3d none = Eigen::Vector3d::Zero();
-  CHECK_FALSE(rotation_between(seen_points(none, none, 19, rng), kSigma));
-  std::uniform_real_distribution<double> anywhere(-0.5, 0.5);
-  std::vector<BearingStep> random;
-  for (int k = 0; k < 100; ++k) {
-    const double a = anywhere(rng), b = anywhere(rng), c = anywhere(rng), d = anywhere(rng);
-    random.push_back({{a, b}, {c, d}});
-  }
-  CHECK_FALSE(rotation_between(random, kSigma));
 }
 
 namespace {
@@ -310,16 +285,6 @@ TEST_CASE("The focal length follows from the gyroscope's rotation", "[diagnosis]
   CHECK(noisy->factor * given == Approx(1.0).margin(3.0 * noisy->sigma));
   CHECK(noisy->sigma < 0.01);
   CHECK(noisy->error_px == Approx(0.3).margin(0.15));
-}
-
-TEST_CASE("Without rotation a gyroscope gives no focal length", "[diagnosis]") {
-  std::vector<TrackedStep> steps = driven(0.2);
-  for (TrackedStep& step : steps)  // all points are far away, and the robot stands still
-    for (TrackedPoint& point : step.points) point.to = point.from;
-  std::vector<ImuSample> still = driven_samples();
-  for (ImuSample& sample : still) sample.gyro = kDriveBias;
-  const auto fit = fit_focal(steps, driven_rig(), still, rough_fit());
-  CHECK((!fit || fit->sigma > 0.05));
 }
 
 }  // namespace km

@@ -104,29 +104,6 @@ TEST_CASE("Stamps of left and right may differ by the tolerance", "[sensors]") {
   CHECK(strict.report().count(ReaderFault::kRightWithoutLeft) == 1);
 }
 
-TEST_CASE("MH_01_easy: 320 pairs in 16 s, one step of 100 ms, covered by samples", "[sensors]") {
-  const auto folder = shared_data("euroc/MH_01_easy");
-  if (!folder) return;
-  FolderReader reader = open_folder(*folder, {.part = {.from_s = 0.0, .to_s = 16.01}});
-  const auto packets = packets_of(reader);
-  REQUIRE(packets.size() == 320);
-  CHECK(reader.report().empty());
-  check_imu_contract(packets);
-  int long_steps = 0;
-  for (std::size_t i = 1; i < packets.size(); ++i) {
-    const double step_s = seconds_between(packets[i - 1].frame->stamp, packets[i].frame->stamp);
-    if (step_s > 0.06) {
-      ++long_steps;
-      CHECK(step_s == Approx(0.1).margin(1e-6));
-      CHECK(packets[i].imu.size() == 21);
-    }
-  }
-  CHECK(long_steps == 1);
-  CHECK(packets.front().imu.size() == 201);
-  CHECK(packets.front().frame->left.width == 752);
-  CHECK(reader.rig().stereo.baseline_m() == Approx(0.110).margin(0.001));  // README of the data
-}
-
 TEST_CASE("Missing files and folders are refused by name", "[sensors]") {
   const EurocFolder folder;
   CHECK_THROWS_WITH(open_folder("/nowhere/at/all"), "/nowhere/at/all: no such folder");

@@ -271,14 +271,6 @@ TEST_CASE("Odometry keeps the images that it needs and the recording waits", "[s
   CHECK(run.worst_lag_s <= 2.0 * kMaxLag_s + run.cost_s);
 }
 
-TEST_CASE("Live images that come too late are dropped", "[sensors]") {
-  Playback run{.cost_s = 0.5, .waits = false};
-  run.play(1000);
-  CHECK(run.worst_lag_s < 2.0 * kMaxLag_s + 5 * run.cost_s);
-  CHECK(run.shedding.load().map);
-  CHECK(run.shedding.load().stride == LoadShedding::kMaxStride);
-}
-
 TEST_CASE("A step that has to be repeated is undone less and less often", "[sensors]") {
   Playback run{.cost_s = 0.06};
   run.play(4000);
