@@ -1,0 +1,425 @@
+#include "modules/diagnosis/examine_sensors.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include "modules/core/lie.hpp"
+#include "modules/core/text_table.hpp"
+#include "modules/diagnosis/finding.hpp"
+#include "modules/diagnosis/focal_fit.hpp"
+#include "modules/diagnosis/image_rotation.hpp"
+#include "modules/diagnosis/inertial_fit.hpp"
+#include "modules/diagnosis/stereo_fit.hpp"
+#include "modules/evaluation/statistics.hpp"
+#include "modules/recordings/bag_summary.hpp"
+
+namespace km {
+namespace {
+
+using enum Severity;
+
+void examine_fault(ReaderFault fault, const ReaderReport::Entry& entry, double of,
+                   Examination& result) {
+  constexpr double kFew = 0.01, kHalf = 0.5;
+  const double share = static_cast<double>(entry.count) / std::max(of, 1.0);
+  std::string id = std::string("recording.") + to_string(fault);  // "recording.missing_images"
+  std::ranges::replace(id, ' ', '_');
+  result.add(share > kHalf  ? kError
+             : share > kFew ? kWarning
+                            : kNote,
+             std::move(id),
+             std::to_string(entry.count) + ' ' + to_string(fault) + ", " + percent(share) +
+                 ", first: " + entry.first,
+             "the affected parts are skipped",
+             "repair the recording, or record again if there are many");
+}
+
+// Number of usable items of the kind that a fault counts. Images are counted per camera, lost
+// messages per topic.
+double usable_count(ReaderFault fault, const SensorSample& sample) {
+  const auto frames = static_cast<double>(sample.frames.size());
+  const auto samples = static_cast<double>(sample.imu.size());
+  const double images = sample.right_size.width > 0 ? 2.0 * frames : frames;
+  switch (fault) {
+    case ReaderFault::kNotFinite:
+    case ReaderFault::kImplausible:
+    case ReaderFault::kNoAcceleration:
+    case ReaderFault::kImuGap:
+      return samples;
+    case ReaderFault::kMissingBetween:
+      return images;
+    case ReaderFault::kLostMessage:
+      return images + samples;
+    default:
+      return frames;
+  }
+}
+
+void examine_rate(const char* sensor, const std::string& id, const std::vector<Stamp>& stamps,
+                  double least_hz, double longest_gap_s, Examination& result) {
+  const StampStatistics found = stamp_statistics(stamps);
+  result.figure(std::string(sensor) + ", rate", fixed(found.rate_hz, 1) + " Hz, largest gap " +
+                                                    fixed(found.largest_gap_s, 3) + " s, jitter " +
+                                                    milliseconds(found.jitter_s));
+  if (!(found.rate_hz >= least_hz))
+    result.add(kWarning, id + ".rate",
+               std::string(sensor) + " at " + fixed(found.rate_hz, 1) + " Hz, less than " +
+                   fixed(least_hz, 0) + " Hz",
+               "odometry may lose track in fast motion", "record at a higher rate");
+  if (found.largest_gap_s > longest_gap_s)
+    result.add(kWarning, id + ".gap",
+               std::string(sensor) + " with a gap of " + fixed(found.largest_gap_s, 2) + " s",
+               "odometry may lose track in the gap and start again",
+               "find out why the driver or the disk stopped; --from and --to choose a part "
+               "without the gap");
+}
+
+std::vector<double> values_of(const std::vector<ImageQuality>& qualities, const auto& value) {
+  std::vector<double> values;
+  values.reserve(qualities.size());
+  for (const ImageQuality& image : qualities) values.push_back(static_cast<double>(value(image)));
+  return values;
+}
+
+// Texts of the finding for a StereoFault.
+struct FaultWords {
+  const char* id;
+  const char* what;
+  const char* to_do;
+};
+
+const std::map<StereoFault, FaultWords> kFaultWords = {
+    {StereoFault::kNone,
+     {"stereo.epipolar", "points are far from their epipolar lines",
+      "calibrate the pair again at the resolution of the images, with its lens model"}},
+    {StereoFault::kSwappedImages,
+     {"stereo.swapped", "the images of the left and the right camera are exchanged",
+      "exchange the topics or folders of the two cameras"}},
+    {StereoFault::kInvertedPair,
+     {"stereo.inverted", "the pose of the right camera relative to the left one is inverted",
+      "replace T_left_right by its inverse: it maps points from the right camera to the left one"}},
+    {StereoFault::kInvertedCameras,
+     {"stereo.inverted_cameras", "both T_body_cam (T_BS) are inverted",
+      "replace them by their inverses: T_BS maps points from the camera to the body"}},
+    {StereoFault::kInvertedLeft,
+     {"stereo.inverted_left", "T_body_cam (T_BS) of the left camera is inverted",
+      "replace it by its inverse"}},
+    {StereoFault::kInvertedRight,
+     {"stereo.inverted_right", "T_body_cam (T_BS) of the right camera is inverted",
+      "replace it by its inverse"}},
+    {StereoFault::kExchangedLenses,
+     {"stereo.exchanged_lenses",
+      "focal lengths, centre and distortion of the two cameras are exchanged", "exchange them"}},
+    {StereoFault::kFocalLength,
+     {"stereo.focal", "the focal lengths of the two cameras do not fit each other",
+      "calibrate them again at the resolution of the images"}},
+};
+
+std::string fit_text(const StereoFit& fit) {
+  return percent(fit.inlier_ratio) + " of " + std::to_string(fit.points) + " points within " +
+         fixed(kEpipolarInlier_px, 0) + " px of their epipolar line, median " +
+         fixed(fit.error_px, 2) + " px";
+}
+
+void examine_pair(const StereoAlternative& found, const StereoFit& given, Examination& result) {
+  const bool is_named = found.fault != StereoFault::kNone;
+  if (!is_named && is_sound(given)) return;
+  const FaultWords& words = kFaultWords.at(found.fault);
+  std::string what = std::string(words.what) + ": " + fit_text(given);
+  if (is_named) what += "; with this fault undone " + percent(found.fit.inlier_ratio);
+  if (found.fault == StereoFault::kFocalLength)
+    what += ", with the right focal length times " + fixed(found.focal_ratio, 3);
+  result.add(kError, words.id, std::move(what),
+             "depth is wrong or missing, so odometry and loop closures fail", words.to_do);
+}
+
+void examine_baseline(const StereoRig& rig, const StereoFit& fit, Examination& result) {
+  constexpr double kLeast_m = 0.02, kMost_m = 1.5;
+  const double baseline_m = rig.baseline_m();
+  const std::string depth =
+      std::isfinite(fit.depth_m) ? "median depth " + fixed(fit.depth_m, 1) + " m" : "no depth";
+  result.figure("baseline",
+                fixed(baseline_m, 3) + " m, " + depth + " (images do not determine the length)");
+  if (!(baseline_m >= kLeast_m && baseline_m <= kMost_m))
+    result.add(kWarning, "stereo.baseline",
+               "a baseline of " + rounded(baseline_m, 4) + " m, outside of the usual " +
+                   fixed(kLeast_m, 2) + " to " + fixed(kMost_m, 1) + " m; " + depth,
+               "if its unit is wrong, all lengths are wrong by the same factor",
+               "state the translation in metres, not in millimetres or inches");
+}
+
+double angle_between(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b) {
+  return so3_log(a.transpose() * b).norm();
+}
+
+// Least rotation for statements on the gyroscope, and bounds for further statements.
+constexpr double kMinRate_radps = 0.02;
+constexpr double kRelated = 0.6, kUnrelated = 0.3;  // bounds on InertialFit::explained
+constexpr double kSecondAxis_radps = 0.02;          // least rate about a second axis
+
+void examine_relation(const InertialFit& fit, Examination& result) {
+  if (fit.explained > kRelated) return;
+  result.add(fit.explained < kUnrelated ? kError : kWarning, "imu.unrelated",
+             "the gyroscope explains " + percent(std::max(fit.explained, 0.0)) +
+                 " of the rotation in the images (" + fixed(kDegrees * fit.image_rms, 1) +
+                 " degrees/s), at any time offset within " + milliseconds(kMaxOffset_s),
+             "the gyroscope is of another device, its stamps are off by more, or its samples "
+             "are wrong",
+             "check that camera and gyroscope are on one robot and use one clock");
+}
+
+void examine_scale(const InertialFit& fit, Examination& result) {
+  constexpr double kPerDegree = 1.0 / kDegrees, kSlack = 0.1;
+  const double off = std::abs(fit.scale - 1.0);
+  if (off < kSlack) return;
+  const bool in_degrees = std::abs(fit.scale / kPerDegree - 1.0) < kSlack;
+  result.add(
+      kError, in_degrees ? "imu.gyro_in_degrees" : "imu.gyro_scale",
+      "the images rotate " + rounded(fit.scale, 4) + " times as fast as the gyroscope states" +
+          (in_degrees ? ", and 1 degree is 0.01745 rad" : ""),
+      in_degrees ? "the gyroscope states degrees/s, but odometry expects rad/s"
+                 : "the gyroscope or the focal length is wrong by this factor",
+      in_degrees ? "divide the samples by 57.2958" : "check the configured range of the gyroscope");
+}
+
+void examine_direction(const InertialFit& fit, const Camera& left, Examination& result) {
+  const Eigen::Matrix3d R_cam_body = left.T_body_cam.linear().transpose();
+  constexpr double kClose = 5.0 / kDegrees, kFar = 20.0 / kDegrees, kOff = 2.0 / kDegrees;
+  if (fit.Q.determinant() < 0.0) {
+    result.add(kError, "imu.mirrored",
+               "the gyroscope's axes are left-handed: with one axis inverted it explains " +
+                   percent(fit.mirror_gain) + " more of the rotation in the images",
+               "no mounting of the camera explains this",
+               "invert the mirrored axis; the data sheet of the sensor shows the axes");
+    return;
+  }
+  const double angle = angle_between(R_cam_body, fit.Q);
+  result.figure("camera to inertial sensor",
+                "rotated by " + fixed(kDegrees * angle, 1) + " degrees against T_body_cam");
+  if (angle < kOff) return;
+  const bool is_inverse = angle > kFar && angle_between(R_cam_body.transpose(), fit.Q) < kClose;
+  result.add(angle > kFar ? kError : kWarning,
+             is_inverse ? "extrinsics.inverted" : "extrinsics.rotation",
+             is_inverse ? "the rotation of T_body_cam (T_BS) is inverted: it is " +
+                              fixed(kDegrees * angle, 0) + " degrees off, and its inverse " +
+                              fixed(kDegrees * angle_between(R_cam_body.transpose(), fit.Q), 1)
+                        : "the left camera is rotated by " + fixed(kDegrees * angle, 1) +
+                              " degrees against T_body_cam",
+             "odometry rotates in the wrong direction, or drifts",
+             is_inverse ? "replace it by its inverse: T_BS maps points from the camera to the body"
+                        : "calibrate cameras and inertial sensor together (Kalibr); "
+                          "vio.calibrate corrects a few degrees");
+}
+
+void examine_offset(const InertialFit& fit, Examination& result) {
+  constexpr double kSmall_s = 3e-3, kLarge_s = 5e-3, kSure = 4.0;
+  if (fit.offset_at_limit) {
+    result.figure("time offset",
+                  "not determined: no best offset within " + milliseconds(kMaxOffset_s));
+    return;
+  }
+  result.figure("time offset", milliseconds(fit.offset_s) + " +- " +
+                                   milliseconds(fit.offset_sigma_s) +
+                                   ", to be added to stamps of images");
+  if (std::abs(fit.offset_s) < std::max(kSmall_s, kSure * fit.offset_sigma_s)) return;
+  result.add(std::abs(fit.offset_s) < kLarge_s ? kNote : kWarning, "imu.time_offset",
+             "stamps of the inertial sensor are " + milliseconds(std::abs(fit.offset_s)) + " (+- " +
+                 milliseconds(fit.offset_sigma_s) + (fit.offset_s > 0.0 ? ") later" : ") earlier") +
+                 " than those of the images",
+             "odometry is less accurate until vio.calibrate has estimated the offset",
+             "set camera_time_offset_s: " + rounded(fit.offset_s, 3) +
+                 " in the rig file, or stamp both sensors by one clock");
+}
+
+void examine_focal(const SensorSample& sample, const StereoRig& rig, const VisualRotations& seen,
+                   const InertialFit& inertial, Examination& result) {
+  constexpr double kSlack = 0.015, kSure = 2.0, kMaxSigma = 0.01;
+  constexpr const char* kName = "focal length by the gyroscope";
+  const bool has_depth = 2 * seen.with_depth > seen.steps.size();
+  const auto fit = has_depth ? fit_focal(sample.steps, rig, sample.imu, inertial) : std::nullopt;
+  if (!fit || !(fit->sigma < kMaxSigma)) {
+    result.figure(kName, std::string("not determined: ") +
+                             (has_depth ? "too little rotation across the optical axis"
+                                        : "no stereo depth that fits"));
+    return;
+  }
+  const std::string factor = fixed(fit->factor, 3) + " +- " + fixed(fit->sigma, 3);
+  result.figure(kName, "times " + factor + " of the calibration's");
+  if (std::abs(fit->factor - 1.0) < std::max(kSlack, kSure * fit->sigma)) return;
+  result.add(kWarning, "camera.focal",
+             "the images agree with the gyroscope if the focal lengths are " + factor +
+                 " times those of the calibration",
+             "distances and rotations are wrong by this factor",
+             "calibrate the cameras again at the resolution of the images, or check the scale of "
+             "the gyroscope");
+}
+
+void examine_gravity(const SensorSample& sample, Examination& result) {
+  std::vector<double> norms;
+  norms.reserve(sample.imu.size());
+  for (const ImuSample& measured : sample.imu) norms.push_back(measured.accel.norm());
+  constexpr double kGravity = 9.81;
+  const double found = quantile(std::move(norms), 0.5);
+  result.figure("accelerometer", "median norm " + fixed(found, 2) + " m/s^2");
+  const auto is_about = [found](double value) { return std::abs(found / value - 1.0) < 0.15; };
+  if (is_about(kGravity) || std::isnan(found)) return;
+  Finding finding{.id = "imu.gravity", .severity = kError};
+  finding.what = "the accelerometer measures " + rounded(found, 3) + " in the median, gravity is " +
+                 fixed(kGravity, 2) + " m/s^2";
+  finding.means = "odometry estimates a wrong direction of gravity";
+  finding.to_do = "write specific force in m/s^2, including gravity";
+  if (is_about(1.0) || is_about(1e3)) {
+    finding.id = "imu.accel_in_g";
+    finding.means =
+        is_about(1.0) ? "the accelerometer states g" : "the accelerometer states thousandths of g";
+    finding.to_do =
+        "multiply the samples by " + std::string(is_about(1.0) ? "9.80665" : "0.00980665");
+  } else if (found < 0.3 * kGravity) {
+    finding.id = "imu.no_gravity";
+    finding.means = "the driver has subtracted gravity, or uses another unit";
+    finding.to_do = "set the driver to raw acceleration";
+  }
+  result.findings.push_back(std::move(finding));
+}
+
+}  // namespace
+
+Examination examine_streams(const SensorSample& sample, const ReaderReport& report) {
+  Examination result;
+  if (sample.frames.empty())
+    result.add(kError, "recording.no_frames", "no frame could be read",
+               "there are no images to estimate motion from",
+               "the other findings state the skipped parts");
+  for (const auto& [fault, entry] : report.entries())
+    examine_fault(fault, entry, usable_count(fault, sample) + static_cast<double>(entry.count),
+                  result);
+  constexpr double kFrames_hz = 8.0, kFrameGap_s = 0.25, kSamples_hz = 80.0, kSampleGap_s = 0.05;
+  if (sample.frames.size() > 1)
+    examine_rate("images", "frames", sample.frames, kFrames_hz, kFrameGap_s, result);
+  std::vector<Stamp> stamps;
+  stamps.reserve(sample.imu.size());
+  for (const ImuSample& measured : sample.imu) stamps.push_back(measured.stamp);
+  if (stamps.size() > 1)
+    examine_rate("inertial samples", "imu", stamps, kSamples_hz, kSampleGap_s, result);
+  return result;
+}
+
+Examination examine_images(const SensorSample& sample) {
+  Examination result;
+  if (sample.qualities.empty()) return result;
+  const auto median = [&](const auto& value) {
+    return quantile(values_of(sample.qualities, value), 0.5);
+  };
+  const double level = median([](const ImageQuality& image) { return image.mean_level; });
+  const double saturated = median([](const ImageQuality& image) { return image.saturated_share; });
+  const double sharpness = median([](const ImageQuality& image) { return image.sharpness; });
+  const double corners = quantile(
+      values_of(sample.qualities, [](const ImageQuality& image) { return image.corners; }), 0.2);
+  result.figure("exposure",
+                "mean level " + fixed(level, 0) + " of 255, " + percent(saturated) + " saturated");
+  result.figure("sharpness", fixed(sharpness, 2) + " (0.5 blurred, 1 sharp)");
+  result.figure("corners", fixed(corners, 0) + " in four images of five, or more");
+  constexpr double kDark = 25.0, kBright = 225.0, kSaturated = 0.35, kBlurred = 0.58;
+  constexpr double kFewCorners = 100.0;
+  if (level < kDark)
+    result.add(kWarning, "images.dark", "a mean grey level of " + fixed(level, 0) + " of 255",
+               "few features are found, and some of them are noise",
+               "use a longer exposure, more gain or more light");
+  if (level > kBright || saturated > kSaturated)
+    result.add(kWarning, "images.bright",
+               percent(saturated) + " of the pixels are saturated, mean level " + fixed(level, 0),
+               "saturated areas have no features", "use a shorter or automatic exposure");
+  if (sharpness < kBlurred)
+    result.add(kWarning, "images.blurred",
+               "edges are blurred: sharpness " + fixed(sharpness, 2) + ", below 0.58",
+               "features are less accurate, and fewer are tracked",
+               "focus and clean the lens, or use a shorter exposure");
+  if (corners < kFewCorners)
+    result.add(kWarning, "images.few_corners",
+               "less than " + fixed(corners + 1.0, 0) + " corners in one image of five",
+               "odometry may lose track in areas without texture",
+               "add texture or light, or lower tracker.fast_threshold");
+  return result;
+}
+
+Examination examine_words(std::span<const std::vector<BinaryDescriptor>> images,
+                          const Vocabulary& vocabulary) {
+  std::map<std::uint32_t, double> counts;
+  double features = 0.0;
+  for (const std::vector<BinaryDescriptor>& image : images)
+    for (const std::uint32_t word : vocabulary.words(image)) {
+      ++counts[word];
+      ++features;
+    }
+  constexpr double kEnough = 1000.0;
+  if (features < kEnough)
+    return {.figures = {{"vocabulary", "not determined: " + fixed(features, 0) + " features"}},
+            .findings = {}};
+  double entropy = 0.0;
+  for (const auto& [word, count] : counts) entropy -= count / features * std::log(count / features);
+  const double words = std::exp(entropy);
+  const double most = std::min(features, static_cast<double>(vocabulary.size()));
+  Examination result;
+  result.figure("vocabulary", fixed(words, 0) + " words distinguish " + fixed(features, 0) +
+                                  " features, of " + std::to_string(vocabulary.size()));
+  constexpr double kLeastWords = 200.0, kLeastShare = 0.05;
+  if (words < kLeastWords || words < kLeastShare * most)
+    result.add(kWarning, "vocabulary.coverage",
+               "the vocabulary distinguishes " + fixed(features, 0) + " features by only " +
+                   fixed(words, 0) + " words",
+               "different places look alike, so candidates are few or wrong",
+               "train a vocabulary on images like these: kimera_multi_vocabulary "
+               "train");
+  return result;
+}
+
+Examination examine_stereo(const SensorSample& sample, const StereoRig& rig) {
+  Examination result;
+  if (rig.depth_source != DepthSource::kRightImage) return result;
+  const StereoFit given = fit_of(sample.stereo, rig);
+  if (given.points < kLeastStereoPoints) {
+    result.figure("stereo",
+                  "not determined: " + std::to_string(given.points) + " points in both images");
+    return result;
+  }
+  result.figure("stereo", fit_text(given));
+  examine_pair(best_alternative(sample.stereo, rig), given, result);
+  examine_baseline(rig, given, result);
+  return result;
+}
+
+Examination examine_inertial(const SensorSample& sample, const StereoRig& rig) {
+  Examination result;
+  if (sample.imu.empty()) return result;
+  examine_gravity(sample, result);
+  const bool use_depth =
+      rig.depth_source == DepthSource::kRightImage && is_sound(fit_of(sample.stereo, rig));
+  const VisualRotations seen = visual_rotations(sample.steps, rig, use_depth);
+  const auto fit = fit_inertial(seen.steps, sample.imu);
+  if (!fit || !(fit->image_rms >= kMinRate_radps)) {
+    result.figure("images against the gyroscope",
+                  fit ? "not determined: the camera turns by only " +
+                            fixed(kDegrees * fit->image_rms, 2) + " degrees/s"
+                      : "not determined: " + std::to_string(seen.steps.size()) +
+                            " pairs of images close in time");
+    return result;
+  }
+  result.figure("images against the gyroscope",
+                percent(fit->explained) + " explained, " + std::to_string(fit->steps) +
+                    " steps at " + fixed(kDegrees * fit->image_rms, 1) + " degrees/s");
+  examine_relation(*fit, result);
+  if (!(fit->explained >= kRelated)) return result;
+  examine_scale(*fit, result);
+  examine_offset(*fit, result);
+  if (fit->gyro_rms[1] * fit->scale > kSecondAxis_radps)
+    examine_direction(*fit, rig.cameras[0], result);
+  else
+    result.figure("camera to inertial sensor",
+                  "not determined: the camera turns about one axis only");
+  if (std::abs(fit->scale - 1.0) < 0.1) examine_focal(sample, rig, seen, *fit, result);
+  return result;
+}
+
+}  // namespace km
