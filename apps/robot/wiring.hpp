@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "apps/robot/journal_node.hpp"
-#include "apps/robot/mapping_plan.hpp"
 #include "apps/robot/mesh_files_node.hpp"
 #include "apps/robot/robot_config.hpp"
 #include "apps/robot/robot_input.hpp"

@@ -7,8 +7,8 @@
 #include <type_traits>
 #include <vector>
 
-#include "apps/robot/mapping_plan.hpp"
 #include "apps/robot/robot_config.hpp"
+#include "apps/robot/robot_input.hpp"
 #include "runtime/config_text.hpp"
 #include "test/support/temporary_folder.hpp"
 

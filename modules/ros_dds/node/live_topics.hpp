@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "modules/recordings/bag_reader.hpp"
@@ -14,12 +15,26 @@ namespace km {
 /// reads the topics of drivers. Not thread-safe, except for stop().
 class LiveBag final : public BagReader {
  public:
-  LiveBag(std::shared_ptr<const RosNetwork> network, std::vector<RosTopic> topics);
+  LiveBag(std::shared_ptr<const RosNetwork> network, std::vector<RosTopic> topics)
+      : subscription_(std::move(network), std::move(topics)) {
+    for (const RosTopic& topic : subscription_.topics())
+      channels_.push_back({topic.topic, topic.type, "cdr", 0});
+  }
 
   [[nodiscard]] const std::vector<BagChannel>& channels() const override { return channels_; }
   /// Waits for a message. nullopt after stop(), or when the time of give_up_after() has passed.
-  [[nodiscard]] std::optional<BagMessage> next() override;
-  [[nodiscard]] BagReport report() const override;
+  [[nodiscard]] std::optional<BagMessage> next() override {
+    auto message = subscription_.next();
+    if (!message) return std::nullopt;
+    return BagMessage{message->topic, message->arrival, std::move(message->bytes)};
+  }
+  [[nodiscard]] BagReport report() const override {
+    BagReport report;
+    for (std::size_t topic = 0; topic < channels_.size(); ++topic)
+      if (const auto lost = subscription_.lost(topic); lost > 0)
+        report.add(BagFault::kLost, channels_[topic].topic, lost);
+    return report;
+  }
   [[nodiscard]] bool is_live() const override { return true; }
   void stop() noexcept override { subscription_.stop(); }
 
