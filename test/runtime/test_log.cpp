@@ -23,14 +23,6 @@ TEST_CASE("A rate limit passes one message per interval and counts the others", 
   CHECK(limit.ask("a", 10.0).held_back == 0);
 }
 
-TEST_CASE("A limited log line appears once per key", "[log]") {
-  const CapturedLog captured;
-  for (int i = 0; i < 100; ++i)
-    log::limited(log::Level::kWarn, "test", "this test") << "line " << i;
-  REQUIRE(captured.lines().size() == 1);
-  CHECK_THAT(captured.lines()[0], Catch::EndsWith("warn test: line 0"));
-}
-
 TEST_CASE("A listener of the log receives the written lines until another replaces it", "[log]") {
   CapturedLog log;
   std::vector<log::Entry> received;

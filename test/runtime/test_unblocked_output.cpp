@@ -95,19 +95,5 @@ TEST_CASE("A reader that has stopped does not stop the program, and lost lines a
   }
 }
 
-TEST_CASE("A closed pipe and a full disk do not end the program", "[output]") {
-  TwoStreams program;
-  SECTION("pipe") {
-    program.close_reader();
-    program.start(100);
-  }
-  SECTION("disk") {
-    const int full = open("/dev/full", O_WRONLY | O_CLOEXEC);
-    program.start(100, full);
-    close(full);
-  }
-  CHECK(program.ends_well());
-}
-
 }  // namespace
 }  // namespace km

@@ -96,29 +96,6 @@ TEST_CASE("A worker that throws keeps the exception and releases the threads tha
 static_assert(!std::is_convertible_v<In<int>, Out<int>>);
 static_assert(!std::is_convertible_v<Out<int>, In<int>>);
 
-TEST_CASE("A message published through one handle of a topic arrives at another handle",
-          "[topic]") {
-  Topic<int> topic;
-  const In<int> in = topic;
-  const Out<int> out = topic;
-  std::vector<int> received;
-  in.subscribe([&](const auto& message) { received.push_back(*message); });
-  out.publish(7);
-  const auto shared = std::make_shared<const int>(8);
-  in.subscribe([&](const auto& message) { received.push_back(message == shared ? 9 : 0); });
-  out.publish(shared);
-  CHECK(received == std::vector<int>{7, 8, 9});
-}
-
-TEST_CASE("A queue returns its values in order, also after it is closed", "[queue]") {
-  BoundedQueue<int> queue(3, Overflow::kBlock);
-  for (int i = 0; i < 3; ++i) CHECK(queue.push(i));
-  queue.close();
-  CHECK_FALSE(queue.push(3));
-  for (int i = 0; i < 3; ++i) CHECK(queue.pop() == i);
-  CHECK(queue.pop() == std::nullopt);
-}
-
 TEST_CASE("A full queue that drops keeps the newest and counts the others", "[queue]") {
   BoundedQueue<int> queue(2, Overflow::kDropOldest);
   for (int i = 0; i < 5; ++i) queue.push(i);
@@ -127,34 +104,6 @@ TEST_CASE("A full queue that drops keeps the newest and counts the others", "[qu
   CHECK(queue.pop() == 3);
   CHECK(queue.pop() == 4);
   CHECK(queue.load().size == 0);
-}
-
-TEST_CASE("A full queue that blocks loses nothing between two threads", "[queue]") {
-  constexpr int kCount = 10000;
-  BoundedQueue<int> queue(4, Overflow::kBlock);
-  std::thread producer([&] {
-    for (int i = 0; i < kCount; ++i) queue.push(i);
-    queue.close();
-  });
-  int expected = 0;
-  bool in_order = true;
-  while (const auto value = queue.pop()) in_order &= *value == expected++;
-  producer.join();
-  CHECK(in_order);
-  CHECK(expected == kCount);
-  CHECK(queue.load().dropped == 0);
-}
-
-TEST_CASE("Closing a queue releases the threads that wait for it", "[queue]") {
-  BoundedQueue<int> empty(1, Overflow::kBlock);
-  BoundedQueue<int> full(1, Overflow::kBlock);
-  full.push(0);
-  auto popped = std::async(std::launch::async, [&] { return empty.pop(); });
-  auto pushed = std::async(std::launch::async, [&] { return full.push(1); });
-  empty.close();
-  full.close();
-  CHECK(popped.get() == std::nullopt);
-  CHECK_FALSE(pushed.get());
 }
 
 TEST_CASE("A taker sees increasingly newer values while others are put, and the last one once",

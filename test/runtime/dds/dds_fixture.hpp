@@ -66,6 +66,14 @@ inline bool eventually(const std::function<bool()>& condition) {
   return true;
 }
 
+/// A participant that announces this user data.
+inline DdsEntity participant_with(const DdsConfig& config, const std::string& user_data) {
+  const DdsQos qos = make_dds_qos();
+  dds_qset_userdata(qos.get(), user_data.data(), user_data.size());
+  return {dds_create_participant(static_cast<dds_domainid_t>(config.domain), qos.get(), nullptr),
+          "participant"};
+}
+
 /// Writes whatever envelopes it is given, as a faulty or hostile program may.
 class RawWriter {
  public:
@@ -173,10 +181,11 @@ struct TestRobot {
   }
   /// Counts of the pings to all, or of those addressed to one robot.
   TopicTraffic traffic(Direction direction, bool addressed = false) {
+    return traffic(Codec<Ping>::kTopic, direction, category(addressed));
+  }
+  TopicTraffic traffic(const std::string& topic, Direction direction, TrafficCategory category) {
     for (const TopicTraffic& t : bridge.traffic().topics)
-      if (t.topic == Codec<Ping>::kTopic && t.direction == direction &&
-          t.category == category(addressed))
-        return t;
+      if (t.topic == topic && t.direction == direction && t.category == category) return t;
     return {};
   }
   /// How many messages of a topic, to all or to it alone, it has refused.
@@ -197,10 +206,8 @@ struct TestRobot {
   }
   /// How many statuses it has sent.
   std::uint64_t status_count() {
-    for (const TopicTraffic& t : bridge.traffic().topics)
-      if (t.topic == Codec<RobotStatus>::kTopic && t.direction == Direction::kOut)
-        return t.count.messages;
-    return 0;
+    return traffic(Codec<RobotStatus>::kTopic, Direction::kOut, TrafficCategory::kOther)
+        .count.messages;
   }
   static TrafficCategory category(bool addressed) {
     return addressed ? TrafficCategory::kGeometricVerification : TrafficCategory::kPlaceRecognition;

@@ -5,18 +5,6 @@
 
 namespace km {
 
-struct MarkedPing : Ping {};
-
-template <>
-struct Codec<MarkedPing> : Codec<Ping> {
-  static constexpr const char* kTopic = "marked_pings";
-  static Decoded<MarkedPing> decode(const Wire& wire, const TeamPeer& writer) {
-    auto ping = Codec<Ping>::decode(wire, writer);
-    if (!ping.value) return Decoded<MarkedPing>::refuse(ping.refusal);
-    return Decoded<MarkedPing>::accept({*std::move(ping.value)});
-  }
-};
-
 namespace {
 
 TEST_CASE("A message of one robot arrives at the other unchanged and once", "[dds]") {
@@ -104,29 +92,6 @@ TEST_CASE("An addressed message reaches its addressee and no other robot gets a 
   CHECK(a.traffic(Direction::kOut).count.messages == 0);
 }
 
-TEST_CASE("Sender and receiver count the same bytes for all sizes", "[dds]") {
-  const auto domain = std::make_shared<const DdsDomain>(loopback_config());
-  TestRobot a(domain, 3), b(domain, 4), c(domain, 5);
-  meet({&a, &b, &c});
-  constexpr std::uint32_t kCount = 50;
-  for (std::uint32_t i = 0; i < kCount; ++i) a.ping(i, std::vector<std::uint8_t>(i));
-  for (TestRobot* robot : {&b, &c}) REQUIRE(robot->received.wait_for(kCount).size() == kCount);
-
-  REQUIRE(eventually([&] { return a.traffic(Direction::kOut).count.messages == kCount; }));
-  const TrafficCount once = a.traffic(Direction::kOut).count;
-  CHECK(a.traffic_with(4, Direction::kOut) == once);
-  CHECK(a.traffic_with(5, Direction::kOut) == once);
-  CHECK(b.traffic_with(3, Direction::kIn) == once);
-  CHECK(b.traffic(Direction::kIn).count == once);
-  // Encoding header 4, key and boot 8 each, number 4, version and robot 2 each, length of the
-  // content 4.
-  // The content has its length 4, index 4, length of the payload 4, and the payload, padded to 4.
-  std::uint64_t expected = 0;
-  for (std::uint32_t i = 0; i < kCount; ++i)
-    expected += 4 + 8 + 8 + 4 + 2 + 2 + 4 + 4 + 4 + 4 + (i + 3) / 4 * 4;
-  CHECK(once.bytes == expected);
-}
-
 TEST_CASE("Earlier messages for a robot that joins late are counted once", "[dds]") {
   const auto kind = GENERATE(TopicKind::kEvent, TopicKind::kState);
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
@@ -171,58 +136,6 @@ TEST_CASE("Messages of a hostile peer are counted by reason and change nothing",
   a.ping(0);  // the number that the foe tried to use up
   CHECK(b.received.wait_for(2).size() == 2);
   CHECK(b.bridge.error() == nullptr);
-}
-
-TEST_CASE("A guard appends a tail to messages and sees them before any node", "[dds]") {
-  Crossing<MarkedPing> from_a, at_b;
-  Inbox<MarkedPing> got(at_b.from_peers());
-  const auto domain = std::make_shared<const DdsDomain>(loopback_config());
-  TestRobot a(domain, 3), b(domain, 4);
-  // The tail: the number of octets before it, and one that is wrong for message 1.
-  const ContentGuard<MarkedPing> guard{
-      .tail_bytes = 2,
-      .tail = [](const MarkedPing& ping, auto serialized) -> std::vector<std::uint8_t> {
-        return {static_cast<std::uint8_t>(serialized.size()),
-                static_cast<std::uint8_t>(ping.index == 1 ? 0 : 7)};
-      },
-      .check = [](const TeamPeer& sender, const MarkedPing& ping, auto content) -> const char* {
-        const std::size_t before = content.size() - 2;
-        const bool is_right = content[before] == before && content.back() == 7;
-        return is_right && sender.robot == ping.robot ? nullptr : "its tail is wrong";
-      }};
-  a.bridge.exchange(from_a, TopicKind::kEvent, TrafficCategory::kOther, {}, {}, guard);
-  b.bridge.exchange(at_b, TopicKind::kEvent, TrafficCategory::kOther, {}, {}, guard);
-  meet({&a, &b});
-  for (std::uint32_t i = 0; i < 3; ++i) from_a.to_peers().publish(MarkedPing{{3, i, {1, 2, 3}}});
-  const auto pings = got.wait_for(2);
-  REQUIRE(pings.size() == 2);
-  CHECK(pings[1].index == 2);
-  CHECK(pings[1].payload == std::vector<std::uint8_t>{1, 2, 3});
-  CHECK(eventually([&] { return b.refused(Codec<MarkedPing>::kTopic) == 1; }));
-}
-
-TEST_CASE("Programs without an identity, or with a broken one, are ignored", "[dds]") {
-  const std::string user_data =
-      GENERATE(std::string(), std::string("robot=7;name=\033[2J;proto=1;boot=1"),
-               std::string("robot=") + std::string(5000, '9'));
-  const auto domain = std::make_shared<const DdsDomain>(loopback_config());
-  TestRobot a(domain, 3), b(domain, 4);
-  const DdsQos qos = make_dds_qos();
-  dds_qset_userdata(qos.get(), user_data.data(), user_data.size());
-  const DdsEntity outsider(
-      dds_create_participant(static_cast<dds_domainid_t>(domain->config().domain), qos.get(),
-                             nullptr),
-      "participant");
-  meet({&a, &b});
-  RawWriter writer(outsider.handle(), domain->config(), TopicKind::kEvent);
-  writer.write(header(a.participant.identity(), 0), {3, 0, {}});
-  CHECK(eventually(
-      [&] { return b.traffic(Direction::kIn).refused["its sender is not a known robot"] == 1; }));
-  CHECK(b.received.messages().empty());
-  const auto refusals =
-      TestRobot::matching(b.peer_events.messages(), PeerEventKind::kRefused, RobotId{0});
-  CHECK(refusals == (user_data.empty() ? 0 : 1));
-  CHECK(b.bridge.peers().list().size() == 1);
 }
 
 TEST_CASE("Messages of a new incarnation wait until all nodes know that the robot has restarted",

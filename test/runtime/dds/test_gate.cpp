@@ -8,13 +8,6 @@
 namespace km {
 namespace {
 
-DdsEntity participant_with(const DdsConfig& config, const std::string& user_data) {
-  const DdsQos qos = make_dds_qos();
-  dds_qset_userdata(qos.get(), user_data.data(), user_data.size());
-  return {dds_create_participant(static_cast<dds_domainid_t>(config.domain), qos.get(), nullptr),
-          "participant"};
-}
-
 std::uint64_t refusals(TestRobot& robot, const std::string& reason) {
   return robot.traffic(Direction::kIn).refused[reason];
 }
@@ -90,28 +83,6 @@ TEST_CASE("No participant can send in a robot's name, not even from a writer tha
   REQUIRE(b.received.wait_for(1)[0].index == 1);
   CHECK(eventually([&] { return b.refused() == 60; }));
   CHECK(b.received.messages().size() == 1);
-}
-
-TEST_CASE("A peer that sends much delays only its own messages", "[gate]") {
-  const auto domain = std::make_shared<const DdsDomain>(loopback_config());
-  TestRobot a(domain, 3), b(domain, 4), c(domain, 5);
-  constexpr std::uint32_t kFlood = 2000;
-  Topic<Ping> handled;
-  Inbox<Ping> in_order(handled);
-  Worker<std::shared_ptr<const Ping>> node(
-      kFlood, Overflow::kBlock, [&](const auto& ping) { handled.publish(ping); }, "node");
-  c.pings.from_peers().subscribe([&](const auto& ping) { node.post(ping); });
-  meet({&a, &b, &c});
-  for (std::uint32_t i = 0; i < kFlood; ++i) a.ping(i);
-  REQUIRE(eventually([&] { return c.received.messages().size() > 10; }));
-  b.ping(99999);
-  REQUIRE(eventually([&] { return b.traffic(Direction::kOut).count.messages == 1; }));
-  node.start();
-  const auto pings = in_order.wait_for(kFlood + 1);
-  REQUIRE(pings.size() == kFlood + 1);
-  const auto place = std::ranges::find(pings, 99999U, &Ping::index) - pings.begin();
-  CHECK(place < kFlood / 2);
-  node.stop();
 }
 
 }  // namespace

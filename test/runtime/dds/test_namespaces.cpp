@@ -46,23 +46,6 @@ std::vector<int> summary(Process& robot) {
   return numbers;
 }
 
-TEST_CASE("Robots on two hosts discover each other, and an addressed message passes",
-          "[dds][namespaces]") {
-  if (!VirtualNetwork::available()) return;
-  const std::string discovery = GENERATE("multicast", "peers");
-  VirtualNetwork network(2);
-  const Pair robots(network, discovery_settings(discovery));
-  const auto a_sees = robots.a->wait_for("joined 4");
-  const auto b_sees = robots.b->wait_for("joined 3");
-  REQUIRE(a_sees);
-  REQUIRE(b_sees);
-  const double seconds = seconds_between(robots.b->started(), std::max(a_sees->time, b_sees->time));
-  std::cout << "discovery by " << discovery << ", two hosts: " << seconds
-            << " s from the launch of the second process\n";
-  robots.a->send_line("one 4 7");
-  CHECK(robots.b->wait_for("one 3 7"));
-}
-
 TEST_CASE("On a host with several interfaces the robot uses the configured one",
           "[dds][namespaces]") {
   if (!VirtualNetwork::available()) return;

@@ -125,28 +125,6 @@ TEST_CASE("A robot joins once its identity and its liveliness are known, in eith
   CHECK_FALSE(table.is_current({7, 71}));
 }
 
-TEST_CASE("A silent robot is lost and returns when it is received again, whatever the lease does",
-          "[peers]") {
-  PeerTable table(kSelf);
-  table.participant(guid(2), data_of(7, 70), "");
-  table.alive(guid(2));
-  table.silent(guid(2));
-  CHECK(kinds(table) == Kinds{PeerEventKind::kJoined, PeerEventKind::kLost});
-  CHECK(table.peers()[0].state == PeerState::kLost);
-
-  SECTION("within the lease") {
-    table.alive(guid(2));
-  }
-  SECTION("after the lease, as the same participant") {
-    table.participant_gone(guid(2));
-    CHECK(table.peers()[0].state == PeerState::kLost);
-    table.participant(guid(2), data_of(7, 70), "");
-    table.alive(guid(2));
-  }
-  CHECK(kinds(table) == Kinds{PeerEventKind::kReturned});
-  CHECK(table.peers()[0].state == PeerState::kAlive);
-}
-
 const char* admit_all(const RobotIdentity& /*identity*/, std::string_view /*credentials*/) {
   return nullptr;
 }

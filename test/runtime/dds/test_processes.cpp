@@ -1,34 +1,10 @@
 #include <catch2/catch.hpp>
-#include <csignal>
-#include <iostream>
-#include <set>
 
 #include "test/runtime/dds/peer_process.hpp"
 #include "test/support/forged_discovery.hpp"
 
 namespace km {
 namespace {
-
-TEST_CASE("A killed robot is lost within the liveliness time, and restarts as another boot",
-          "[dds][processes]") {
-  const auto settings = own_team() + std::vector<std::string>{"interface=lo", "liveliness_s=0.5"};
-  const auto a = start_peer(3, settings);
-  auto b = start_peer(4, settings);
-  REQUIRE(a->wait_for("joined 4"));
-  a->send_line("ping 0 9");
-  REQUIRE(b->wait_for("ping 3 9"));
-  const auto killed = std::chrono::steady_clock::now();
-  b->kill(SIGKILL);
-  const auto lost = a->wait_for("lost 4");
-  REQUIRE(lost);
-  std::cout << "killed robot lost after " << seconds_between(killed, lost->time)
-            << " s (liveliness 0.5 s)\n";
-  b = start_peer(4, settings);
-  CHECK(a->wait_for("restarted 4"));
-  CHECK(b->wait_for("ping 3 9"));  // events of before it was born
-  b->send_line("ping 0 0");
-  CHECK(a->wait_for("ping 4 0"));
-}
 
 TEST_CASE("Robots with keys return after a forged packet has declared that they are gone",
           "[dds][processes]") {

@@ -41,27 +41,6 @@ TestRobot::MakeSeal member_of(const ToyTeam& team) {
   };
 }
 
-TEST_CASE("Robots of a team with keys talk, to all and to one", "[sealed]") {
-  const ToyTeam team;
-  const auto domain = std::make_shared<const DdsDomain>(loopback_config());
-  TestRobot a(domain, 3, member_of(team)), b(domain, 4, member_of(team));
-  a.start();
-  b.start();
-  for (std::uint32_t i = 0; i < 100; ++i) a.ping(i, {1, 2, 3});  // before any robot is known
-  REQUIRE(a.receives(PeerEventKind::kJoined, 4));
-  REQUIRE(b.receives(PeerEventKind::kJoined, 3));
-  CHECK(b.received.wait_for(100).size() == 100);
-  a.ping_one(4, 7, {9});
-  REQUIRE(b.received_addressed.wait_for(1).size() == 1);
-  CHECK(b.received_addressed.messages()[0].payload == std::vector<std::uint8_t>{9});
-  CHECK(b.refused() == 0);
-
-  TestRobot late(domain, 5, member_of(team));
-  late.start();
-  CHECK(late.received.wait_for(100).size() == 100);
-  CHECK(late.received_addressed.messages().empty());
-}
-
 TEST_CASE("A robot without keys of the team is ignored and receives nothing", "[sealed]") {
   const ToyTeam team, others("survey");
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
@@ -179,12 +158,7 @@ TEST_CASE("Replayed credentials and messages make no participant a member", "[se
     REQUIRE(b->received.wait_for(1).size() == 1);
   }
   REQUIRE(b->receives(PeerEventKind::kLeft, 3));
-  const DdsQos qos = make_dds_qos();
-  dds_qset_userdata(qos.get(), shown.data(), shown.size());
-  const DdsEntity impostor(
-      dds_create_participant(static_cast<dds_domainid_t>(domain->config().domain), qos.get(),
-                             nullptr),
-      "participant");
+  const DdsEntity impostor = participant_with(domain->config(), shown);
   RawWriter status(impostor.handle(), domain->config(), TopicKind::kStatus,
                    Codec<RobotStatus>::kTopic);
   RawWriter pings(impostor.handle(), domain->config(), TopicKind::kEvent);

@@ -87,14 +87,5 @@ TEST_CASE("Messages that a budget delays or drops are in the table beside those 
         "2,waiting,bow,place_recognition,*,0,0,0\n");
 }
 
-TEST_CASE("Bytes add up per direction and category", "[traffic]") {
-  TrafficSnapshot snapshot;
-  snapshot.peers = {row(Direction::kOut, 7, {1, 100}, 5), row(Direction::kOut, 8, {1, 100}, 0),
-                    row(Direction::kIn, 7, {1, 40}, 0)};
-  CHECK(snapshot.bytes(Direction::kOut, TrafficCategory::kPlaceRecognition) == 205);
-  CHECK(snapshot.bytes(Direction::kIn, TrafficCategory::kPlaceRecognition) == 40);
-  CHECK(snapshot.bytes(Direction::kOut, TrafficCategory::kOther) == 0);
-}
-
 }  // namespace
 }  // namespace km
