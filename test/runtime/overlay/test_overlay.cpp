@@ -3,7 +3,6 @@
 #include <catch2/catch.hpp>
 #include <memory>
 #include <set>
-#include <string>
 #include <utility>
 #include <vector>
 
@@ -39,30 +38,6 @@ TEST_CASE("Robots that all receive each other forward nothing and report no stor
     CHECK(network.at(robot).robots().own_links().size() == 2);
     CHECK(network.at(robot).summary().holds.empty());
   }
-}
-
-TEST_CASE("A robot gets each bag of a robot out of range once and in order", "[overlay]") {
-  const bool has_keys = GENERATE(false, true);
-  CAPTURE(has_keys);
-  Network network(3, has_keys);
-  network.link(kA, kC);
-  for (std::uint32_t i = 0; i < 300; ++i) network.send_bag(kA, i);
-  SECTION("at the same time") {}
-  SECTION("before") {
-    network.run(2.0);
-    network.cut(kA, kC);
-  }
-  network.link(kC, kB);
-  network.run(15.0);
-  REQUIRE(network.met(kB).size() == 1);
-  CHECK(network.met(kB)[0].boot == Network::first_boot(kA));
-  CHECK(network.met(kB)[0].name == "r0");
-  CHECK(network.read(kB, OverlayStream::kBag) == first(300));
-  const std::size_t signature = has_keys ? kEndorsementBytes : 0;
-  const std::size_t introductions = has_keys ? 2 * 300 : 100;
-  CHECK(network.octets_sent() < 300 * (600 + signature) + introductions);
-  CHECK(network.at(kB).summary().holds ==
-        std::vector<OverlayHeld>{{{kA, Network::first_boot(kA)}, 300, 0}});
 }
 
 TEST_CASE("Bags pass along a chain and only one of two robots in between forwards them",

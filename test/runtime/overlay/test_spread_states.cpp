@@ -2,7 +2,6 @@
 #include <map>
 #include <memory>
 #include <set>
-#include <string>
 #include <utility>
 #include <vector>
 
@@ -17,14 +16,6 @@ using Links = Network::Links;
 
 RobotIdentity robot(RobotId id) {
   return {.robot = id, .name = name_of(id), .boot = 1};
-}
-
-// All pairs of robots 1 to `count`.
-Network::Links full_mesh(RobotId count) {
-  Network::Links links;
-  for (RobotId a = 1; a <= count; ++a)
-    for (RobotId b = 1; b < a; ++b) links.emplace_back(a, b);
-  return links;
 }
 
 // Robots 1 to `count` in a line.
@@ -57,15 +48,6 @@ TEST_CASE("all robots receive each state once, over any links", "[overlay]") {
   }
 }
 
-TEST_CASE("a full team whose robots all appear at once forwards nothing", "[overlay]") {
-  Network network(kMaxTeam + 1);
-  network.link(full_mesh(kMaxTeam));
-  network.run(5.0);
-  CHECK(network.packets() == 0);
-  network.publish(2, kPoses);
-  CHECK(network.packets() == kMaxTeam - 1);
-}
-
 TEST_CASE("the states of a full team reach all robots of a line", "[overlay]") {
   Network network(kMaxTeam + 1);
   network.link(line(kMaxTeam));
@@ -86,16 +68,6 @@ TEST_CASE("in a line of robots that have just met, a state waits once and not at
   CHECK(network.read(3, kPoses).empty());
   network.wait(0.6 * SpreadStates::kMeeting_s);
   CHECK(network.read(6, kPoses).size() == 1);
-}
-
-TEST_CASE("a robot that meets all others in a tenth of a second is not introduced", "[overlay]") {
-  Network network(10, full_mesh(5));
-  for (RobotId id = 1; id <= 5; ++id) {
-    network.link(id, 9);
-    network.run(0.02, 0.02);
-  }
-  network.run(10.0);
-  CHECK(network.packets() == 0);
 }
 
 TEST_CASE("a lost state is sent again when the hashes show its loss", "[overlay]") {
