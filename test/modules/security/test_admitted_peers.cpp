@@ -5,20 +5,6 @@
 namespace km {
 namespace {
 
-TEST_CASE("Among active starts of a robot the one that has been silent for longest is removed",
-          "[security]") {
-  AdmittedPeers peers;
-  for (std::uint64_t boot = 1; boot <= kMaxAdmittedPerRobot; ++boot) {
-    peers.add({3, boot}, {});
-    peers.received({3, boot});
-  }
-  peers.received({3, 1});
-  peers.add({3, 99}, {});
-  CHECK(peers.find({3, 1}) != nullptr);
-  CHECK(peers.find({3, 2}) == nullptr);
-  CHECK(peers.find({3, 99}) != nullptr);
-}
-
 TEST_CASE("The number of admitted processes is bounded", "[security]") {
   AdmittedPeers peers;
   const TeamPeer live{0, 1};

@@ -43,18 +43,6 @@ struct TeamOnDisk {
   TemporaryFolder folder;
 };
 
-TEST_CASE("A robot's folder contains the keys that were made for it", "[security]") {
-  const TeamOnDisk team;
-  const RobotKeys keys = load_robot_keys(team.alpha());
-  CHECK(keys.certificate.team == "survey");
-  CHECK(keys.certificate.robot == 3);
-  CHECK(keys.certificate.name == "alpha");
-  CHECK(keys.certificate.valid_until_s == kToyNow_s + 86400);
-  CHECK(why_refused(keys.certificate, keys.authority, keys.revocations, kToyNow_s) == nullptr);
-  CHECK_NOTHROW(TeamSeal(keys, toy_identity(3, "alpha"), kToyNow_s));
-  CHECK(load_revocations(team.alpha()).number == 0);
-}
-
 TEST_CASE("A secret that other users may read is refused", "[security]") {
   const TeamOnDisk team;
   const auto secret = team.alpha() / "secret_key.txt";

@@ -130,7 +130,7 @@ TEST_CASE("Messages changed at random never open", "[security]") {
   CHECK(pair.b.seal.open(to_all, sealed_to_all).status == Status::kOpened);
 }
 
-TEST_CASE("Credentials with any bit flipped, or changed at random, are refused", "[security]") {
+TEST_CASE("Credentials with any bit flipped are refused", "[security]") {
   const ToyTeam team;
   ToyMember a(team, 0, "alpha"), b(team, 1, "beta");
   const std::string genuine = b.seal.credentials();
@@ -143,16 +143,6 @@ TEST_CASE("Credentials with any bit flipped, or changed at random, are refused",
     shown[bit / 8] = static_cast<char>(shown[bit / 8] ^ (1 << (bit % 8)));
     CHECK_FALSE(is_admitted(shown));
   }
-  const unsigned seed = GENERATE(1U, 2U, 3U);
-  CAPTURE(seed);
-  InputCorrupter corrupter(seed);
-  int admitted = 0;
-  for (int i = 0; i < 3000; ++i) {
-    const Octets octets = corrupter(std::vector<Octets>{Octets(genuine.begin(), genuine.end())});
-    const std::string shown(octets.begin(), octets.end());
-    admitted += shown != genuine && is_admitted(shown);
-  }
-  CHECK(admitted == 0);
   CHECK_FALSE(a.seal.is_admitted(b.peer()));
   CHECK(is_admitted(genuine));
 }
