@@ -21,29 +21,6 @@ std::vector<std::pair<double, T>> updates_of(const RunPlayback& run, RobotId rob
   return found;
 }
 
-TEST_CASE("States are shown as they were sampled", "[run_playback]") {
-  const SmallRun files;
-  const RunPlayback run = read_run(files.folder.path(), kBegin);
-  CHECK(run.updates.front().sent == kBegin);
-  const auto states = updates_of<RobotSample>(run, 1);
-  REQUIRE(states.size() == 12);
-  for (int t = 1; t <= 12; ++t) {
-    const auto& [time_s, state] = states[static_cast<std::size_t>(t) - 1];
-    CHECK(time_s == Approx(t));
-    CHECK(state.cpu_s == 0.5 * t);
-    CHECK(state.anchor == (t < 4.5 ? 1 : 0));
-    CHECK(state.cost == (t < 4.5 ? 0.0 : 7.0));
-  }
-  const RobotSample& last = states.back().second;
-  CHECK(last.phase == "leaving");
-  CHECK(last.keyframes == 3);
-  CHECK(last.dataset_time_s == 10.0);
-  REQUIRE(last.links.size() == 1);
-  REQUIRE(last.sent_bytes.size() == 1);
-  CHECK(last.sent_bytes[0].value == 1200.0);
-  REQUIRE(last.loads.size() == 1);
-}
-
 TEST_CASE("Poses are shown from the time at which they were known", "[run_playback]") {
   const SmallRun files;
   const RunPlayback run = read_run(files.folder.path(), kBegin);

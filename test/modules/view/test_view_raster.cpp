@@ -1,5 +1,3 @@
-#include <algorithm>
-#include <array>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <cstdint>
@@ -16,22 +14,6 @@ constexpr std::int8_t kUnknownCell = OccupancyGrid::kUnknown, kFreeCell = Occupa
                       kOccupiedCell = OccupancyGrid::kOccupied;
 
 using Values = std::vector<std::uint8_t>;
-
-TEST_CASE("A 2D map that fits is sent cell by cell", "[view]") {
-  OccupancyGrid map{0.25, {-1.0, 2.0}, 3, 2, {}};
-  map.cells = {kFreeCell, kFreeCell, kOccupiedCell, kUnknownCell, kUnknownCell, kUnknownCell};
-  map.z_m = 0.5;
-  map.anchor = 4;
-  const auto raster = view_raster(map);
-  REQUIRE(raster);
-  CHECK(is_valid(*raster));
-  CHECK(raster->anchor == 4);
-  CHECK(raster->origin == std::array{-1.0F, 2.0F, 0.5F});
-  CHECK(raster->runs ==
-        Values{2, ViewRaster::kFree, 1, ViewRaster::kOccupied, 3, ViewRaster::kUnknown});
-  CHECK(cells_of(*raster) == Values{1, 1, 0, 255, 255, 255});
-  CHECK_FALSE(view_raster(OccupancyGrid{}));
-}
 
 // Brute force: a cell of the reduced map is occupied if any of its cells is, else free if any is.
 TEST_CASE("A large 2D map is reduced until it fits, and no obstacle is lost", "[view]") {

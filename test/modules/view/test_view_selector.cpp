@@ -1,10 +1,5 @@
 #include <catch2/catch.hpp>
-#include <cstdint>
-#include <map>
-#include <optional>
 #include <random>
-#include <utility>
-#include <variant>
 #include <vector>
 
 #include "modules/core/lie.hpp"
@@ -96,44 +91,6 @@ TEST_CASE("The newest pose is sent a few times a second", "[view]") {
   CHECK(watcher.poses.back().stamp == last);
   receive_all(selector, watcher, 12.0);
   CHECK(watcher.poses.size() == 26);  // Each sent once.
-}
-
-TEST_CASE("Keyframes of odometry are sent once, several at a time", "[view]") {
-  ViewSelector selector(kSelf);
-  Watcher watcher;
-  std::mt19937 rng(5);
-  std::vector<SE3> truth;
-  int updates = 0;
-  for (KeyframeIndex k = 0; k < 100; ++k) {  // 4 keyframes a second.
-    truth.push_back(random_pose(rng, 100.0));
-    selector.add(keyframe(k, truth.back()));
-    while (const auto content = selector.next(0.25 * k)) {
-      receive(*content, watcher);
-      ++updates;
-    }
-  }
-  receive_all(selector, watcher, 100.0);
-  CHECK(updates <= 26);
-  CHECK(watcher.odometry_received == 100);
-  REQUIRE(watcher.odometry.size() == 100);
-  for (KeyframeIndex k = 0; k < 100; ++k)
-    CHECK((watcher.odometry.at(k).T.translation() - truth[k].translation()).norm() < kRounding_m);
-  CHECK(watcher.odometry.at(0).anchor == kSelf);
-}
-
-TEST_CASE("Each sample is sent once, the last one also to a late viewer", "[view]") {
-  ViewSelector selector(kSelf);
-  Watcher watcher, late;
-  for (std::uint32_t k = 1; k <= 3; ++k) {
-    selector.add(RobotSample{.keyframes = k});
-    receive_all(selector, watcher, 0.1 * k);
-  }
-  REQUIRE(watcher.states.size() == 3);
-  CHECK(watcher.states.back().keyframes == 3);
-  selector.begin_again();
-  receive_all(selector, late, 0.4);
-  REQUIRE(late.states.size() == 1);
-  CHECK(late.states.back().keyframes == 3);
 }
 
 // A graph that changes faster than it can be sent: one update per round.
