@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <set>
 
 #include "apps/evaluate/mesh_picture.hpp"
 #include "apps/evaluate/surface_image.hpp"
@@ -124,25 +123,6 @@ LabelledMesh triangle(float z) {
   mesh.vertices = {{1, 1, z}, {4, 1, z}, {1, 3, z}};  // columns 60 to 90, rows 30 to 10
   mesh.faces = {{0, 1, 2}};
   return mesh;
-}
-
-std::size_t covered(const SurfaceImage& image) {
-  std::size_t count = 0;
-  for (const std::uint32_t face : image.faces) count += face != SurfaceImage::kNone ? 1 : 0;
-  return count;
-}
-
-TEST_CASE("A triangle covers the pixels whose centres it contains", "[mesh_picture]") {
-  const SurfaceImage image = rasterise(triangle(2.0F), from_above());
-  CHECK(image.faces[image.at(60, 29)] == 0);  // its right angle
-  CHECK(image.faces[image.at(59, 29)] == SurfaceImage::kNone);
-  CHECK(image.faces[image.at(60, 30)] == SurfaceImage::kNone);
-  CHECK(image.faces[image.at(88, 29)] == 0);
-  CHECK(image.faces[image.at(89, 28)] == SurfaceImage::kNone);
-  CHECK(image.faces[image.at(60, 11)] == 0);
-  CHECK(image.depth_m[image.at(60, 29)] == Approx(98.0F));
-  CHECK(std::isinf(image.depth_m[image.at(0, 0)]));
-  CHECK(std::abs(static_cast<double>(covered(image)) - 300.0) <= 20.0);  // half of 30 x 20
 }
 
 TEST_CASE("Faces that are seen from behind are not drawn", "[mesh_picture]") {

@@ -66,14 +66,6 @@ inline std::vector<TrueObject> street(std::mt19937& rng) {
   return scene;
 }
 
-/// Objects of three labels in four rows along x, at random places.
-inline std::vector<TrueObject> rows(std::size_t count, std::mt19937& rng) {
-  std::vector<TrueObject> scene = square(count, rng);
-  for (TrueObject& object : scene)
-    object.center.y() = (object.label == 3 ? 4.0 : 5.5) * (object.center.y() > 0.0 ? 1.0 : -1.0);
-  return scene;
-}
-
 /// Errors of the map of a robot.
 struct MapErrors {
   double found = 1.0;  ///< Probability that an object is in the map.

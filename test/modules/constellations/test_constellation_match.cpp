@@ -122,22 +122,17 @@ TEST_CASE("Constellations without objects, and of one place only, are refused",
 }
 
 TEST_CASE("Landmarks that are not finite are refused with their label", "[constellations]") {
-  Landmark good{.label = 7}, bad = good;
-  SECTION("position") {
-    bad.center.y() = std::numeric_limits<double>::quiet_NaN();
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  const std::vector<Landmark> good = {{.label = 7}};
+  for (const Landmark& one :
+       {Landmark{.label = 7, .center = {0.0, kNan, 0.0}},
+        Landmark{.label = 7, .size_m = {1.0, 1.0, kInfinity}}, Landmark{.label = 7, .sigma_m = 0.0},
+        Landmark{.label = 7, .side_shift_m = kInfinity}}) {
+    const std::vector<Landmark> bad = {one};
+    CHECK_THROWS_WITH(match_constellations(good, bad), Catch::Contains("label 7"));
+    CHECK_THROWS_WITH(match_constellations(bad, good), Catch::Contains("label 7"));
   }
-  SECTION("size") {
-    bad.size_m.z() = std::numeric_limits<double>::infinity();
-  }
-  SECTION("sigma") {
-    bad.sigma_m = 0.0;
-  }
-  SECTION("shift") {
-    bad.side_shift_m = std::numeric_limits<double>::infinity();
-  }
-  const std::vector<Landmark> a = {good}, b = {bad};
-  CHECK_THROWS_WITH(match_constellations(a, b), Catch::Contains("label 7"));
-  CHECK_THROWS_WITH(match_constellations(b, a), Catch::Contains("label 7"));
 }
 
 }  // namespace km

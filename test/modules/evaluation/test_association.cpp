@@ -35,31 +35,6 @@ TEST_CASE("Across a gap and outside the trajectory only a near pose counts", "[e
   CHECK_FALSE(pose_at({}, 0, 0.1, 0.01));
 }
 
-TEST_CASE("Pairs are taken at the stamps of the sparser trajectory", "[evaluation]") {
-  const auto dense = sample(0.0, 100.0, 1001, screw);
-  const auto sparse = sample(2.003, 10.0, 51, screw);
-  for (const bool estimate_is_sparse : {true, false}) {
-    CAPTURE(estimate_is_sparse);
-    const auto pairs = estimate_is_sparse ? associate(dense, sparse, kAlways, 0.1, 0.0)
-                                          : associate(sparse, dense, kAlways, 0.1, 0.0);
-    REQUIRE(pairs.size() == 51);
-    for (std::size_t i = 0; i < pairs.size(); ++i) {
-      CHECK(pairs[i].stamp == sparse[i].stamp);
-      CHECK(pairs[i].T_truth_body.isApprox(pairs[i].T_estimate_body, 1e-9));
-    }
-  }
-}
-
-TEST_CASE("Only the window and the time in common are paired", "[evaluation]") {
-  const auto truth = sample(0.0, 100.0, 1001, screw);   // 0 to 10 s
-  const auto estimate = sample(8.0, 10.0, 101, screw);  // 8 to 18 s
-  CHECK(associate(truth, estimate, kAlways, 0.1, 0.0).size() == 21);
-  CHECK(associate(truth, estimate, {9 * kSecond, 11 * kSecond}, 0.1, 0.0).size() == 11);
-  CHECK(associate(truth, estimate, {11 * kSecond, 12 * kSecond}, 0.1, 0.0).empty());
-  CHECK(associate(truth, {}, kAlways, 0.1, 0.0).empty());
-  CHECK(associate(truth, sample(50.0, 10.0, 5, screw), kAlways, 0.1, 0.0).empty());
-}
-
 TEST_CASE("Covered time is that between neighbours without a gap inside the window",
           "[evaluation]") {
   auto poses = sample(1.0, 10.0, 11, screw);        // 1 to 2 s

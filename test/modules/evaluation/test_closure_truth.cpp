@@ -1,12 +1,8 @@
 #include <catch2/catch.hpp>
-#include <nlohmann/json.hpp>
 #include <numbers>
-#include <sstream>
 
-#include "modules/core/input_file.hpp"
 #include "modules/core/lie.hpp"
 #include "modules/evaluation/closure_truth.hpp"
-#include "test/modules/evaluation/trajectories.hpp"
 #include "test/support/temporary_folder.hpp"
 
 namespace km {
@@ -181,47 +177,6 @@ TEST_CASE("Invalid closures and options are refused", "[closure_truth]") {
 const std::string kHeader =
     "from_robot,from_keyframe,to_robot,to_keyframe,similarity,stage,matches,inliers,"
     "tx,ty,tz,qx,qy,qz,qw,reason\n";
-
-TEST_CASE("Closures are read with their stages and poses", "[closure_files]") {
-  const TemporaryFolder folder;
-  const auto file =
-      folder.write("loop_closures.csv",
-                   kHeader + "3,17,60000,4,0.5,inlier,80,60,1.5,-2,0.25,0,0,0.6,0.8,\"\"\n" +
-                       "3,18,60000,4,0.4,candidate,0,0,,,,,,,,\"too few matches, 3 of 20\"\n");
-  const auto closures = read_closures(file);
-  REQUIRE(closures.size() == 2);
-  CHECK(closures[0].id == ClosureId{{3, 17}, {60000, 4}});
-  CHECK(closures[0].stage == ClosureStage::kInlier);
-  REQUIRE(closures[0].T_from_to);
-  CHECK(closures[0].T_from_to->translation() == Eigen::Vector3d(1.5, -2.0, 0.25));
-  CHECK(angle_of(closures[0].T_from_to->linear()) == Approx(2.0 * std::acos(0.8)));
-  CHECK(closures[1].stage == ClosureStage::kCandidate);
-  CHECK_FALSE(closures[1].T_from_to);
-  CHECK(closures[0].matches == 80);
-  CHECK(closures[0].inliers == 60);
-  CHECK(closures[0].reason.empty());
-  CHECK(closures[1].reason == "too few matches, 3 of 20");
-}
-
-TEST_CASE("Keyframes get their true poses by their stamps", "[closure_files]") {
-  const TemporaryFolder folder;
-  const auto file = folder.write("keyframes.csv",
-                                 "robot,keyframe,stamp_ns,median_depth_m\n"
-                                 "7,0,1000000000,2.5\n"
-                                 "7,1,1525000000,0\n"
-                                 "7,2,9000000000,3\n");
-  const auto keyframes = read_keyframes(file);
-  REQUIRE(keyframes.size() == 3);
-  CHECK(keyframes[1].stamp == 1'525'000'000);
-  const auto truth = sample(1.0, 20.0, 21, curve);  // to 2 s
-  const auto placed = place_keyframes(keyframes, truth);
-  REQUIRE(placed.size() == 2);  // the third is after the truth
-  CHECK(placed[0].id == KeyframeId{7, 0});
-  CHECK(placed[0].scene_depth_m == 2.5);
-  CHECK(placed[0].T_world_body.isApprox(curve(1.0)));
-  const double between_m = 0.002;  // chord against arc of 50 ms
-  CHECK((placed[1].T_world_body.translation() - curve(1.525).translation()).norm() < between_m);
-}
 
 TEST_CASE("Errors in closure files are reported with their line", "[closure_files]") {
   const TemporaryFolder folder;

@@ -1,5 +1,4 @@
 #include <catch2/catch.hpp>
-#include <numbers>
 #include <random>
 
 #include "modules/objects/object_box.hpp"
@@ -39,15 +38,6 @@ TEST_CASE("Shared volumes agree with counted points", "[objects]") {
   const double share = static_cast<double>(inside) / kPoints;
   CHECK(shared_volume_m3(a, b) / a.volume_m3() == Approx(share).margin(0.02));
   CHECK(shared_volume_m3(b, a) == Approx(shared_volume_m3(a, b)).margin(1e-9));
-}
-
-TEST_CASE("A box in a tilted frame is upright again in the world", "[objects]") {
-  const ObjectBox box{{3.0, -4.0, 0.5}, 0.4, {2.0, 0.7, 1.2}};
-  const SE3 T_world_kf = make_pose(
-      Eigen::AngleAxisd(1.1, Eigen::Vector3d(1, 2, 3).normalized()).toRotationMatrix(), {5, 6, 7});
-  const ObjectBox back = upright_box(T_world_kf * (T_world_kf.inverse() * box.pose()), box.size_m);
-  CHECK(back.yaw_rad == Approx(0.4));
-  CHECK((back.center - box.center).norm() < 1e-9);
 }
 
 }  // namespace

@@ -31,29 +31,24 @@ TEST_CASE("Objects are read as they were written", "[objects]") {
   CHECK(list.objects[0].robots == std::vector<RobotId>{0, 3});
 }
 
-TEST_CASE("A list of objects with numbers out of range is refused", "[objects]") {
+TEST_CASE("Objects with an unusable entry are refused with its place", "[objects]") {
   const TemporaryFolder folder;
-  const auto file = folder.path() / "objects.json";
-  const std::string box = R"("center_m": [0, 0, 0], "yaw_rad": 0, "size_m": [1, 1, 1])";
-  const std::string entry =
-      GENERATE(R"("label": 256, "robots": [])", R"("label": -1, "robots": [])",
-               R"("label": 1, "robots": [65536])", R"("label": 1)");
-  write_file(file, R"({"anchor": 0, "objects": [{)" + entry + ", " + box + "}]}");
-  CHECK_THROWS_WITH(read_object_list(file), Catch::Contains(file.string() + ": entry 0 of"));
-  write_file(file, R"({"anchor": "a", "objects": []})");
-  CHECK_THROWS_WITH(read_object_list(file), Catch::Contains(file.string() + ": \"anchor\""));
-}
-
-TEST_CASE("A file of objects with an unusable entry is refused with its place", "[objects]") {
-  const TemporaryFolder folder;
-  const auto file = folder.path() / "objects.json";
-  const char* const text = GENERATE(
-      R"({"objects": [{"layer": "room"}, {"class": "chair", "center_m": [0, 0], "yaw_rad": 0}]})",
-      R"({"objects": [{"layer": "room"}, {"class": 5}]})");
-  write_file(file, text);
-  CHECK_THROWS_WITH(read_objects(file), Catch::Contains(file.string() + ": entry 1 of"));
-  write_file(file, "[]");
-  CHECK_THROWS_WITH(read_objects(file), Catch::Contains(file.string()));
+  const auto refuses = [&](const auto& read, const std::string& text, const std::string& place) {
+    CAPTURE(text);
+    const auto file = folder.write("objects.json", text);
+    CHECK_THROWS_WITH(read(file), Catch::Contains(file.string() + place));
+  };
+  const std::string box = R"(, "center_m": [0, 0, 0], "yaw_rad": 0, "size_m": [1, 1, 1]}]})";
+  for (const char* entry : {R"("label": 256, "robots": [])", R"("label": -1, "robots": [])",
+                            R"("label": 1, "robots": [65536])", R"("label": 1)"})
+    refuses(read_object_list, std::string(R"({"anchor": 0, "objects": [{)") + entry + box,
+            ": entry 0 of");
+  refuses(read_object_list, R"({"anchor": "a", "objects": []})", ": \"anchor\"");
+  const std::string room = R"({"objects": [{"layer": "room"}, )";
+  refuses(read_objects, room + R"({"class": "chair", "center_m": [0, 0], "yaw_rad": 0}]})",
+          ": entry 1 of");
+  refuses(read_objects, room + R"({"class": 5}]})", ": entry 1 of");
+  refuses(read_objects, "[]", "");
 }
 
 }  // namespace

@@ -6,7 +6,6 @@
 #include <map>
 #include <memory>
 #include <optional>
-#include <random>
 #include <variant>
 #include <vector>
 
@@ -120,33 +119,6 @@ TEST_CASE("A correction of the trajectory costs poses, and the receiver's mesh f
   for (const Eigen::Vector3f& p : robot.mesh->vertices)
     highest_m = std::max(highest_m, static_cast<double>(p.z()));
   CHECK(highest_m > 0.9);
-}
-
-TEST_CASE("The map does not depend on the order of chunks and poses, nor on the time of joining",
-          "[team_map]") {
-  CorrectedRobot robot;
-  robot.T_world_kf = bent(robot.T_odom_kf, 100.0);
-  robot.correct();
-  robot.map.mesh.vertices[7].z() += 0.3F;  // mapped again
-  ++robot.map_version;
-  robot.correct();
-  robot.T_world_kf = bent(robot.T_odom_kf, 150.0);
-  robot.correct();
-  std::vector<Message> all;
-  for (const MeshChunk& chunk : robot.chunks.messages()) all.emplace_back(chunk);
-  for (const MeshPoses& poses : robot.poses.messages()) all.emplace_back(poses);
-  const TeamMap present = fuse_chunks(received(all).placed(), kFusedVoxel_m);
-  CHECK(present.mesh.faces.size() > 1000);
-  CHECK(present.anchor == kMapper);
-
-  std::vector<Message> newest = newest_of(robot);
-  CHECK(newest.size() < all.size());
-  std::mt19937 rng(GENERATE(range(0U, 3U)));
-  std::shuffle(newest.begin(), newest.end(), rng);
-  const TeamMap late = fuse_chunks(received(newest).placed(), kFusedVoxel_m);
-  CHECK(late.mesh.vertices == present.mesh.vertices);
-  CHECK(late.mesh.faces == present.mesh.faces);
-  CHECK(late.mesh.labels == present.mesh.labels);
 }
 
 }  // namespace km

@@ -3,7 +3,6 @@
 #include <Eigen/Geometry>
 #include <cmath>
 #include <cstdint>
-#include <numbers>
 
 #include "modules/mesh/labelled_mesh.hpp"
 
@@ -40,29 +39,6 @@ inline LabelledMesh room() {
   mesh.append(rectangle({4, 0, 0}, {0, 3, 0}, {0, 0, 2}, 8, 3));
   mesh.append(rectangle({0, 0, 0}, {4, 0, 0}, {0, 0, 2}, 8, 4));
   mesh.append(rectangle({0, 3, 0}, {4, 0, 0}, {0, 0, 2}, 8, 5));
-  return mesh;
-}
-
-/// A sphere about zero, of rings x 2 rings cells between circles of latitude and longitude.
-inline LabelledMesh sphere(float radius, int rings = 48) {
-  LabelledMesh mesh;
-  const int around = 2 * rings;
-  for (int i = 0; i <= rings; ++i)
-    for (int j = 0; j < around; ++j) {
-      const float polar =
-          std::numbers::pi_v<float> * static_cast<float>(i) / static_cast<float>(rings);
-      const float azimuth =
-          2.0F * std::numbers::pi_v<float> * static_cast<float>(j) / static_cast<float>(around);
-      mesh.vertices.emplace_back(radius * std::sin(polar) * std::cos(azimuth),
-                                 radius * std::sin(polar) * std::sin(azimuth),
-                                 radius * std::cos(polar));
-    }
-  const auto at = [&](int i, int j) { return static_cast<std::uint32_t>(i * around + j % around); };
-  for (int i = 0; i < rings; ++i)
-    for (int j = 0; j < around; ++j) {
-      mesh.faces.push_back({at(i, j), at(i + 1, j), at(i + 1, j + 1)});
-      mesh.faces.push_back({at(i, j), at(i + 1, j + 1), at(i, j + 1)});
-    }
   return mesh;
 }
 

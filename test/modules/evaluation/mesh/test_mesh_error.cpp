@@ -186,19 +186,6 @@ TEST_CASE("Two states of a mesh are judged on the points that either of them sho
   CHECK(of_whole.truth.labels.total().accuracy() == 0.0);
 }
 
-TEST_CASE("One transform registers both states of a mesh", "[mesh_error]") {
-  const LabelledMesh truth = sphere(1.0F);
-  LabelledMesh before = truth, after = truth;
-  before.transform(make_pose(Eigen::Matrix3d::Identity(), {0.04, 0.0, 0.0}));
-  after.transform(make_pose(Eigen::Matrix3d::Identity(), {0.02, 0.0, 0.0}));
-  const std::vector<MeshInput> first = {{"before", before}}, second = {{"after", after}};
-  const MeshChange change = mesh_change(truth, first, second);
-  const Eigen::Vector3d moved = change.after.registration.T_truth_estimate.translation();
-  CHECK(moved.x() == Approx(-0.03).margin(1e-3));
-  CHECK(change.before.registration.T_truth_estimate.isApprox(
-      change.after.registration.T_truth_estimate));
-}
-
 TEST_CASE("The same arguments give the same report on any number of threads", "[mesh_error]") {
   LabelledMesh estimate = room();
   estimate.transform(make_pose(Eigen::Matrix3d::Identity(), {0.02, 0.01, 0.03}));

@@ -1,51 +1,12 @@
 #include <catch2/catch.hpp>
-#include <cmath>
 #include <limits>
 #include <random>
-#include <vector>
 
 #include "modules/evaluation/mesh/sampled_surface.hpp"
 #include "test/modules/evaluation/mesh/shapes.hpp"
 
 namespace km {
 namespace {
-
-TEST_CASE("Samples have the requested density on every part", "[mesh_error]") {
-  const std::uint32_t seed = GENERATE(1U, 2U, 3U);
-  CAPTURE(seed);
-  const LabelledMesh mesh = room();  // 12 + 2 * 6 + 2 * 8 m^2
-  CHECK(surface_area(mesh) == Approx(40.0));
-  const SurfaceSamples samples = sample_surface(mesh, 1000.0, seed);
-  // The number is that of the area, rounded up or down, also for every face.
-  CHECK(std::abs(static_cast<double>(samples.points.size()) - 40'000.0) <= 1.0);
-  std::vector<int> of_face(mesh.faces.size());
-  for (const std::uint32_t face : samples.faces) ++of_face[face];
-  LabelledMesh one = mesh;
-  for (std::size_t face = 0; face < mesh.faces.size(); ++face) {
-    one.faces = {mesh.faces[face]};
-    CHECK(std::abs(of_face[face] - 1000.0 * surface_area(one)) <= 1.0);
-  }
-}
-
-TEST_CASE("Samples are uniform within a triangle", "[mesh_error]") {
-  LabelledMesh mesh;
-  mesh.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
-  mesh.faces = {{0, 1, 2}};
-  const SurfaceSamples samples = sample_surface(mesh, 80'000.0, 1);
-  REQUIRE(samples.points.size() == 40'000);
-  // The four triangles between the middles of the sides have a quarter each: 10000 +- 5 sigma.
-  std::array<int, 4> quarter{};
-  for (const Eigen::Vector3f& point : samples.points) {
-    REQUIRE(point.minCoeff() >= 0.0F);
-    REQUIRE(point.sum() <= 1.0F + 1e-6F);
-    const std::size_t part = point.x() > 0.5F     ? 0
-                             : point.y() > 0.5F   ? 1
-                             : point.sum() < 0.5F ? 2
-                                                  : 3;
-    ++quarter[part];
-  }
-  for (const int count : quarter) CHECK(std::abs(count - 10'000) < 5 * 87);
-}
 
 TEST_CASE("A mesh ends at an edge of one face with shared and with separate vertices",
           "[mesh_error]") {
