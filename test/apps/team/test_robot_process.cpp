@@ -37,17 +37,6 @@ struct Script {
 
 }  // namespace
 
-TEST_CASE("A process gives its lines, its end and its last words", "[team]") {
-  Script script("echo one; echo bad >&2; printf 'two\\nthree'; exit 3");
-  script.wait();
-  CHECK(script.lines == std::vector<std::string>{"one", "two", "three"});
-  CHECK(script.process.exit()->code == 3);
-  CHECK(to_string(*script.process.exit()) == "exit code 3");
-  REQUIRE(script.process.last_log_lines().size() == 1);
-  CHECK(script.process.last_log_lines().back() == "bad");
-  CHECK_THAT(script.folder.read("log"), Catch::Contains("one\n") && Catch::Contains("bad\n"));
-}
-
 TEST_CASE("Its standard input is empty and its process group its own", "[team]") {
   Script script("read x || echo empty; [ $(ps -o pgid= -p $$) = $$ ] && echo leader");
   script.wait();
