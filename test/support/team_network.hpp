@@ -1,15 +1,12 @@
 #pragma once
 
 #include <algorithm>
-#include <catch2/catch.hpp>
 #include <functional>
-#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
 #include <random>
 #include <set>
-#include <sstream>
 #include <string>
 #include <utility>
 #include <vector>
@@ -216,31 +213,6 @@ class TeamNetwork {
       const Robot& robot = entry.second;
       return robot.dead || (robot.progress.settled && robot.progress.members.size() == alive);
     });
-  }
-
-  /// State of all agents, for messages of failed tests.
-  [[nodiscard]] std::string describe() const {
-    std::ostringstream text;
-    text << "at " << now_s_ << " s\n";
-    for (const auto& [id, robot] : robots) {
-      text << "robot " << id << (robot.dead ? " (dead)" : "") << ": frame "
-           << robot.agent->frame().robot << ", members";
-      for (const RobotId member : robot.progress.members) text << ' ' << member;
-      text << (robot.progress.settled ? ", settled" : "") << "; reaches";
-      for (const auto& [other, of_other] : robots)
-        if (other != id && robot.overlay->robots().next_hop(other)) text << ' ' << other;
-      if (const SessionPart* part = robot.agent->part()) {
-        const Session& session = part->session();
-        text << "; session " << session.id.coordinator.robot << '/' << session.id.number
-             << (robot.agent->in_session() ? " running" : " over")
-             << (session.finished ? " finished" : "") << " stage "
-             << (part->stage() ? static_cast<int>(*part->stage()) : -1) << " round "
-             << part->state().round << " moved " << part->last_activity_s();
-      }
-      if (!robot.notices.empty()) text << "; " << robot.notices.back();
-      text << '\n';
-    }
-    return text.str();
   }
 
   /// Published poses; they are in one frame if all have the same anchor.
@@ -479,9 +451,7 @@ inline void feed(TeamAgent& agent, RobotId robot, const TeamProblem& problem) {
 
 /// Runs until all running robots are members of one settled session. False if that takes longer.
 inline bool settle(TeamNetwork& network, double within_s = 300.0) {
-  const bool settled = network.run(within_s, [&] { return network.all_settled(); });
-  if (!settled) UNSCOPED_INFO(network.describe());
-  return settled;
+  return network.run(within_s, [&] { return network.all_settled(); });
 }
 
 }  // namespace km
