@@ -4,8 +4,11 @@
 
 #include <array>
 #include <cmath>
+#include <optional>
 #include <string>
+#include <utility>
 #include <variant>
+#include <vector>
 
 #include "runtime/clock.hpp"
 #include "runtime/dds/codec.hpp"
@@ -145,25 +148,26 @@ ViewReader::ViewReader(dds_entity_t participant, dds_entity_t topic, ViewChannel
       reader_(dds_create_reader(subscriber_.handle(), topic, reader_qos().get(), nullptr),
               std::string("reader of ") + name_of(channel)) {}
 
-std::optional<ViewReader::Batch> ViewReader::take_batch() {
+std::size_t ViewReader::take(const std::function<void(ViewUpdate)>& take_one) {
   constexpr std::uint32_t kAtOnce = 16;
   std::array<void*, kAtOnce> samples{};
   std::array<dds_sample_info_t, kAtOnce> infos{};
-  const dds_return_t count =
-      check_dds(dds_take(reader_.handle(), samples.data(), infos.data(), kAtOnce, kAtOnce),
-                std::string("cannot take from ") + name_of(channel_));
-  if (count == 0) return std::nullopt;
-  Batch batch;
-  for (std::size_t k = 0; k < static_cast<std::size_t>(count); ++k) {
-    if (!infos[k].valid_data) continue;
-    auto update = update_of(*static_cast<const km_wire_ViewUpdate*>(samples[k]), channel_);
-    if (update)
-      batch.updates.push_back(*std::move(update));
-    else
-      ++batch.refused;
+  std::size_t refused = 0;
+  while (true) {
+    const dds_return_t count =
+        check_dds(dds_take(reader_.handle(), samples.data(), infos.data(), kAtOnce, kAtOnce),
+                  std::string("cannot take from ") + name_of(channel_));
+    if (count == 0) return refused;
+    for (std::size_t k = 0; k < static_cast<std::size_t>(count); ++k) {
+      if (!infos[k].valid_data) continue;
+      auto update = update_of(*static_cast<const km_wire_ViewUpdate*>(samples[k]), channel_);
+      if (update)
+        take_one(*std::move(update));
+      else
+        ++refused;
+    }
+    check_dds(dds_return_loan(reader_.handle(), samples.data(), count), "cannot return samples");
   }
-  check_dds(dds_return_loan(reader_.handle(), samples.data(), count), "cannot return samples");
-  return batch;
 }
 
 }  // namespace km

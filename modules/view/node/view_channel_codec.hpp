@@ -2,9 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <optional>
-#include <utility>
-#include <vector>
+#include <functional>
 
 #include "modules/core/ids.hpp"
 #include "modules/core/robot_identity.hpp"
@@ -65,23 +63,9 @@ class ViewReader {
 
   /// Passes each update that has arrived to `take_one`. Returns the number of invalid updates,
   /// which are dropped.
-  template <typename Take>
-  std::size_t take(const Take& take_one) {
-    std::size_t refused = 0;
-    while (auto batch = take_batch()) {
-      refused += batch->refused;
-      for (ViewUpdate& update : batch->updates) take_one(std::move(update));
-    }
-    return refused;
-  }
+  std::size_t take(const std::function<void(ViewUpdate)>& take_one);
 
  private:
-  struct Batch {
-    std::vector<ViewUpdate> updates;
-    std::size_t refused = 0;
-  };
-  [[nodiscard]] std::optional<Batch> take_batch();
-
   ViewChannel channel_;
   DdsEntity subscriber_, reader_;
 };
