@@ -24,11 +24,10 @@ constexpr std::array kChannels = {ViewChannel::kView, ViewChannel::kMesh, ViewCh
 
 // The sending half of a robot.
 struct Publisher {
-  Publisher(const std::shared_ptr<const DdsDomain>& domain, RobotId robot, std::uint64_t boot = 0)
-      : participant(domain,
-                    {.robot = robot, .name = robot_name(robot), .boot = 50U + robot + boot}) {
+  Publisher(const std::shared_ptr<const DdsDomain>& domain, RobotId robot)
+      : participant(domain, {.robot = robot, .name = robot_name(robot), .boot = 50U + robot}) {
     for (const ViewChannel channel : kChannels)
-      writers.emplace_back(participant.handle(), channel, TeamPeer{robot, 50U + robot + boot});
+      writers.emplace_back(participant.handle(), channel, TeamPeer{robot, 50U + robot});
   }
   ViewWriter& on(ViewChannel channel) { return writers[static_cast<std::size_t>(channel)]; }
   void publish(const ViewContent& content) { on(channel_of(content)).write(content); }
@@ -86,21 +85,6 @@ TEST_CASE("A viewer receives the updates of robots in order", "[view]") {
   }
   CHECK(w.publisher.on(ViewChannel::kView).await_readers(kPatience_s));
   CHECK(w.listener.refused() == 0);
-}
-
-TEST_CASE("A viewer ignores a second robot with a taken id", "[view]") {
-  Watching w;
-  Publisher twin(w.domain, 7, 1000);
-  REQUIRE(w.is_read(ViewChannel::kView));
-  w.publisher.publish(ViewKeyframes{.first = 0, .T_world_kf = {}});
-  CHECK(w.received().boot == 57);
-  REQUIRE(eventually([&] { return twin.on(ViewChannel::kView).readers() == 1; }));
-  twin.publish(ViewKeyframes{.first = 0, .T_world_kf = {}});
-  CHECK(twin.on(ViewChannel::kView).await_readers(kPatience_s));
-  w.publisher.publish(ViewKeyframes{.first = 1, .T_world_kf = {}});
-  const ViewUpdate next = w.received();
-  CHECK(next.boot == 57);
-  CHECK(std::get<ViewKeyframes>(next.content).first == 1);
 }
 
 TEST_CASE("Images arrive only from the robots that are asked", "[view]") {

@@ -252,25 +252,6 @@ TEST_CASE("No participant takes over the id of a present robot", "[peers]") {
   CHECK(kinds(table) == Kinds{PeerEventKind::kReturned});
 }
 
-TEST_CASE("A robot that is a member no longer is lost, and its certificate no proof", "[peers]") {
-  PeerTable table(kSelf, admit_all);
-  for (const std::uint8_t n : std::vector<std::uint8_t>{2, 3}) {
-    table.participant(guid(n), data_of(7, kBoot + n), "");
-    table.alive(guid(n));
-    table.prove(guid(n));
-  }
-  (void)table.take_events();
-  table.expel({{7, kBoot + 2}, {7, kBoot + 3}, {9, 90}});
-  CHECK(kinds(table) == Kinds{PeerEventKind::kLost});
-  CHECK(table.peers()[0].state == PeerState::kLost);
-  for (const std::uint8_t n : std::vector<std::uint8_t>{2, 3}) {
-    table.prove(guid(n));
-    table.alive(guid(n));
-    CHECK(table.standing(guid(n)) == Standing::kOutsider);
-  }
-  CHECK(kinds(table).empty());
-}
-
 TEST_CASE("With keys a former process does not get its id back", "[peers]") {
   PeerTable table(kSelf, admit_all);
   const auto receive = [&](const Guid& from, std::uint64_t boot) {
