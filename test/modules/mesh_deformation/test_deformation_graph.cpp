@@ -13,23 +13,6 @@ namespace {
 
 constexpr DeformationStop kStop{.max_iterations = 50, .energy_tolerance = 1e-14};
 
-// A patch of nodes in the plane z = 0 with a keyframe above each of its corners.
-DeformationGraph patch(std::uint32_t width) {
-  DeformationGraph graph;
-  for (std::uint32_t i = 0; i < width; ++i)
-    for (std::uint32_t j = 0; j < width; ++j) {
-      const std::uint32_t n = i * width + j;
-      graph.nodes.emplace_back(i, j, 0.1 * ((i + 2 * j) % 3));
-      if (j > 0) graph.edges.push_back({n - 1, n});
-      if (i > 0) graph.edges.push_back({n - width, n});
-      graph.keyframe_edges.push_back({2 * i / width + 2 * (2 * j / width), n});
-    }
-  for (const double y : {0.0, width - 1.0})
-    for (const double x : {0.0, width - 1.0})
-      graph.T_odom_kf.push_back(make_pose(Eigen::Matrix3d::Identity(), {x, y, 2.0}));
-  return graph;
-}
-
 constexpr double kDerivative = 1e-5;  // central differences of step 1e-6, values up to 10
 
 }  // namespace
