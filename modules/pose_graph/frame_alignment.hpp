@@ -16,14 +16,16 @@ inline constexpr double kAlignedTranslation_m = 10.0;
 
 struct [[nodiscard]] FrameAlignment {
   SE3 T = SE3::Identity();
-  std::vector<std::size_t> inliers;  ///< Candidates within tolerance of T, ascending.
+  std::vector<std::size_t> inliers;  ///< Candidates within the last tolerance of T, ascending.
 };
 
 /// Robust average of candidates for one transform. Many of them may be wrong. It minimises the
 /// truncated sum of squares sum_k w_k min(1, d_k^2). d_k^2 is the larger of two squared distances,
 /// each relative to its tolerance: the chordal distance of the rotations and the distance of the
-/// translations. Every candidate is tried as the start. The best one is refined: its inliers, with
-/// equal weights, are averaged until they no longer change.
+/// translations. Every candidate is tried as the start. Then the tolerance is halved, and the
+/// inliers are tried again, as long as the best one keeps half of the weight of the first inliers.
+/// True and false candidates that are near each other are thus not averaged. The inliers of the
+/// last tolerance, with equal weights, are averaged until they no longer change.
 ///
 /// Translations are compared at the origin of the frames. This origin should be near the
 /// measurements, because otherwise rotation errors count a second time through the lever arm.
