@@ -2,8 +2,10 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <limits>
 #include <optional>
 #include <set>
+#include <utility>
 #include <vector>
 
 #include "modules/core/lie.hpp"
@@ -27,6 +29,11 @@ constexpr double kConsistentMargin = 2.0;
 constexpr double kMostConsistent = 0.1;
 constexpr std::size_t kMostErrorCycles = 200;  // bounds the time
 constexpr std::size_t kMostBreaks = 5;         // odometry with more of them is noisy
+// Largest speed in a correct step, relative to the speed that 95 % of the steps of the robot do not
+// exceed. The robot moves in a wrong step as in the others. Rows of closures between parts of the
+// environment that look alike agree on a jump, too, but this jump has any length.
+constexpr double kUsualShare = 0.95;
+constexpr double kFastestStep = 3.0;
 
 struct ErrorCycle {
   std::size_t lower = 0;  // keyframes at its ends
@@ -74,15 +81,46 @@ std::vector<ErrorCycle> error_cycles(const OdometryChain& chain,
   return cycles;
 }
 
-// One step of each run of steps that are in the same cycles: the middle one.
-std::vector<std::size_t> distinct_steps(const std::vector<ErrorCycle>& cycles, std::size_t steps) {
+// Runs of steps [first, second) that are in the same cycles.
+std::vector<std::pair<std::size_t, std::size_t>> runs_of_steps(
+    const std::vector<ErrorCycle>& cycles, std::size_t steps) {
   std::set<std::size_t> ends{0, steps};
   for (const ErrorCycle& cycle : cycles) ends.insert({cycle.lower, cycle.upper});
-  std::vector<std::size_t> middles;
+  std::vector<std::pair<std::size_t, std::size_t>> runs;
   for (auto end = ends.begin(); std::next(end) != ends.end(); ++end)
-    middles.push_back((*end + *std::next(end)) / 2);
-  return middles;
+    runs.emplace_back(*end, *std::next(end));
+  return runs;
 }
+
+// The possible motions of the robot in a step.
+class PossibleSteps {
+ public:
+  // `seconds`: duration of each step. If they are unknown, steps count as equally long.
+  PossibleSteps(std::span<const PoseEdge> steps, std::span<const double> seconds) {
+    if (seconds.size() == steps.size() &&
+        std::ranges::all_of(seconds, [](double s) { return s > 0.0; }))
+      seconds_ = seconds;
+    std::vector<double> speeds;
+    for (std::size_t k = 0; k < steps.size(); ++k)
+      if (!is_unknown_step(steps[k])) speeds.push_back(speed(steps[k].T_from_to, k));
+    if (speeds.empty()) return;
+    const auto rank = kUsualShare * static_cast<double>(speeds.size() - 1);
+    const auto usual = speeds.begin() + static_cast<std::ptrdiff_t>(rank);
+    std::ranges::nth_element(speeds, usual);
+    fastest_ = kFastestStep * *usual;
+  }
+
+  [[nodiscard]] bool contain(const SE3& T, std::size_t step) const {
+    return speed(T, step) <= fastest_;
+  }
+  [[nodiscard]] double speed(const SE3& T, std::size_t step) const {
+    return T.translation().norm() / (seconds_.empty() ? 1.0 : seconds_[step]);
+  }
+
+ private:
+  std::span<const double> seconds_;
+  double fastest_ = 0.0;
+};
 
 struct Suspicion {
   double limit = 0.0;       // squared length up to which cycles are consistent
@@ -141,47 +179,68 @@ SE3 mean_of(const std::vector<Jump>& jumps) {
   return first * se3_exp(sum / static_cast<double>(jumps.size()));
 }
 
+// The break with the slowest correct step among the steps [first, second), between which closures
+// do not distinguish. `jump` is in the frame of keyframe `at` + 1.
+OdometryBreak slowest_break(std::span<const PoseEdge> steps, const OdometryChain& chain,
+                            const PossibleSteps& possible, std::pair<std::size_t, std::size_t> run,
+                            std::size_t at, const SE3& jump) {
+  OdometryBreak slowest;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t step = run.first; step < run.second; ++step) {
+    const SE3 T_at_step = chain.T_first_kf[at + 1].inverse() * chain.T_first_kf[step + 1];
+    const SE3 moved = T_at_step.inverse() * jump * T_at_step;
+    const SE3 T = steps[step].T_from_to * moved;
+    const double speed = possible.speed(T, step);
+    if (!(speed < least)) continue;
+    least = speed;
+    slowest = {.step = step,
+               .T_from_to = T,
+               .precision = steps[step].precision,
+               .jump_rad = angle_of(moved.linear()),
+               .jump_m = moved.translation().norm()};
+  }
+  return slowest;
+}
+
 std::optional<OdometryBreak> find_break(std::span<const PoseEdge> steps,
-                                        std::span<const PoseEdge> closures) {
+                                        std::span<const PoseEdge> closures,
+                                        std::span<const double> seconds) {
   const OdometryChain chain(steps);
   const std::vector<ErrorCycle> cycles = error_cycles(chain, closures);
-  std::optional<std::size_t> where;
-  std::vector<Jump> most;
+  const PossibleSteps possible(steps, seconds);
+  std::optional<OdometryBreak> found;
   double best = 0.0;  // places for a wrong step minus those against it
-  for (const std::size_t step : distinct_steps(cycles, steps.size())) {
-    const auto suspicion = suspicion_of(cycles, step);
+  for (const auto& run : runs_of_steps(cycles, steps.size())) {
+    const std::size_t middle = (run.first + run.second) / 2;
+    const auto suspicion = suspicion_of(cycles, middle);
     if (!suspicion) continue;
-    std::vector<Jump> jumps = agreeing_jumps(chain, cycles, step, suspicion->limit);
+    const std::vector<Jump> jumps = agreeing_jumps(chain, cycles, middle, suspicion->limit);
     const double places = places_of(jumps);
     if (places < kLeastPlaces || places - suspicion->consistent <= best) continue;
+    OdometryBreak wrong = slowest_break(steps, chain, possible, run, middle, mean_of(jumps));
+    if (!possible.contain(wrong.T_from_to, wrong.step)) continue;
     best = places - suspicion->consistent;
-    most = std::move(jumps);
-    where = step;
+    wrong.places = static_cast<std::size_t>(places);
+    found = wrong;
   }
-  if (!where) return std::nullopt;
-  const SE3 jump = mean_of(most);
-  OdometryBreak found{.step = *where,
-                      .T_from_to = steps[*where].T_from_to * jump,
-                      .precision = steps[*where].precision,
-                      .jump_rad = angle_of(jump.linear()),
-                      .jump_m = jump.translation().norm(),
-                      .places = static_cast<std::size_t>(places_of(most))};
+  if (!found) return std::nullopt;
   const auto at_most = [](double precision, double size, double factor) {
     return size > 0.0 ? std::min(precision, factor / (size * size)) : precision;
   };
-  found.precision.kappa = at_most(found.precision.kappa, found.jump_rad, 0.5);
-  found.precision.tau = at_most(found.precision.tau, found.jump_m, 1.0);
+  found->precision.kappa = at_most(found->precision.kappa, found->jump_rad, 0.5);
+  found->precision.tau = at_most(found->precision.tau, found->jump_m, 1.0);
   return found;
 }
 
 }  // namespace
 
 std::vector<OdometryBreak> find_odometry_breaks(std::span<const PoseEdge> steps,
-                                                std::span<const PoseEdge> closures) {
+                                                std::span<const PoseEdge> closures,
+                                                std::span<const double> seconds) {
   std::vector<PoseEdge> corrected(steps.begin(), steps.end());
   std::vector<OdometryBreak> breaks;
   while (!corrected.empty()) {
-    const auto found = find_break(corrected, closures);
+    const auto found = find_break(corrected, closures, seconds);
     if (!found) break;
     if (breaks.size() == kMostBreaks) return {};
     breaks.push_back(*found);

@@ -25,15 +25,19 @@ struct OdometryBreak {
 /// A wrong step makes every cycle of odometry and a closure that contains it inconsistent, and each
 /// of these cycles yields the jump that would close it. A step is wrong if the cycles of at least
 /// three places agree on the jump, and if at most 10 % of the cycles that contain the step are
-/// consistent. At least three places must have cycles without the step, for comparison. False
-/// closures rarely agree on a jump.
+/// consistent. At least three places must have cycles without the step, for comparison. The correct
+/// step must be a possible motion of the robot: at most three times as fast as 95 % of its steps.
+/// Rows of closures between two parts of the environment that look alike agree on a jump, too, but
+/// such a jump hardly ever leaves a possible step.
 ///
 /// Cycles are consistent, and jumps agree, up to the 99.9 % quantile of chi-squared at the claimed
 /// noise. The limit is larger if the median error of the cycles without the step exceeds the
 /// claimed noise, because noisy odometry increases the errors of all cycles. If successive steps
-/// are in the same cycles, the middle one is taken.
+/// are in the same cycles, the one with the slowest correct step is taken. `seconds`: duration of
+/// each step; if it is empty or has a value that is not positive, all steps last equally long.
 [[nodiscard]] std::vector<OdometryBreak> find_odometry_breaks(std::span<const PoseEdge> steps,
-                                                              std::span<const PoseEdge> closures);
+                                                              std::span<const PoseEdge> closures,
+                                                              std::span<const double> seconds = {});
 
 /// Replaces the wrong steps.
 void correct_breaks(std::span<PoseEdge> steps, std::span<const OdometryBreak> breaks);

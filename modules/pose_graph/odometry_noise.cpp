@@ -255,8 +255,10 @@ void OdometryJudgement::correct(std::span<PoseEdge> steps) const {
 }
 
 OdometryJudgement judge_odometry(std::span<const PoseEdge> steps,
-                                 std::span<const PoseEdge> closures) {
-  OdometryJudgement judgement{.breaks = find_odometry_breaks(steps, closures)};
+                                 std::span<const PoseEdge> closures,
+                                 std::span<const double> seconds, bool corrects) {
+  OdometryJudgement judgement;
+  if (corrects) judgement.breaks = find_odometry_breaks(steps, closures, seconds);
   std::vector<PoseEdge> repaired(steps.begin(), steps.end());
   correct_breaks(repaired, judgement.breaks);
   judgement.noise = estimate_odometry_noise(repaired, closures);

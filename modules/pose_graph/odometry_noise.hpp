@@ -56,8 +56,11 @@ struct OdometryJudgement {
   void correct(std::span<PoseEdge> steps) const;
 };
 
-/// `steps`: odometry from each keyframe to the next, as measured.
+/// `steps`: odometry from each keyframe to the next, as measured. `seconds`: see
+/// find_odometry_breaks(). `corrects`: wrong steps are looked for.
 [[nodiscard]] OdometryJudgement judge_odometry(std::span<const PoseEdge> steps,
-                                               std::span<const PoseEdge> closures);
+                                               std::span<const PoseEdge> closures,
+                                               std::span<const double> seconds = {},
+                                               bool corrects = true);
 
 }  // namespace km

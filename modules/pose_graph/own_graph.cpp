@@ -53,6 +53,7 @@ bool OwnGraph::add(const KeyframeOdometry& keyframe) {
       throw std::invalid_argument("OwnGraph: odometry to keyframe " + to_string(keyframe.id) +
                                   " is not finite with a usable covariance");
     odometry_.push_back(*step);
+    step_s_.push_back(seconds_between(newest_, keyframe.stamp));
     if (is_unknown_step(*step)) later_runs_.push_back(keyframe.id.index);
   } else {
     if (!keyframe.T_odom_kf.matrix().allFinite())
@@ -60,6 +61,7 @@ bool OwnGraph::add(const KeyframeOdometry& keyframe) {
     T_odom_first_ = keyframe.T_odom_kf;
   }
   if (vertical) verticals_.push_back(*vertical);
+  newest_ = keyframe.stamp;
   ++keyframes_;
   ++revision_;
   complete_sets();
@@ -193,10 +195,11 @@ const std::vector<PoseEdge>* OwnGraph::newest_edges(RobotId peer) const {
                                                               : &sets->second.complete[0].edges;
 }
 
-void OwnGraph::judge_odometry() {
+void OwnGraph::judge_odometry(bool corrects) {
   const std::vector<PoseEdge>* inside = newest_edges(self_);
-  odometry_judgement_ =
-      inside == nullptr ? OdometryJudgement() : km::judge_odometry(odometry_, *inside);
+  odometry_judgement_ = inside == nullptr
+                            ? OdometryJudgement()
+                            : km::judge_odometry(odometry_, *inside, step_s_, corrects);
 }
 
 std::vector<PoseEdge> OwnGraph::own_edges() const {

@@ -69,9 +69,9 @@ class OwnGraph {
   /// The odometry of this robot and a peer by each known closure between them, selected or not.
   [[nodiscard]] std::span<const AlignedOdometry> alignments(RobotId peer) const;
 
-  /// Finds wrong steps of odometry and estimates its noise again, from the closures inside this
-  /// robot. From now on, own_edges() has corrected steps and weights.
-  void judge_odometry();
+  /// Estimates the noise of odometry again, from the closures inside this robot, and finds wrong
+  /// steps if it `corrects` them. From now on, own_edges() has corrected steps and weights.
+  void judge_odometry(bool corrects = true);
   /// Wrong steps by the last judge_odometry().
   [[nodiscard]] const std::vector<OdometryBreak>& odometry_breaks() const {
     return odometry_judgement_.breaks;
@@ -121,6 +121,8 @@ class OwnGraph {
   std::uint32_t keyframes_ = 0;
   std::uint32_t revision_ = 0;
   std::vector<PoseEdge> odometry_;  // with claimed precision
+  std::vector<double> step_s_;      // duration of each step
+  Stamp newest_ = 0;                // stamp of the last keyframe
   OdometryJudgement odometry_judgement_;
   std::vector<KeyframeIndex> later_runs_;
   std::vector<VerticalPrior> verticals_;

@@ -12,6 +12,7 @@ struct PoseGraphConfig {
   PgoMethod method = PgoMethod::kNewton;
   bool robust = true;
   double barc = 0.0;
+  bool correct_odometry = true;
   double scale_sigma = 0.003;
   int max_rounds = 0;
   double exchange_budget_kb_s = 20.0;
@@ -27,6 +28,11 @@ struct PoseGraphConfig {
     visitor.field("barc", barc, {0.0, 1e6},
                   "[sigma] newton: largest residual (square root of the cost) of a closure that is "
                   "kept; equal on all robots; 0: the team estimates it from the closures");
+    visitor.field(
+        "correct_odometry", correct_odometry,
+        "newton, robust: correct a step of odometry if closures inside the robot agree at "
+        "three places or more that it is wrong, as after a loss of tracking; false: the "
+        "steps stay as measured");
     visitor.field(
         "scale_sigma", scale_sigma, {0.0, 1.0},
         "standard deviation of the scale of the map, which calibration limits: published "

@@ -200,7 +200,7 @@ std::optional<FrozenPart> TeamAgent::freeze(const Session& session) const {
 bool TeamAgent::join(const Session& session) {
   if (graph_.keyframes() == 0) return false;
   if (config_.robust) {
-    graph_.judge_odometry();
+    graph_.judge_odometry(config_.correct_odometry);
     notices_.odometry(graph_.odometry_noise());
     notices_.breaks(graph_.odometry_breaks());
   }

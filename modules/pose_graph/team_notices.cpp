@@ -68,7 +68,8 @@ void TeamNotices::breaks(std::span<const OdometryBreak> breaks) {
     if (!breaks_.insert(found.step).second) continue;
     add("odometry is wrong near keyframe " + std::to_string(found.step) + ": closures at " +
         std::to_string(found.places) + " places agree on a jump of " + fixed(found.jump_m, 2) +
-        " m and " + fixed(found.jump_rad, 3) + " rad; the step is corrected");
+        " m and " + fixed(found.jump_rad, 3) +
+        " rad; the step is corrected (pose_graph.correct_odometry=false: it stays as measured)");
   }
 }
 

@@ -100,6 +100,40 @@ TEST_CASE("Two wrong steps are both found", "[odometry_breaks]") {
   CHECK(find_odometry_breaks(rounds.steps, rounds.closures).size() == 2);
 }
 
+// No true closure spans the middle of the trajectory, and a row of false closures does: two parts
+// of the environment look alike.
+TEST_CASE("A row of false closures that agree is not a wrong step", "[odometry_breaks]") {
+  const unsigned seed = GENERATE(range(1U, 11U));
+  const double apart_m = GENERATE(10.0, 70.0);
+  CAPTURE(seed, apart_m);
+  Rounds rounds(seed, 1.0, 3);
+  std::erase_if(rounds.closures, [](const PoseEdge& e) { return e.to.index > 150; });
+  const SE3 alike = make_pose(so3_exp({0.0, 0.0, 2.5}), {apart_m, 0.0, 0.0});
+  for (std::uint32_t k = 150; k < 200; k += 2) {
+    PoseEdge wrong = rounds.edge(k, k + 90, 1.0);
+    wrong.T_from_to = rounds.truth[k].inverse() * alike * rounds.truth[k + 90];
+    rounds.closures.push_back(wrong);
+  }
+  CHECK(find_odometry_breaks(rounds.steps, rounds.closures).empty());
+}
+
+TEST_CASE("A wrong step may be long if it lasts long", "[odometry_breaks]") {
+  constexpr std::size_t kStep = 149;
+  Rounds rounds(1, 1.0, 3);
+  // The robot drove on for a fifth of a round, and its odometry stood still.
+  for (std::size_t k = kStep + 1; k < rounds.truth.size(); ++k)
+    rounds.truth[k] = rounds.truth[(k + 9) % rounds.truth.size()];
+  rounds.closures.clear();
+  for (std::uint32_t k = 0; k + 60 < Rounds::kKeyframes; k += 3)
+    rounds.closures.push_back(rounds.edge(k, k + (k + 50 > kStep && k <= kStep ? 41 : 50), 1.0));
+  std::vector<double> seconds(rounds.steps.size(), 1.0);
+  CHECK(find_odometry_breaks(rounds.steps, rounds.closures, seconds).empty());
+  seconds[kStep] = 10.0;
+  const auto breaks = find_odometry_breaks(rounds.steps, rounds.closures, seconds);
+  REQUIRE(breaks.size() == 1);
+  CHECK(breaks[0].step == kStep);
+}
+
 TEST_CASE("Odometry without a wrong step has no break, however noisy it is", "[odometry_breaks]") {
   const double odometry = GENERATE(1.0, 2.0, 5.0, 10.0);
   const std::size_t wrong = GENERATE(0, 10, 60);
