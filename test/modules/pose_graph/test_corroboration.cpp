@@ -176,6 +176,52 @@ TEST_CASE("Lengths that are not finite are not counted", "[pose_graph]") {
   CHECK(histogram.size() == 2);
 }
 
+// Lengths of cycles: `share_false` of them have the size `false_size` and any spread, the others
+// are `scale` times noisier than stated.
+NoiseHistogram draw_lengths(unsigned seed, std::size_t count, double scale, double spread,
+                            double share_false, double false_size, double false_spread) {
+  std::mt19937 rng(seed);
+  std::normal_distribution<double> normal;
+  NoiseHistogram histogram;
+  for (std::size_t k = 0; k < count; ++k) {
+    const bool is_false = static_cast<double>(k) < share_false * static_cast<double>(count);
+    const double length = random_vector<6>(rng).norm();
+    const double blur = std::exp((is_false ? false_spread : spread) * normal(rng));
+    count_length(histogram, (is_false ? false_size : scale) * blur * length);
+  }
+  return histogram;
+}
+
+TEST_CASE("Cycles with false closures do not set the noise scale, however many they are",
+          "[pose_graph]") {
+  const double share_false = GENERATE(0.3, 0.74, 0.89, 0.95);
+  const double scale = GENERATE(0.5, 1.0, 3.0);
+  const double false_size = GENERATE(20.0, 60.0);
+  const double false_spread = GENERATE(0.0, 0.3, 0.6);
+  const unsigned seed = GENERATE(1U, 2U, 3U);
+  CAPTURE(share_false, scale, false_size, false_spread, seed);
+  const auto noise =
+      fit_noise(draw_lengths(seed, 300, scale, 0.0, share_false, false_size, false_spread), 3);
+  REQUIRE(noise);
+  // The scale nearest to 1 is up to sqrt(8) standard deviations from the best one, each
+  // 1 / sqrt(2 * 6 * 15).
+  CHECK(noise->scale == Approx(scale).epsilon(0.4));
+  CHECK(noise->consistent == Approx(1.0 - share_false).margin(0.1));
+}
+
+TEST_CASE("Noise whose lengths spread more than those of normal vectors is one population",
+          "[pose_graph]") {
+  const double scale = GENERATE(2.0, 4.0, 10.0);
+  const double spread = GENERATE(0.0, 0.3, 0.6);
+  const double share_false = GENERATE(0.0, 0.3);
+  const unsigned seed = GENERATE(range(1U, 6U));
+  CAPTURE(scale, spread, share_false, seed);
+  const auto noise = fit_noise(draw_lengths(seed, 300, scale, spread, share_false, 300.0, 1.0), 3);
+  REQUIRE(noise);
+  CHECK(noise->scale > 0.75 * scale);
+  CHECK(noise->scale < 2.0 * scale);
+}
+
 TEST_CASE("Near closures that agree do not stand alone", "[pose_graph]") {
   Lanes lanes(GENERATE(2, 3), 1.0, GENERATE(range(1U, 6U)));
   for (const int k : {10, 12, 15, 100, 101, 200, 205}) lanes.add_true(k, k);
