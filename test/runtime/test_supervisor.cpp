@@ -202,13 +202,6 @@ TEST_CASE("Nodes are stopped during the run without waiting for them", "[supervi
         std::vector<std::string>{"start other", "start after", "stop after", "stop other"});
 }
 
-TEST_CASE("Two nodes of one name are refused", "[supervisor]") {
-  Run run;
-  auto& [log, diary, signals, supervisor] = run;
-  supervisor.emplace<ToyNode>("camera", diary);
-  CHECK_THROWS_AS(supervisor.emplace<ToyNode>("camera", diary), std::invalid_argument);
-}
-
 TEST_CASE("The first signal ends the run in order", "[supervisor]") {
   const int signal = GENERATE(SIGINT, SIGTERM, SIGHUP);
   const auto before = std::signal(SIGHUP, SIG_DFL);  // the tests may run under nohup

@@ -26,21 +26,16 @@ class TwoStreams {
     }
     REQUIRE(fcntl(ends_[1], F_SETFL, flags) == 0);
   }
-  void start(int lines) { start(lines, ends_[1]); }
-  void start(int lines, int output) {
+  void start(int lines) {
     child_ = fork();
     if (child_ == 0) {
-      dup2(output, STDOUT_FILENO);
-      dup2(output, STDERR_FILENO);
+      dup2(ends_[1], STDOUT_FILENO);
+      dup2(ends_[1], STDERR_FILENO);
       execl(KM_BIN_DIR "/test_two_streams", "test_two_streams", std::to_string(lines).c_str(),
             nullptr);
       _exit(127);
     }
     close(ends_[1]);
-  }
-  void close_reader() {
-    close(ends_[0]);
-    ends_[0] = -1;
   }
   // The rest of the lines.
   [[nodiscard]] std::vector<std::string> read() const {

@@ -244,25 +244,5 @@ TEST_CASE("Missing relative errors are not perfect errors", "[evaluation]") {
   CHECK_THAT(text, !Catch::Contains("nan"));
 }
 
-TEST_CASE("The plot draws a shared truth once and every estimate", "[evaluation]") {
-  const Plot plot = plot_from_above(kInputs, trajectory_error(kInputs));
-  CHECK(plot.is_map);
-  REQUIRE(plot.series.size() == 3);
-  CHECK(plot.series[0].name == "truth");
-  CHECK(plot.series[0].colour == PlotSeries::kGrey);
-  CHECK_THAT(plot.series[1].name, Catch::StartsWith("alpha, position rmse "));
-  CHECK_THAT(plot.series[2].name, Catch::StartsWith("b<&>eta, position rmse "));
-  CHECK(plot.series[1].colour != plot.series[2].colour);
-  constexpr double kRounding_m = 1e-9;
-  for (const PlotSeries& series : plot.series) {
-    REQUIRE(series.points.size() == kTruePoses.size());
-    CHECK(series.points[40].y == Approx(kTruePoses[40].T.translation().y()).margin(kRounding_m));
-  }
-  // The truth before and after the estimates is left out.
-  const std::vector<StampedPose> part(kTruePoses.begin() + 40, kTruePoses.begin() + 60);
-  const std::vector<TrajectoryInput> inputs = {{"part", kTruePoses, part, {}}};
-  CHECK(plot_from_above(inputs, trajectory_error(inputs)).series[0].points.size() == part.size());
-}
-
 }  // namespace
 }  // namespace km

@@ -126,6 +126,12 @@ std::pair<JournalExtent, std::vector<JournalEntry>> read(const std::filesystem::
   return {extent, std::move(entries)};
 }
 
+std::vector<JournalPlace> places_in(const std::filesystem::path& file) {
+  std::vector<JournalPlace> places;
+  (void)read_journal(file, [&](const StoredEntry& stored) { places.push_back(stored.place); });
+  return places;
+}
+
 TEST_CASE("Every journal entry is restored exactly", "[journal]") {
   std::mt19937 rng(2);
   const KeyframeOdometry keyframe = step(4, rng);
@@ -212,9 +218,7 @@ TEST_CASE("A flipped bit costs one entry, and its place is stated", "[journal]")
   const TemporaryFolder folder;
   const std::vector<JournalEntry> run = some_run();
   const auto expected = bytes_of(run);
-  std::vector<JournalPlace> places;
-  const std::filesystem::path file = written(folder, run);
-  (void)read_journal(file, [&](const StoredEntry& stored) { places.push_back(stored.place); });
+  const std::vector<JournalPlace> places = places_in(written(folder, run));
   const std::string text = folder.read("run.journal");
   std::mt19937 rng(4);
   for (int i = 0; i < 200; ++i) {
@@ -271,9 +275,7 @@ std::vector<JournalEntry> line_run(KeyframeIndex count) {
 TEST_CASE("After damage to any one entry, the run is restored with all keyframes", "[journal]") {
   const TemporaryFolder folder;
   const std::vector<JournalEntry> entries = line_run(6);
-  std::vector<JournalPlace> places;
-  const std::filesystem::path file = written(folder, entries);
-  (void)read_journal(file, [&](const StoredEntry& stored) { places.push_back(stored.place); });
+  const std::vector<JournalPlace> places = places_in(written(folder, entries));
   const std::string text = folder.read("run.journal");
   for (std::size_t hit = 0; hit + 5 < entries.size(); ++hit) {
     CAPTURE(hit, entries[hit].index());

@@ -21,14 +21,6 @@ std::vector<Bytes> samples() {
   return all;
 }
 
-template <typename T>
-T round_trip(const T& content) {
-  const auto decoded = decode_view(encode_view(content));
-  REQUIRE(decoded);
-  REQUIRE(std::holds_alternative<T>(*decoded));
-  return std::get<T>(*decoded);
-}
-
 bool is_understood(const ViewContent& content) {
   return decode_view(encode_view(content)).has_value();
 }
@@ -36,7 +28,9 @@ bool is_understood(const ViewContent& content) {
 TEST_CASE("Texts are encoded in printable ASCII", "[view]") {
   RobotSample state;
   state.name = "a\nb\xC3\xA9";
-  CHECK(round_trip(state).name == "a?b??");
+  const auto decoded = decode_view(encode_view(state));
+  REQUIRE(decoded);
+  CHECK(std::get<RobotSample>(*decoded).name == "a?b??");
 }
 
 TEST_CASE("Truncated and extended updates are refused", "[view]") {

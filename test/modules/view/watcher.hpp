@@ -19,7 +19,7 @@ struct Watcher {
   void take(const ViewKeyframes& keyframes) {
     auto& known = keyframes.optimized ? optimized : odometry;
     for (std::size_t k = 0; k < keyframes.T_world_kf.size(); ++k) {
-      ++(keyframes.optimized ? optimized_received : odometry_received);
+      if (!keyframes.optimized) ++odometry_received;
       known[keyframes.first + static_cast<KeyframeIndex>(k)] = {keyframes.anchor,
                                                                 keyframes.T_world_kf[k]};
     }
@@ -44,7 +44,7 @@ struct Watcher {
   std::map<KeyframeIndex, Placed> odometry, optimized;
   std::map<ClosureId, ViewClosure> closures;
   std::vector<ClosureId> order;
-  std::size_t odometry_received = 0, optimized_received = 0;
+  std::size_t odometry_received = 0;
   std::vector<RobotSample> states;
   std::vector<ViewImage> images;
   TeamMesh mesh;

@@ -125,10 +125,9 @@ struct TestRobot {
 
   explicit TestRobot(std::shared_ptr<const DdsDomain> domain, RobotId id,
                      TopicKind ping_kind = TopicKind::kEvent,
-                     TopicKind addressed_kind = TopicKind::kRequest,
-                     std::uint16_t protocol = kProtocolVersion)
-      : TestRobot(std::move(domain), {id, robot_name(id), protocol, random_boot_id()}, nullptr,
-                  ping_kind, addressed_kind) {}
+                     TopicKind addressed_kind = TopicKind::kRequest)
+      : TestRobot(std::move(domain), {id, robot_name(id), kProtocolVersion, random_boot_id()},
+                  nullptr, ping_kind, addressed_kind) {}
   TestRobot(std::shared_ptr<const DdsDomain> domain, RobotId id, const MakeSeal& make_seal)
       : TestRobot(std::move(domain), {id, robot_name(id), kProtocolVersion, random_boot_id()},
                   make_seal) {}

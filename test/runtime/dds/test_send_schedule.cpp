@@ -112,22 +112,6 @@ TEST_CASE("Only the newest of a waiting state is kept, at the position of the fi
   CHECK(held.dropped == TrafficCount{});
 }
 
-TEST_CASE("A state that is replaced after it has waited takes no room from others", "[budget]") {
-  Schedule schedule({.bytes_per_s = 1000.0});
-  Entry bag = entry(kWords, 0);
-  bag.newest_wins = true;
-  bag.bytes = 1000;
-  schedule.push(bag, 0.0);
-  const auto nobody = [](const Entry&) { return std::optional<std::vector<RobotId>>(); };
-  const double late_s = Schedule::kNew_s + 1.0;
-  CHECK_FALSE(schedule.pop(late_s, nobody));
-  bag.bytes = 10;
-  schedule.push(bag, late_s);
-  for (int k = 1; k < 4; ++k) schedule.push(entry(kWords, k), late_s);
-  CHECK(schedule.size() == 4);
-  CHECK(schedule.held_back().at("t").dropped == TrafficCount{});
-}
-
 TEST_CASE("Requests that are too old to be answered are dropped", "[budget]") {
   Schedule schedule({.bytes_per_s = 100.0});
   for (int k = 0; k < 10; ++k) {

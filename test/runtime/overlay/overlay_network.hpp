@@ -144,7 +144,6 @@ class Network {
   }
   [[nodiscard]] std::vector<OverlayMessagePtr>& all_read(RobotId robot) { return read_[robot]; }
   [[nodiscard]] const std::vector<RobotIdentity>& met(RobotId robot) { return met_[robot]; }
-  [[nodiscard]] const std::vector<RobotId>& reachable(RobotId robot) { return reachable_[robot]; }
   [[nodiscard]] Overlay& at(RobotId robot) { return overlays_.at(robot); }
   /// Messages other than those of a robot on its own links.
   [[nodiscard]] std::size_t packets() const { return packets_; }
@@ -196,7 +195,6 @@ class Network {
         OverlayOutput output = overlay.take_output();
         std::ranges::move(output.delivered, std::back_inserter(read_[robot]));
         std::ranges::move(output.met, std::back_inserter(met_[robot]));
-        std::ranges::move(output.reachable, std::back_inserter(reachable_[robot]));
         std::ranges::move(output.renewed, std::back_inserter(renewed_[robot]));
         for (const OverlayPacket& packet : output.packets) {
           more = true;
@@ -226,7 +224,7 @@ class Network {
   std::set<std::pair<RobotId, RobotId>> links_, jammed_;
   std::map<RobotId, std::vector<OverlayMessagePtr>> read_;
   std::map<RobotId, std::vector<RobotIdentity>> met_;
-  std::map<RobotId, std::vector<RobotId>> reachable_, renewed_;
+  std::map<RobotId, std::vector<RobotId>> renewed_;
   std::map<RobotId, std::vector<std::string>> refusals_;
   std::function<void(OverlayMessage&)> change_;
   std::mt19937 random_{5};
