@@ -34,18 +34,6 @@ TEST_CASE("A view from a position has the direction of yaw and pitch", "[mesh_pi
   CHECK(down.project({1, 3, 0}).x() < 100.0);
 }
 
-TEST_CASE("Pixels and depths are projected back to their points", "[mesh_picture]") {
-  const auto* const name = GENERATE("top", "oblique", "-5,1,2,20,-10");
-  const PictureView view = parse_view(name, kBox, 300, 200);
-  const Eigen::Vector3d point(4, 3, 1);
-  const Eigen::Vector3d pixel = view.project(point);
-  CHECK(view.unproject(pixel.x(), pixel.y(), pixel.z()).isApprox(point));
-  const Eigen::Vector3d further = view.unproject(pixel.x(), pixel.y(), pixel.z() + 1.0);
-  CHECK((further - point).normalized().isApprox(view.ray(pixel.x(), pixel.y())));
-  CHECK(view.enlarged(3).project(point).isApprox(
-      Eigen::Vector3d(3 * pixel.x(), 3 * pixel.y(), pixel.z())));
-}
-
 TEST_CASE("Other views are refused with their text", "[mesh_picture]") {
   for (const char* text :
        {"", "up", "1,2,3", "1,2,3,4,x", "1,2,3,4,5,6", "1,,3,4,5", "nan,0,0,0,0"}) {

@@ -58,18 +58,6 @@ TEST_CASE("the states of a full team reach all robots of a line", "[overlay]") {
   CHECK(network.packets() == kMaxTeam - 1);
 }
 
-TEST_CASE("in a line of robots that have just met, a state waits once and not at each link",
-          "[overlay]") {
-  Network network(7);
-  network.link(line(6));
-  network.publish(1, kPoses);
-  network.wait(0.5 * SpreadStates::kMeeting_s);
-  CHECK(network.read(2, kPoses).size() == 1);
-  CHECK(network.read(3, kPoses).empty());
-  network.wait(0.6 * SpreadStates::kMeeting_s);
-  CHECK(network.read(6, kPoses).size() == 1);
-}
-
 TEST_CASE("a lost state is sent again when the hashes show its loss", "[overlay]") {
   Network network(5, line(4));
   network.lose(1.0);
