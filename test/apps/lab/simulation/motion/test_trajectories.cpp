@@ -192,39 +192,6 @@ TEST_CASE("Outliers do not bend a fit", "[motion]") {
   }
 }
 
-const Route kBlock{{{0, 0}, {80, 0}, {80, 50}, {0, 50}}, 6.0};
-
-// Distance of a point from the closed polyline.
-double distance_to(const Route& route, const Eigen::Vector2d& point) {
-  double best = std::numeric_limits<double>::infinity();
-  for (std::size_t k = 0; k < route.points.size(); ++k) {
-    const Eigen::Vector2d& a = route.points[k];
-    const Eigen::Vector2d edge = route.points[(k + 1) % route.points.size()] - a;
-    const double t = std::clamp((point - a).dot(edge) / edge.squaredNorm(), 0.0, 1.0);
-    best = std::min(best, (point - a - t * edge).norm());
-  }
-  return best;
-}
-
-TEST_CASE("A path follows its route and rounds its corners", "[motion]") {
-  const double radius = GENERATE(4.0, 6.0, 10.0);
-  const RoutePath path(kBlock, radius);
-  // Straights less two tangents per corner, plus a quarter circle each; smoothing shortens a
-  // little.
-  const double expected = 260.0 - 8.0 * radius + 2.0 * std::numbers::pi * radius;
-  CHECK(path.length_m() == Approx(expected).margin(1.0));
-  double farthest = 0.0, sharpest = 0.0;
-  for (double s = 0.0; s < path.length_m(); s += 0.1) {
-    farthest = std::max(farthest, distance_to(kBlock, path.at(s).position));
-    sharpest = std::max(sharpest, std::abs(path.at(s).curvature));
-  }
-  // The arc of a right angle passes the corner at (sqrt(2) - 1) r, that is r (1 - 1/sqrt(2)) from
-  // the lines.
-  CHECK(farthest == Approx(radius * (1.0 - std::sqrt(0.5))).margin(0.15));
-  CHECK(sharpest <= 1.05 / radius);  // smoothing tightens short arcs a little
-  CHECK(sharpest > 0.9 / radius);
-}
-
 // One-sided spectral density of the heights near `frequency` [cycles/m], averaged over windows.
 double density_at(double frequency, double roughness) {
   constexpr double kWindow_m = 100.0, kStep_m = 0.05;

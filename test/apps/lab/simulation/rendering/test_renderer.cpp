@@ -91,27 +91,6 @@ SE3 looking_down(double height_m) {
   return make_pose(R, {0.0, 0.0, height_m});
 }
 
-// A floor in the sun; a slab 1 m above its half with x > 0, of which the camera sees no part.
-World shaded_floor() {
-  Builder builder;
-  const MaterialId gray = builder.material(SurfaceClass::kRoad, 0.5F);
-  builder.scene.quad({-10, -10, 0}, {10, -10, 0}, {10, 10, 0}, {-10, 10, 0}, gray);
-  builder.scene.box({0.0F, -10.0F, 6.0F}, {10.0F, 10.0F, 6.1F}, gray);
-  builder.world().lighting.sun = 1.0F;
-  builder.world().lighting.ambient = 0.2F;
-  builder.world().lighting.to_sun = Eigen::Vector3f::UnitZ();
-  return builder.build();
-}
-
-TEST_CASE("A slab takes the sun away below it", "[simulation][rendering]") {
-  const World world = shaded_floor();
-  const RenderedView dark = view_of(world, forward_camera(64, 48, 60.0), looking_down(3.0));
-  // The upper half of the image is x > 0. The sun gives 0.5, the sky 0.1 at most.
-  CHECK(at(dark, 32, 40) > 0.5F);
-  CHECK(at(dark, 32, 8) < 0.1F);
-  CHECK(at(dark, 32, 8) > 0.005F);  // light from the side
-}
-
 TEST_CASE("A lamp lights by the square of its distance and casts shadows",
           "[simulation][rendering]") {
   Builder builder;
