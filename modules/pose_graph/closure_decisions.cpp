@@ -4,9 +4,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <iterator>
+#include <utility>
 #include <vector>
-
-#include "modules/pose_graph/member_solver.hpp"
 
 namespace km {
 
@@ -15,53 +14,25 @@ bool ClosureDecisions::is_rejected(const ClosureId& id) const {
   return decided != decided_.end() && !decided->second;
 }
 
-void ClosureDecisions::begin_session(bool with_team) {
+void ClosureDecisions::begin_result(std::span<const RobotId> members) {
   verdicts_.clear();
-  if (!with_team) return;
-  for (const ClosureId& id : std::exchange(provisional_, {})) decided_.erase(id);
-  noise_ = team_noise_;
   counted_.clear();
+  std::erase_if(decided_, [&](const auto& entry) {
+    return std::ranges::binary_search(members, entry.first.from.robot) &&
+           std::ranges::binary_search(members, entry.first.to.robot);
+  });
 }
 
-void ClosureDecisions::decide(std::span<const WeighedClosure> verdicts, bool provisional) {
+void ClosureDecisions::decide(std::span<const WeighedClosure> verdicts) {
   if (verdicts.empty()) return;
-  for (const auto& [id, kept] : verdicts) {
-    const auto before = decided_.find(id);
-    const bool is_new = before == decided_.end() || before->second != kept;
-    if (is_new && provisional) provisional_.insert(id);
-    decided_[id] = verdicts_[id] = kept;
-  }
+  for (const auto& [id, kept] : verdicts) decided_[id] = verdicts_[id] = kept;
   verdicts_due_ = true;
   counted_.clear();
-}
-
-void ClosureDecisions::set_noise(ClosureNoiseRecord noise, bool with_team) {
-  noise_ = std::move(noise);
-  if (with_team) team_noise_ = noise_;
-}
-
-bool ClosureDecisions::reconsider(std::span<const PoseEdge> closures, const PoseOf& pose,
-                                  double barc) {
-  bool any = false;
-  for (const PoseEdge& e : closures) {
-    const ClosureId id = e.id();
-    if (!is_rejected(id)) continue;
-    const auto from = pose(e.from), to = pose(e.to);
-    if (!from || !to || !(residual_of(e, *from, *to) <= kReconsiderLimit * barc)) continue;
-    if (++times_reconsidered_[id] > kChances) continue;
-    decided_.erase(id);
-    any = true;
-  }
-  if (!any) return false;
-  ++reconsidered_;
-  counted_.clear();
-  return true;
 }
 
 void ClosureDecisions::discard(RobotId robot) {
   const auto concerns = [&](const auto& entry) { return touches(entry.first, robot); };
   std::erase_if(decided_, concerns);
-  std::erase_if(times_reconsidered_, concerns);
   std::erase_if(verdicts_, concerns);
   counted_.clear();
 }
@@ -80,8 +51,7 @@ void ClosureDecisions::count_places(EdgeSetOffer& offer, std::span<const PoseEdg
     // Once a session has weighed closures of the pair, offered now or not, its solution places the
     // robots by the kept ones: undecided ones wait for the next session.
     const auto is_of_pair = [&](const auto& of_one) { return touches(of_one.first, offer.peer); };
-    const bool weighed = std::ranges::any_of(decided_, is_of_pair) ||
-                         std::ranges::any_of(times_reconsidered_, is_of_pair);
+    const bool weighed = std::ranges::any_of(decided_, is_of_pair);
     std::vector<PoseEdge> accepted, rejected;
     std::vector<ClosureId> kept;
     for (const PoseEdge& closure : closures) {

@@ -23,10 +23,7 @@ constexpr std::size_t kScored = 200;  // fixes that judge a hypothesis
 constexpr std::size_t kLeastKept = 5;
 constexpr double kIndependent = 10.0;  // largest number of fixes that count as independent
 constexpr double kLargestRotationSigma_rad = 0.1;
-constexpr double kSlack = 1.5;  // on bounds that a located robot has passed, so that none flickers
 constexpr double kGrowthOfMu = 1.4;  // Yang et al., RA-L 2020, Remark 5
-// A new hypothesis replaces the known frame if it keeps more fixes by this factor.
-constexpr double kNotablyMore = 1.1;
 
 struct Fixes {
   std::span<const PositionFix> fixes;
@@ -194,9 +191,8 @@ double rotation_sigma(const Fixes& f, std::span<const double> shares, bool uprig
   return 1.0 / std::sqrt(std::max(least, 0.0));
 }
 
-// `slack`: factor on the bounds below which the robot is located.
 FixPlacement judge(const Fixes& f, const SE3& T_datum_frame, std::span<const double> walk,
-                   bool upright, double slack = 1.0) {
+                   bool upright) {
   FixPlacement placement{.T_frame_datum = T_datum_frame.inverse(),
                          .kept = consistent(f, T_datum_frame, walk),
                          .state = {}};
@@ -204,16 +200,15 @@ FixPlacement judge(const Fixes& f, const SE3& T_datum_frame, std::span<const dou
   state.used = static_cast<std::uint32_t>(std::ranges::count(placement.kept, true));
   state.rejected = static_cast<std::uint32_t>(f.size()) - state.used;
   state.rotation_sigma_rad = rotation_sigma(f, shares_of(f.fixes, placement.kept), upright);
-  state.located = state.used >= kLeastKept && slack * state.used > state.rejected &&
-                  state.rotation_sigma_rad <= slack * kLargestRotationSigma_rad;
+  state.located = state.used >= kLeastKept && state.used > state.rejected &&
+                  state.rotation_sigma_rad <= kLargestRotationSigma_rad;
   return placement;
 }
 
 }  // namespace
 
 FixPlacement place_fixes(std::span<const PositionFix> fixes, std::span<const SE3> T_frame_kf,
-                         const SE3& known, const Precision& step, bool upright, bool was_located) {
-  if (fixes.empty()) return {.T_frame_datum = known, .kept = {}, .state = {}};
+                         const Precision& step, bool upright) {
   Fixes f{.fixes = fixes, .q = {}, .p = {}, .sigma_m = {}};
   std::vector<double> walk;  // variances
   for (const PositionFix& fix : fixes) {
@@ -225,14 +220,12 @@ FixPlacement place_fixes(std::span<const PositionFix> fixes, std::span<const SE3
     const double drift_m = kDrift * (f.q.back() - f.q[f.size() - 2]).norm();
     walk.push_back(std::max(1.0, steps) / step.tau + drift_m * drift_m);
   }
-  FixPlacement before = judge(f, known.inverse(), walk, upright, was_located ? kSlack : 1.0);
   FixPlacement found = judge(f, best_hypothesis(f, upright), walk, upright);
   for (int repetition = 0; repetition < 2; ++repetition) {
     const std::vector<double> w(found.kept.begin(), found.kept.end());
     found = judge(f, aligned(f, w, upright), walk, upright);
   }
-  const bool is_better = found.state.used > kNotablyMore * before.state.used;
-  return before.state.located && !is_better ? before : found;
+  return found;
 }
 
 std::vector<PoseEdge> fix_edges(std::span<const PositionFix> fixes, const std::vector<bool>& kept,

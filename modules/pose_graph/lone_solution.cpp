@@ -21,24 +21,14 @@ LoneSolution solve_alone(SessionGraph graph, TreeNewtonOptions options) {
   return {newton.poses(), state.barc, !state.failed && state.round + 1 < options.max_rounds};
 }
 
-std::vector<SE3> relaxed_start(SessionGraph graph, const std::map<KeyframeId, SE3>& known,
-                               const TreeNewtonOptions& options) {
+std::vector<SE3> relaxed_start(SessionGraph graph, const TreeNewtonOptions& options) {
   std::vector<SE3> start = graph.start;
-  const auto decided = [&](const PoseEdge& e, bool kept) {
-    const auto decision = graph.decided.find(e.id());
-    return decision != graph.decided.end() && decision->second == kept;
-  };
   std::vector<PoseEdge> closures;
-  for (std::size_t k = graph.odometry; k < graph.own.size(); ++k)
-    if (!decided(graph.own[k], false)) closures.push_back(graph.own[k]);
-  if (closures.empty()) return start;
-  for (const PoseEdge& e : std::exchange(graph.between, {})) {
-    const auto pose = known.find(e.other(graph.self));
-    if (pose == known.end() || !decided(e, true)) continue;
-    graph.public_poses[pose->first] = pose->second;
-    graph.to_absent.push_back(e);
+  for (std::size_t k = graph.odometry; k < graph.own.size(); ++k) {
+    const auto decided = graph.decided.find(graph.own[k].id());
+    if (decided == graph.decided.end() || decided->second) closures.push_back(graph.own[k]);
   }
-  graph.datum_ties.clear();
+  if (closures.empty()) return start;
   try {
     LoneSolution solution = solve_alone(std::move(graph), options);
     const bool clear = solution.converged && mostly_fit(closures, solution.poses, solution.barc);

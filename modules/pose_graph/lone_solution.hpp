@@ -1,6 +1,5 @@
 #pragma once
 
-#include <map>
 #include <vector>
 
 #include "modules/pose_graph/session_graph.hpp"
@@ -20,13 +19,10 @@ struct [[nodiscard]] LoneSolution {
 /// std::invalid_argument as TreeNewton does.
 LoneSolution solve_alone(SessionGraph graph, TreeNewtonOptions options);
 
-/// `graph.start`, moved to the solution of the edges that this robot has before a session: its own
-/// ones, and closures that earlier sessions have kept to poses in `known`. New closures inside the
-/// robot are weighed. From a start that contradicts them, the first steps of a session would lead
-/// far away, while closures between robots are weighed. The start does not move if there are no
+/// `graph.start`, moved to the solution of `graph`, which has no closures to members. From a start
+/// that contradicts the closures inside the robot, the first steps of a session would lead far
+/// away, while closures between robots are weighed. The start does not move if there are no
 /// closures inside this robot, if there is no solution, or if these do not mostly_fit() it.
-[[nodiscard]] std::vector<SE3> relaxed_start(SessionGraph graph,
-                                             const std::map<KeyframeId, SE3>& known,
-                                             const TreeNewtonOptions& options);
+[[nodiscard]] std::vector<SE3> relaxed_start(SessionGraph graph, const TreeNewtonOptions& options);
 
 }  // namespace km

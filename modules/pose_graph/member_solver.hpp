@@ -20,13 +20,6 @@ struct SolverMessage {
   std::shared_ptr<const std::vector<std::uint8_t>> bytes;
 };
 
-/// After a session with deferred closures, its deferred and rejected closures may be weighed again
-/// in the next session, at most kChances times each. Their residual must be at most
-/// kReconsiderLimit times barc. The limit exceeds barc because the solution was computed without
-/// these closures.
-inline constexpr double kReconsiderLimit = 5.0;
-inline constexpr int kChances = 2;
-
 /// Progress of the team, as this member knows it.
 struct SolverState {
   std::uint32_t round = 0;   ///< Number of complete rounds of the team.
@@ -34,10 +27,7 @@ struct SolverState {
   double gradient = 0.0;     ///< Newton: sqrt(g^T H^-1 g); rbcd: norm of the Riemannian gradient.
   double noise_scale = 1.0;  ///< Noise scale of the closures, estimated by the team.
   double barc = 0.0;  ///< Largest residual of a closure that is kept [sigma]; 0: none is rejected.
-  /// Every member has completed the round `round` - `rounds_behind`.
-  std::uint32_t rounds_behind = 1;
-  bool deferred = false;  ///< Closures that stand alone were deferred: they may be true.
-  bool held = false;      ///< Held poses fix the frame of the team.
+  bool deferred = false;  ///< Closures that stand alone were deferred: a second look is due.
   bool failed = false;    ///< The graph of the team could not be solved.
 };
 
@@ -67,7 +57,7 @@ class MemberSolver {
   [[nodiscard]] virtual SolverState state() const = 0;
   /// Present verdicts on the closures that this robot weighs; empty if the solver rejects none.
   [[nodiscard]] virtual ClosureVerdicts verdicts() const = 0;
-  /// SessionGraph::noise with the cycles that were counted in this session.
+  /// The noise of closures, as far as this robot knows it.
   [[nodiscard]] virtual ClosureNoiseRecord noise() const { return {}; }
 };
 

@@ -76,7 +76,15 @@ bool OwnGraph::add(const Closure& closure) {
   if (is_full(id)) return false;
   const RobotId peer = peer_of(id);
   const auto [known, is_new] = closures_.try_emplace(id, *edge);
-  if (peer != self_ && is_new) alignments_[peer].push_back(align_odometry(closure));
+  if (peer != self_ && (is_new || is_better(*edge, known->second))) {
+    std::vector<AlignedOdometry>& of_peer = alignments_[peer];
+    const auto at = std::ranges::lower_bound(of_peer, id, {}, &AlignedOdometry::closure);
+    const AlignedOdometry aligned = align_odometry(closure);
+    if (is_new)
+      of_peer.insert(at, aligned);
+    else
+      *at = aligned;
+  }
   if (is_new) {
     ++closures_to_[peer];
   } else {

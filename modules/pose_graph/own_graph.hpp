@@ -67,6 +67,7 @@ class OwnGraph {
   [[nodiscard]] const std::vector<PoseEdge>* newest_edges(RobotId peer) const;
 
   /// The odometry of this robot and a peer by each known closure between them, selected or not.
+  /// Ascending by closure.
   [[nodiscard]] std::span<const AlignedOdometry> alignments(RobotId peer) const;
 
   /// Estimates the noise of odometry again, from the closures inside this robot, and finds wrong

@@ -52,8 +52,8 @@ bool fits(std::span<const PoseEdge> closures, const std::vector<SE3>& poses) {
 // The cost of `edges`, of which the first `steps` are odometry and the others closures. The cost of
 // each closure is truncated.
 double truncated_cost(std::span<const PoseEdge> edges, std::size_t steps,
-                      const std::vector<SE3>& poses) {
-  const double barc = default_threshold(3);
+                      const std::vector<SE3>& poses, int dimension) {
+  const double barc = default_threshold(dimension);
   double sum = 0.0;
   for (std::size_t k = 0; k < edges.size(); ++k) {
     const double r = residual_of(edges[k], poses[edges[k].from.index], poses[edges[k].to.index]);
@@ -62,35 +62,31 @@ double truncated_cost(std::span<const PoseEdge> edges, std::size_t steps,
   return sum;
 }
 
-}  // namespace
-
-void OwnPoses::extend(const OwnGraph& graph) {
-  while (T_frame_kf_.size() < std::min<std::size_t>(restored_.size(), graph.keyframes()))
-    T_frame_kf_.push_back(restored_[T_frame_kf_.size()]);
-  if (T_frame_kf_.empty()) T_frame_kf_.push_back(graph.T_odom_first());
-  while (T_frame_kf_.size() < graph.keyframes())
-    T_frame_kf_.push_back(T_frame_kf_.back() *
-                          graph.step_to(static_cast<std::uint32_t>(T_frame_kf_.size())));
+// Adds the keyframes without a pose by odometry.
+void extend_by_odometry(const OwnGraph& graph, std::vector<SE3>& poses) {
+  if (poses.empty()) poses.push_back(graph.T_odom_first());
+  while (poses.size() < graph.keyframes())
+    poses.push_back(poses.back() * graph.step_to(static_cast<std::uint32_t>(poses.size())));
 }
 
-void OwnPoses::correct(std::span<const OdometryBreak> breaks) {
+// Moves the poses after each wrong step of odometry as a whole, such that the step is corrected.
+void correct(std::span<const OdometryBreak> breaks, std::vector<SE3>& poses) {
   for (const OdometryBreak& found : breaks) {
-    if (!corrected_.insert(found.step).second) continue;
-    covariances_.clear();
-    const SE3 T_new_old =
-        T_frame_kf_[found.step] * found.T_from_to * T_frame_kf_[found.step + 1].inverse();
-    for (std::size_t k = found.step + 1; k < T_frame_kf_.size(); ++k)
-      T_frame_kf_[k] = T_new_old * T_frame_kf_[k];
+    const SE3 T_new_old = poses[found.step] * found.T_from_to * poses[found.step + 1].inverse();
+    for (std::size_t k = found.step + 1; k < poses.size(); ++k) poses[k] = T_new_old * poses[k];
   }
 }
 
-void OwnPoses::place_runs(const OwnGraph& graph, RobotId self) {
+// Moves every later run as a whole to where most of its closures to the runs before it agree,
+// unless most of them agree with its place already. False if none has moved.
+bool place_runs(const OwnGraph& graph, RobotId self, std::vector<SE3>& poses) {
+  bool any = false;
   const std::vector<KeyframeIndex>& runs = graph.later_runs();
   for (std::size_t k = 0; k < runs.size(); ++k) {
     const KeyframeIndex begin = runs[k];
     const KeyframeIndex end = k + 1 < runs.size() ? runs[k + 1] : graph.keyframes();
     std::vector<PoseEdge> across = graph.closures_across(begin, end);
-    if (fits(across, T_frame_kf_)) continue;
+    if (fits(across, poses)) continue;
     // The runs before count as another robot, into whose frame this run moves.
     constexpr RobotId kLast = std::numeric_limits<RobotId>::max();
     const RobotId before = self == kLast ? self - 1 : self + 1;
@@ -98,52 +94,63 @@ void OwnPoses::place_runs(const OwnGraph& graph, RobotId self) {
     for (PoseEdge& e : across)
       for (KeyframeId* const id : {&e.from, &e.to}) {
         if (id->index >= begin) continue;
-        received[{before, id->index}] = T_frame_kf_[id->index];
+        received[{before, id->index}] = poses[id->index];
         id->robot = before;
       }
-    const auto moved = moved_into_frame(T_frame_kf_, self, across, received);
+    const auto moved = moved_into_frame(poses, self, across, received);
     if (!moved) continue;
-    covariances_.clear();
-    const SE3 T_new_old = (*moved)[begin] * T_frame_kf_[begin].inverse();
-    for (std::size_t i = begin; i < T_frame_kf_.size(); ++i)
-      T_frame_kf_[i] = T_new_old * T_frame_kf_[i];
+    any = true;
+    const SE3 T_new_old = (*moved)[begin] * poses[begin].inverse();
+    for (std::size_t i = begin; i < poses.size(); ++i) poses[i] = T_new_old * poses[i];
   }
+  return any;
 }
 
-// Returns the closures inside this robot that are likely true before anything is solved. If
-// odometry is noisy, these are the closures that its noise explains. Otherwise, these are the
-// closures that agree with a closure a few keyframes away.
-std::vector<PoseEdge> OwnPoses::likely_closures(const OwnGraph& graph, RobotId self,
-                                                std::span<const PoseEdge> inside) const {
+// The closures inside a robot that are likely true before anything is solved. If odometry is noisy,
+// these are the closures that its noise explains. Otherwise, these are the closures that agree with
+// a closure a few keyframes away.
+std::vector<PoseEdge> likely_closures(const OwnGraph& graph, RobotId self,
+                                      const std::vector<SE3>& poses,
+                                      std::span<const PoseEdge> inside, int dimension) {
   const std::vector<PoseEdge>& explained = graph.odometry_noise().likely;
   if (!explained.empty()) return explained;
   const std::map<RobotId, Precision> step{{self, graph.mean_step_precision()}};
-  const Corroboration::PoseOf pose = [&](const KeyframeId& id) { return T_frame_kf_[id.index]; };
+  const Corroboration::PoseOf pose = [&](const KeyframeId& id) { return poses[id.index]; };
   const std::vector<bool> isolated =
-      Corroboration(inside, pose, step, 3).isolated(default_threshold(3));
+      Corroboration(inside, pose, step, dimension).isolated(default_threshold(dimension));
   std::vector<PoseEdge> likely;
   for (std::size_t k = 0; k < inside.size(); ++k)
     if (!isolated[k]) likely.push_back(inside[k]);
   return likely;
 }
 
-void OwnPoses::improve_alone(const OwnGraph& graph, RobotId self, bool trusted) {
+}  // namespace
+
+std::vector<SE3> own_start(const OwnGraph& graph, RobotId self, bool trusted, int dimension) {
+  std::vector<SE3> poses;
+  extend_by_odometry(graph, poses);
+  correct(graph.odometry_breaks(), poses);
+  (void)place_runs(graph, self, poses);
   const std::vector<PoseEdge>* inside = graph.newest_edges(self);
-  if (inside == nullptr || inside->size() == improved_with_) return;
-  improved_with_ = inside->size();
-  covariances_.clear();
+  if (inside == nullptr) return poses;
   const std::vector<PoseEdge> all = graph.own_edges();
-  if (trusted) {
-    T_frame_kf_ = better_of_chordal(std::move(T_frame_kf_), weighed_to_start(all));
-    return;
-  }
+  if (trusted) return better_of_chordal(std::move(poses), weighed_to_start(all));
   const std::size_t steps = graph.keyframes() - 1;
   std::vector<PoseEdge> likely(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(steps));
-  for (const PoseEdge& closure : likely_closures(graph, self, *inside)) likely.push_back(closure);
-  if (likely.size() < steps + kEnoughForChordal) return;
-  std::vector<SE3> chordal = better_of_chordal(T_frame_kf_, weighed_to_start(std::move(likely)));
-  if (truncated_cost(all, steps, chordal) < truncated_cost(all, steps, T_frame_kf_))
-    T_frame_kf_ = std::move(chordal);
+  for (const PoseEdge& closure : likely_closures(graph, self, poses, *inside, dimension))
+    likely.push_back(closure);
+  if (likely.size() < steps + kEnoughForChordal) return poses;
+  std::vector<SE3> chordal = better_of_chordal(poses, weighed_to_start(std::move(likely)));
+  const bool better =
+      truncated_cost(all, steps, chordal, dimension) < truncated_cost(all, steps, poses, dimension);
+  return better ? std::move(chordal) : poses;
+}
+
+void OwnPoses::extend(const OwnGraph& graph, RobotId self) {
+  while (T_frame_kf_.size() < std::min<std::size_t>(restored_.size(), graph.keyframes()))
+    T_frame_kf_.push_back(restored_[T_frame_kf_.size()]);
+  extend_by_odometry(graph, T_frame_kf_);
+  if (place_runs(graph, self, T_frame_kf_)) covariances_.clear();
 }
 
 }  // namespace km

@@ -1,17 +1,22 @@
 #pragma once
 
-#include <cstddef>
-#include <set>
-#include <span>
 #include <utility>
 #include <vector>
 
 #include "modules/core/geometry.hpp"
 #include "modules/core/ids.hpp"
-#include "modules/pose_graph/frame_alignment.hpp"
 #include "modules/pose_graph/own_graph.hpp"
 
 namespace km {
+
+/// The start of robot `self` in a session, by its own measurements alone: odometry with its wrong
+/// steps corrected, in the frame of odometry. Every later run (OwnGraph::later_runs()) is moved to
+/// where most of its closures to the runs before it agree. The chordal initialisation replaces the
+/// poses if its cost is lower. If closures are `trusted`, all of them count. Otherwise, the
+/// initialisation contains closures that are likely true, and the cost of a closure is truncated.
+/// `dimension` 2: poses are planar. Precondition: there is a keyframe.
+[[nodiscard]] std::vector<SE3> own_start(const OwnGraph& graph, RobotId self, bool trusted,
+                                         int dimension);
 
 /// The poses of the keyframes of one robot between sessions: the poses of the last session, and
 /// odometry for later keyframes. Not thread-safe.
@@ -29,38 +34,13 @@ class OwnPoses {
   void restore(std::vector<SE3> T_frame_kf) { restored_ = std::move(T_frame_kf); }
 
   /// Adds new keyframes: restored ones with their poses, the others by odometry. Without restored
-  /// poses, the first keyframe has its odometry pose.
-  void extend(const OwnGraph& graph);
-
-  /// Moves the poses after each wrong step of odometry as a whole, such that the step is corrected.
-  /// Each step is corrected only once.
-  void correct(std::span<const OdometryBreak> breaks);
-
-  /// Moves every later run (OwnGraph::later_runs()) as a whole to where most of its closures to the
-  /// runs before it agree. A run stays if most of them agree with its place already.
-  /// Precondition: extend().
-  void place_runs(const OwnGraph& graph, RobotId self);
-
-  /// Moves keyframe 0, the origin of an absolute frame.
-  void place_first(const SE3& T_frame_first) {
-    T_frame_kf_.front() = T_frame_first;
-    covariances_.clear();
-  }
-
-  /// Improves the start of a session of this robot alone: the chordal initialisation replaces the
-  /// poses if its cost is lower. If closures are `trusted`, all of them count. Otherwise, the
-  /// initialisation contains closures that are likely true, and the cost of a closure is truncated.
-  /// Precondition: extend(). Does nothing if the number of closures is that of the last call.
-  void improve_alone(const OwnGraph& graph, RobotId self, bool trusted);
+  /// poses, the first keyframe has its odometry pose. New runs are placed as in own_start(); a run
+  /// stays if most of its closures agree with its place already.
+  void extend(const OwnGraph& graph, RobotId self);
 
  private:
-  [[nodiscard]] std::vector<PoseEdge> likely_closures(const OwnGraph& graph, RobotId self,
-                                                      std::span<const PoseEdge> inside) const;
-
   std::vector<SE3> T_frame_kf_, restored_;
   std::vector<Matrix6> covariances_;
-  std::set<std::size_t> corrected_;  // steps
-  std::size_t improved_with_ = 0;    // number of closures
 };
 
 }  // namespace km

@@ -3,7 +3,6 @@
 #include <cstddef>
 #include <map>
 #include <optional>
-#include <set>
 #include <vector>
 
 #include "modules/core/geometry.hpp"
@@ -43,11 +42,12 @@ struct SessionGraph {
   std::vector<VerticalPrior> verticals = {};  ///< Priors of own poses; empty unless `upright`.
   bool upright = false;                       ///< All members have verticals: the frame has z up.
   KeyframeId origin = {};                     ///< Covariances are relative to this keyframe.
-  /// Decisions of earlier sessions: kept or rejected. Closures without an entry are undecided.
+  /// Second look of a session: `start` is the solution without the deferred closures.
+  bool again = false;
+  /// Kept or rejected: closures to robots out of reach by an earlier session, and in a second look
+  /// all closures by the first one. Closures without an entry are undecided.
   std::map<ClosureId, bool> decided = {};
-  std::set<ClosureId> trusted = {};  ///< Closures that are never weighed; equal on both robots.
-  /// Cycles through closures that this robot counted in earlier sessions.
-  ClosureNoiseRecord noise = {};
+  ClosureNoiseRecord noise = {};  ///< In a second look the noise by the first one.
 };
 
 /// The place of a robot in the tree of a session. The edges of the tree are links, or paths over

@@ -23,8 +23,9 @@ void add_absent(const MemberPoses& poses, RobotId self, const std::vector<PoseEd
     if (graph.public_poses.contains(e.other(self))) graph.to_absent.push_back(e);
 }
 
-// Number of rounds whose poses are kept until all members are known to have completed them.
-constexpr std::size_t kRememberedRounds = 16;
+// Largest residual of a closure that a second look weighs, relative to the largest one of an
+// inlier. It exceeds 1 because the solution was computed without these closures.
+constexpr double kSecondLook = 5.0;
 
 // Limit of the messages kept before there is a solver. Senders repeat the messages beyond it.
 constexpr std::size_t kMaxEarlyMessages = 1000;
@@ -38,8 +39,7 @@ void add_public_poses(const MemberPoses& poses, std::map<KeyframeId, SE3>& publi
 }  // namespace
 
 std::optional<FrozenPart> freeze_part(const Session& session, RobotId self, const OwnGraph& graph,
-                                      std::span<const RobotId> peers,
-                                      const PublicPoses& published) {
+                                      std::span<const RobotId> peers, const PublicPoses& results) {
   const SessionPlan& plan = session.plan;
   FrozenPart part{.place = *place_in(plan, self)};
   SessionGraph& frozen = part.graph;
@@ -56,8 +56,8 @@ std::optional<FrozenPart> freeze_part(const Session& session, RobotId self, cons
     const auto* edges = graph.newest_edges(robot);
     if (edges == nullptr) continue;
     for (const PoseEdge& e : *edges) ends.insert(e.end_on(self).index);
-    const auto poses = published.find(robot);
-    if (!plan.has_member(robot) && poses != published.end() && poses->second.frame == plan.frame)
+    const auto poses = results.find(robot);
+    if (!plan.has_member(robot) && poses != results.end() && poses->second.frame == plan.frame)
       add_absent(poses->second, self, *edges, frozen);
   }
   for (const PoseEdge& e : frozen.between) ends.insert(e.end_on(self).index);
@@ -117,10 +117,10 @@ std::vector<ReliableMessage> SessionPart::advance(const PublicPoses& published, 
   worked_ = false;
   if (!stage_) {
     worked_ = enter(published);
-  } else if (*stage_ == MemberStage::kEntered && !solver_) {
+  } else if (*stage_ < MemberStage::kSolved && !solver_) {
     worked_ = gather(published);
     if (worked_) start_solver(now_s);
-  } else if (*stage_ == MemberStage::kEntered && (solver_->ready() || solver_->done())) {
+  } else if (*stage_ < MemberStage::kSolved && (solver_->ready() || solver_->done())) {
     worked_ = true;
     solve(now_s);
   }
@@ -133,7 +133,7 @@ std::vector<ReliableMessage> SessionPart::advance(const PublicPoses& published, 
 // quaternion is normalised in between. Copies of a pose on two robots that differ at all drift
 // apart: the same step of the solver moves them along different axes.
 std::vector<SinglePose> SessionPart::public_poses() const {
-  if (stage_ == MemberStage::kEntered) return entered_;
+  if (stage_ < MemberStage::kSolved) return entered_;
   std::vector<SinglePose> rounded;
   for (const KeyframeIndex keyframe : public_) rounded.push_back(SinglePose::of(poses()[keyframe]));
   return rounded;
@@ -141,14 +141,18 @@ std::vector<SinglePose> SessionPart::public_poses() const {
 
 bool SessionPart::enter(const PublicPoses& published) {
   if (!in_frame_ && !align(published)) return false;
+  round_public_poses();
+  stage_ = MemberStage::kEntered;
+  return true;
+}
+
+void SessionPart::round_public_poses() {
+  entered_.clear();
   for (const KeyframeIndex keyframe : public_) {
     SE3& T = graph_.start[keyframe];
     entered_.push_back(SinglePose::of(T));
     T = entered_.back().pose();
   }
-  committed_ = graph_.start;
-  stage_ = MemberStage::kEntered;
-  return true;
 }
 
 bool SessionPart::align(const PublicPoses& published) {
@@ -167,14 +171,9 @@ bool SessionPart::align(const PublicPoses& published) {
   }
   std::vector<PoseEdge> closures = graph_.between;
   closures.insert(closures.end(), graph_.to_absent.begin(), graph_.to_absent.end());
-  std::vector<PoseEdge> kept;
-  for (const PoseEdge& e : closures) {
-    const auto decided = graph_.decided.find(e.id());
-    if (decided == graph_.decided.end() || decided->second) kept.push_back(e);
-  }
   // A datum tie alone is enough, because several fixes agree on it; closures may all be false.
   std::optional<std::vector<SE3>> moved;
-  for (const auto* edges : {&graph_.datum_ties, &kept, &closures})
+  for (const auto* edges : {&graph_.datum_ties, &closures})
     if (!moved) moved = moved_into_frame(graph_.start, self_.robot, *edges, poses);
   if (!moved) return false;
   closures.insert(closures.end(), graph_.datum_ties.begin(), graph_.datum_ties.end());
@@ -186,35 +185,36 @@ bool SessionPart::align(const PublicPoses& published) {
 
 bool SessionPart::gather(const PublicPoses& published) {
   for (const auto& [robot, boot] : boot_of_)
-    if (robot != self_.robot && poses_of(published, robot, MemberStage::kEntered) == nullptr)
-      return false;
+    if (robot != self_.robot && poses_of(published, robot, *stage_) == nullptr) return false;
   for (const auto& [robot, boot] : boot_of_) {
     if (robot == self_.robot) continue;
-    const MemberPoses& poses = *poses_of(published, robot, MemberStage::kEntered);
+    const MemberPoses& poses = *poses_of(published, robot, *stage_);
     add_public_poses(poses, graph_.public_poses);
-    graph_.step_precision[robot] = poses.step_precision;
-    combine_decisions(poses);
+    if (!graph_.again) graph_.step_precision[robot] = poses.step_precision;
+    for (const auto& [id, kept] : poses.verdicts)
+      if (graph_.again && joins_members(id)) graph_.decided[id] = kept;
   }
-  if (closures_may_be_false_) limit_precisions(graph_);
+  if (graph_.again)
+    reopen_closures();
+  else if (closures_may_be_false_)
+    limit_precisions(graph_);
   return true;
 }
 
-// Both robots of a closure compute the same decision: rejected if either has rejected it, kept if
-// both have kept it.
-void SessionPart::combine_decisions(const MemberPoses& received) {
-  std::map<ClosureId, bool> theirs;
-  for (const WeighedClosure& closure : received.verdicts) theirs[closure.id] = closure.kept;
-  for (const PoseEdge& e : graph_.between) {
-    if (e.other(self_.robot).robot != received.sender.robot) continue;
-    const auto here = graph_.decided.find(e.id());
-    const auto there = theirs.find(e.id());
-    const bool here_rejected = here != graph_.decided.end() && !here->second;
-    const bool there_rejected = there != theirs.end() && !there->second;
-    if (here_rejected || there_rejected)
-      graph_.decided[e.id()] = false;
-    else if (here != graph_.decided.end() && there == theirs.end())
-      graph_.decided.erase(here);
-  }
+// For a closure between robots, both robots use the poses and the verdict that are sent, and so
+// decide equally.
+void SessionPart::reopen_closures() {
+  const double limit = kSecondLook * results_->state.barc;
+  const auto pose = [this](const KeyframeId& id) {
+    return id.robot == self_.robot ? graph_.start[id.index] : graph_.public_poses.at(id);
+  };
+  for (const auto* edges : {&graph_.own, &graph_.between})
+    for (const PoseEdge& e : *edges) {
+      const auto decided = graph_.decided.find(e.id());
+      if (decided != graph_.decided.end() && !decided->second &&
+          residual_of(e, pose(e.from), pose(e.to)) <= limit)
+        graph_.decided.erase(decided);
+    }
 }
 
 void SessionPart::start_solver(double now_s) {
@@ -223,7 +223,7 @@ void SessionPart::start_solver(double now_s) {
       if (!graph_.public_poses.contains(e.other(self_.robot)))
         throw std::runtime_error("a closure ends on " + to_string(e.other(self_.robot)) +
                                  ", whose pose its robot has not published");
-    solver_ = factory_(session_, std::move(graph_), place_);
+    solver_ = factory_(session_, graph_, place_);
   } catch (const std::exception& e) {
     return fail(e.what());
   }
@@ -242,31 +242,27 @@ void SessionPart::solve(double now_s) {
   for (SolverMessage& message : messages)
     if (boot_of_.contains(message.to) && message.to != self_.robot)
       to_send_.push_back(channel_.write(std::move(message), now_s));
-  remember_round();
   if (!solver_->done()) return;
-  if (solver_->state().failed) return fail("the team's equations cannot be solved");
+  const SolverState state = solver_->state();
+  if (state.failed) return fail("the team's equations cannot be solved");
+  if (state.deferred && stage_ == MemberStage::kEntered) return look_again();
   stage_ = MemberStage::kSolved;
+}
+
+void SessionPart::look_again() {
+  results_ = results_of_solver();
+  solver_.reset();
+  graph_.again = true;
+  graph_.start = results_->poses;
+  graph_.noise = results_->noise;
+  for (const auto& [id, kept] : results_->verdicts.closures) graph_.decided[id] = kept;
+  round_public_poses();
+  stage_ = MemberStage::kLooked;
 }
 
 void SessionPart::fail(const std::string& why) {
   failure_ = why;
   stage_ = MemberStage::kFailed;
-}
-
-void SessionPart::remember_round() {
-  const std::uint32_t round = solver_->state().round;
-  if (!rounds_.empty() && rounds_.back().first == round)
-    rounds_.back().second = solver_->poses();
-  else
-    rounds_.emplace_back(round, solver_->poses());
-  if (rounds_.size() > kRememberedRounds) rounds_.pop_front();
-}
-
-void SessionPart::commit(std::uint32_t round) {
-  while (!rounds_.empty() && rounds_.front().first <= round) {
-    committed_ = std::move(rounds_.front().second);
-    rounds_.pop_front();
-  }
 }
 
 bool SessionPart::receive(const ReliableMessage& message, double now_s) {
@@ -291,7 +287,6 @@ bool SessionPart::pass_to_solver(const ReliableMessage& message, double now_s) {
   if (!solver_->receive(message.sender.robot, *message.bytes)) return false;
   channel_.take(message);
   last_activity_s_ = now_s;
-  remember_round();
   return true;
 }
 
@@ -307,7 +302,6 @@ bool SessionPart::follow(const Session& session) {
   session_.cost = session.cost;
   session_.gradient = session.gradient;
   if (session.T_frame_world) session_.T_frame_world = session.T_frame_world;
-  commit(session.round);
   const bool ends = session.finished && !session_.finished;
   session_.finished |= session.finished;
   return ends;
@@ -315,40 +309,42 @@ bool SessionPart::follow(const Session& session) {
 
 void SessionPart::keep_only_results() {
   if (!solver_) return;
-  results_ = {solver_->state(), solver_->verdicts(), solver_->noise(), solver_->covariances()};
-  committed_ = solver_->poses();
+  results_ = results_of_solver();
   solver_.reset();
-  rounds_.clear();
+  graph_ = {};
 }
 
+SessionPart::Results SessionPart::results_of_solver() const {
+  return {state(), solver_->verdicts(), solver_->noise(), solver_->covariances(), solver_->poses()};
+}
+
+// Rounds are those of both looks.
 SolverState SessionPart::state() const {
-  if (results_) return results_->state;
-  return solver_ ? solver_->state() : SolverState();
+  const SolverState before = results_ ? results_->state : SolverState();
+  if (!solver_) return before;
+  SolverState state = solver_->state();
+  state.round += before.round;
+  return state;
 }
 
 ClosureNoiseRecord SessionPart::noise() const {
-  if (results_) return results_->noise;
-  return solver_ ? solver_->noise() : graph_.noise;
+  if (solver_) return solver_->noise();
+  return results_ ? results_->noise : ClosureNoiseRecord();
 }
 
 std::vector<Matrix6> SessionPart::covariances() const {
-  if (results_) return results_->covariances;
-  return solver_ ? solver_->covariances() : std::vector<Matrix6>{};
+  if (solver_) return solver_->covariances();
+  return results_ ? results_->covariances : std::vector<Matrix6>();
 }
 
 ClosureVerdicts SessionPart::verdicts() const {
-  if (results_) return results_->verdicts;
   if (solver_) return solver_->verdicts();
-  ClosureVerdicts known;
-  for (const PoseEdge& e : graph_.between)
-    if (const auto decided = graph_.decided.find(e.id()); decided != graph_.decided.end())
-      known.closures.push_back({e.id(), decided->second});
-  return known;
+  return results_ ? results_->verdicts : ClosureVerdicts();
 }
 
 const std::vector<SE3>& SessionPart::poses() const {
-  if (stage_ == MemberStage::kFailed || results_) return committed_;
-  return solver_ ? solver_->poses() : graph_.start;
+  if (solver_) return solver_->poses();
+  return results_ ? results_->poses : graph_.start;
 }
 
 }  // namespace km

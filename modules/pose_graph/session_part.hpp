@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <deque>
 #include <functional>
 #include <map>
 #include <memory>
@@ -23,8 +22,8 @@ namespace km {
 /// The contribution of a robot to a session, frozen when it joins.
 struct FrozenPart {
   /// `public_poses` has the poses of absent robots only, and `step_precision` the entry of this
-  /// robot only. The other members of the session send theirs. The agent sets `start`, in the
-  /// present frame of the robot, and `decided` and `noise`, which follow from earlier sessions.
+  /// robot only. The other members of the session send theirs. The agent sets `start`, and the
+  /// decisions on closures to absent robots.
   SessionGraph graph = {};
   TreePlace place = {};
   bool in_frame = false;  ///< `start` is already in the frame of the session.
@@ -35,12 +34,12 @@ struct FrozenPart {
 };
 
 /// The measurements of robot `self` in `session`, of which it is a member. `peers` are the robots
-/// that it knows; closures to absent ones are tied to their received poses. nullopt if `graph` does
-/// not have the edges() by which the plan of the session names the closures of a pair.
+/// that it knows; closures to absent ones are tied to their poses in `results`. nullopt if `graph`
+/// does not have the edges() by which the plan of the session names the closures of a pair.
 [[nodiscard]] std::optional<FrozenPart> freeze_part(const Session& session, RobotId self,
                                                     const OwnGraph& graph,
                                                     std::span<const RobotId> peers,
-                                                    const PublicPoses& published);
+                                                    const PublicPoses& results);
 
 /// Creates the solver of one robot for a session, which also enforces max_rounds of the session.
 using MemberSolverFactory = std::function<std::unique_ptr<MemberSolver>(
@@ -53,10 +52,10 @@ using MemberSolverFactory = std::function<std::unique_ptr<MemberSolver>(
 /// are then rounded to single precision and ready to be sent. Once the public poses of all members
 /// have arrived, its solver begins. Members exchange messages until the solver is done or fails.
 ///
-/// A session may end early at any time, and its members are then in different rounds. Each member
-/// therefore keeps the poses of the last rounds. The coordinator repeatedly sends the number of the
-/// last round that all members have completed. A member that leaves early uses committed_poses(),
-/// the poses of that round. Deterministic; not thread-safe.
+/// If the solver has deferred closures, a second look follows. All members send their poses and
+/// verdicts, and another solver begins there. It weighs the rejected and deferred closures whose
+/// residual is at most kSecondLook times the largest one of an inlier, together with all other
+/// closures of their pairs. Deterministic; not thread-safe.
 class SessionPart {
  public:
   SessionPart(Session session, TeamPeer self, FrozenPart part, MemberSolverFactory factory,
@@ -78,11 +77,9 @@ class SessionPart {
 
   /// Takes the newest message of the coordinator. True if it ends the session.
   bool follow(const Session& session);
-  /// Stores the poses of `round`, which all members have completed, as committed_poses().
-  void commit(std::uint32_t round);
-  /// Frees the solver and the poses of the last rounds, which take most of the memory of a session.
-  /// Call once all members have the solution. Afterwards this part only reports the results, and
-  /// committed_poses() is the solution. Precondition: stage() is kSolved.
+  /// Frees the solver and the graph, which take most of the memory of a session. Call once all
+  /// members have the solution. Afterwards this part only reports the results. Precondition:
+  /// stage() is kSolved.
   void keep_only_results();
 
   /// nullopt before the robot has entered the frame.
@@ -99,23 +96,20 @@ class SessionPart {
   [[nodiscard]] Session& session() { return session_; }
   [[nodiscard]] const Session& session() const { return session_; }
   [[nodiscard]] const std::vector<KeyframeIndex>& public_keyframes() const { return public_; }
-  /// The poses of public_keyframes() as other robots receive them. Those of the stage kEntered are
-  /// the poses with which the solver of this robot begins, to the last bit.
+  /// The poses of public_keyframes() as other robots receive them. Before the stage kSolved they
+  /// are the poses with which the solver of this robot begins, to the last bit.
   [[nodiscard]] std::vector<SinglePose> public_poses() const;
   [[nodiscard]] const std::vector<RobotId>& members() const { return place_.members; }
   /// State of the solver; zeros before there is one.
   [[nodiscard]] SolverState state() const;
-  /// Before there is a solver: the known decisions on closures to other members when the robot
-  /// joined. Afterwards: the verdicts of the solver on all closures that this robot weighs.
+  /// The last verdicts of a solver on all closures that this robot weighs.
   [[nodiscard]] ClosureVerdicts verdicts() const;
   [[nodiscard]] ClosureNoiseRecord noise() const;
-  /// The poses that the solver has last accepted. Before there is a solver: the start. After a
-  /// failure: committed_poses(). In the frame of the session once there is a stage.
+  /// The poses that the solver has last accepted. Before there is a solver: the start. In the
+  /// frame of the session once there is a stage.
   [[nodiscard]] const std::vector<SE3>& poses() const;
   /// Covariances of poses() once the session is solved; empty if the solver computes none.
   [[nodiscard]] std::vector<Matrix6> covariances() const;
-  /// Poses of the last round that is known to be completed by all members.
-  [[nodiscard]] const std::vector<SE3>& committed_poses() const { return committed_; }
   /// Time of the last activity or message of the session [s].
   [[nodiscard]] double last_activity_s() const { return last_activity_s_; }
   void note_activity(double now_s) { last_activity_s_ = now_s; }
@@ -127,32 +121,35 @@ class SessionPart {
 
  private:
   [[nodiscard]] bool enter(const PublicPoses& published);
+  void round_public_poses();
   [[nodiscard]] bool align(const PublicPoses& published);
   [[nodiscard]] bool gather(const PublicPoses& published);
-  void combine_decisions(const MemberPoses& received);
   void start_solver(double now_s);
+  void look_again();
+  void reopen_closures();
   [[nodiscard]] bool pass_to_solver(const ReliableMessage& message, double now_s);
   void store_early(const ReliableMessage& message);
   void solve(double now_s);
   void fail(const std::string& why);
-  void remember_round();
 
-  // Results of a solver that has been freed, except for the poses.
+  // Results of a solver that has been freed.
   struct Results {
     SolverState state;
     ClosureVerdicts verdicts;
     ClosureNoiseRecord noise;
     std::vector<Matrix6> covariances;
+    std::vector<SE3> poses;
   };
+  [[nodiscard]] Results results_of_solver() const;
 
   Session session_;
   TeamPeer self_;
-  SessionGraph graph_;  // the solver takes it over
+  SessionGraph graph_;
   TreePlace place_;
   bool in_frame_;
   bool closures_may_be_false_;
   std::vector<KeyframeIndex> public_;
-  std::vector<SinglePose> entered_;  // poses of public_, when the robot entered the frame
+  std::vector<SinglePose> entered_;  // poses of public_ with which the solver begins
   std::vector<ClosureId> between_;   // to other members, ascending
   MemberSolverFactory factory_;
   std::map<RobotId, std::uint64_t> boot_of_;  // members
@@ -162,11 +159,9 @@ class SessionPart {
   std::vector<RobotId> refused_;  // senders of early messages that the solver refused
   std::vector<ReliableMessage> to_send_;
   std::unique_ptr<MemberSolver> solver_;
-  std::optional<Results> results_;
+  std::optional<Results> results_;  // results of the first look, then of the session
   std::optional<MemberStage> stage_;
   std::string failure_;
-  std::deque<std::pair<std::uint32_t, std::vector<SE3>>> rounds_;  // poses of the last rounds
-  std::vector<SE3> committed_;
   bool worked_ = false;
   double started_s_;
   double last_activity_s_;

@@ -23,7 +23,7 @@ bool same_graph_size(const TeamStatus& a, const TeamStatus& b) {
 // All except for keyframes and revision.
 bool same_rest(const TeamStatus& a, const TeamStatus& b) {
   const auto rest = [](const TeamStatus& s) {
-    return std::tie(s.sender, s.frame, s.frame_version, s.offers, s.method, s.upright, s.datum);
+    return std::tie(s.sender, s.offers, s.method, s.upright, s.datum);
   };
   return rest(a) == rest(b) && a.T_odom_first.matrix() == b.T_odom_first.matrix();
 }

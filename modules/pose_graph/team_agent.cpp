@@ -11,16 +11,13 @@
 // team_agent_session.cpp.
 
 namespace km {
-namespace {
 
-constexpr double kPublishPeriod_s = 1.0;  // shortest, during a session
-
-}  // namespace
-
-TeamAgent::TeamAgent(const PoseGraphConfig& config, TeamPeer self, MemberSolverFactory factory)
+TeamAgent::TeamAgent(const PoseGraphConfig& config, TeamPeer self, MemberSolverFactory factory,
+                     int dimension)
     : config_(checked(config)),
       self_(self),
       factory_(std::move(factory)),
+      dimension_(dimension),
       graph_(self.robot),
       roster_(self, config_.method),
       notices_(self.robot),
@@ -75,7 +72,7 @@ void TeamAgent::restore(const TeamSolution& solution) {
   poses_.restore(own.T_world_kf);
   frame_.set_world(World{own.anchor, SE3::Identity()});
   published_anchor_ = own.anchor;
-  decisions_.decide(solution.verdicts.closures, true);
+  decisions_.decide(solution.verdicts.closures);
   for (const TeamPeer& peer : solution.peers) {
     meet(peer);
     MemberPoses held{.sender = peer, .stage = MemberStage::kSolved, .frame = frame_.frame()};
@@ -84,7 +81,9 @@ void TeamAgent::restore(const TeamSolution& solution) {
       held.keyframes.push_back(id.index);
       held.T_frame_kf.push_back(SinglePose::of(T_world_kf));
     }
-    if (!held.keyframes.empty()) roster_.take(held);
+    if (held.keyframes.empty()) continue;
+    roster_.take(held);
+    roster_.keep_result(peer.robot);
   }
 }
 
@@ -168,6 +167,8 @@ bool TeamAgent::take(const TeamPeer& sender, const MemberPoses& poses) {
   };
   const bool was_member = is_member();
   roster_.take(poses);
+  const bool of_session = in_session() && poses.session == part_->session().id;
+  if (poses.stage == MemberStage::kSolved && !of_session) roster_.keep_result(sender.robot);
   if (was_member && poses.session != part_->session().id && state_ == SessionState::kRunning)
     state_ = SessionState::kDeserted;
   if (!is_member()) return true;
@@ -191,7 +192,6 @@ TeamOutput TeamAgent::step(double now_s, std::uint64_t sent_bytes) {
   if (is_complete) {
     coordinate(output);
     advance(output);
-    reconsider();
     refine_alone();
   }
   send_status(output);
@@ -207,10 +207,8 @@ TeamStatus TeamAgent::make_status() {
     decisions_.count_places(offer, *graph_.edges(offer.peer, offer.id),
                             graph_.alignments(offer.peer));
   return {.sender = self_,
-          .frame = frame_.frame(),
-          .frame_version = frame_.version(),
           .keyframes = graph_.keyframes(),
-          .revision = revision(),
+          .revision = graph_.revision(),
           .offers = std::move(offers),
           .method = config_.method,
           .T_odom_first = graph_.T_odom_first(),
@@ -315,25 +313,17 @@ std::optional<FixesState> TeamAgent::fixes_state() const {
   return state;
 }
 
-const std::vector<SE3>& TeamAgent::poses() const {
-  return in_session() && part_->stage() ? part_->poses() : poses_.T_frame_kf();
-}
-
 void TeamAgent::publish(TeamOutput& output) {
-  const bool early = now_s_ - published_s_ < kPublishPeriod_s;
-  if (!frame_.world() || (in_session() && early)) return;
-  const auto world = tied_world();
+  const auto world = frame_.world() ? tied_world() : std::nullopt;
   if (!world || (!publish_due_ && published_anchor_ == world->anchor)) return;
   publish_due_ = false;
-  published_s_ = now_s_;
   published_anchor_ = world->anchor;
   output.progress = make_progress();
   if (!output.progress->located) return;
   Trajectory trajectory{self_.robot, world->anchor, {}};
   const SE3 T_world_frame = world->T_frame_world.inverse();
   for (const SE3& T_frame_kf : poses()) trajectory.T_world_kf.push_back(T_world_frame * T_frame_kf);
-  if (state_ == SessionState::kSolved && world->anchor == part_->session().anchor)
-    trajectory.covariances = poses_.covariances();
+  if (solution_anchor_ == world->anchor) trajectory.covariances = poses_.covariances();
   trajectory.scale_sigma = robot_in_datum() ? 0.0 : config_.scale_sigma;
   trajectory.public_poses = held_poses(T_world_frame);
   output.trajectory = std::move(trajectory);
@@ -342,7 +332,7 @@ void TeamAgent::publish(TeamOutput& output) {
 // Public poses of the other robots in the frame of this one.
 std::map<KeyframeId, SE3> TeamAgent::held_poses(const SE3& T_world_frame) const {
   std::map<KeyframeId, SE3> held;
-  for (const auto& [robot, poses] : roster_.public_poses())
+  for (const auto& [robot, poses] : roster_.results())
     for (std::size_t k = 0; k < poses.keyframes.size(); ++k)
       if (robot != self_.robot && poses.frame == frame_.frame())
         held[{robot, poses.keyframes[k]}] = T_world_frame * poses.T_frame_kf[k].pose();
@@ -388,7 +378,7 @@ OptimizerProgress TeamAgent::make_progress() const {
 bool TeamAgent::holds_all(const SessionPlan& plan) const {
   const auto self = std::find_if(plan.members.begin(), plan.members.end(),
                                  [&](const SessionMember& member) { return member.peer == self_; });
-  if (self->revision != revision() || self->datum != datum_of(self_.robot)) return false;
+  if (self->revision != graph_.revision() || self->datum != datum_of(self_.robot)) return false;
   std::optional<RobotId> last;
   for (const EdgeSetOffer& offer : graph_.offers()) {
     const bool newest = offer.peer != last;

@@ -52,17 +52,17 @@ struct [[nodiscard]] TeamOutput {
 /// Until then each robot refines its poses alone: without a message, it solves its own graph with
 /// its new closures and the poses that the other robots have last sent. A
 /// session ends early when links to a member no longer exist. Links that return at once do no
-/// harm, because messages are repeated and find other ways. The members of the interrupted
-/// session return to the last round that all have completed, and the next session begins there.
+/// harm, because messages are repeated and find other ways. The members of the interrupted session
+/// keep the result of the last one.
+///
+/// A session decides from the measurements of its members alone: no pose, verdict or estimate of an
+/// earlier session is an input. The result therefore does not depend on the order in which robots
+/// have met. Exceptions are the poses of robots out of reach, and the verdicts on closures to them.
 ///
 /// The other robots hold the last public poses of a robot that is out of reach, so that they keep
 /// their frame and its measurements. When this robot returns, it catches up. If it returns as
 /// another process, its poses are discarded; if it returns with another incarnation, closures to it
 /// are discarded, too.
-///
-/// Decisions on closures carry over from session to session; see ClosureDecisions. Both robots of a
-/// closure exchange their decisions first. Deferred closures that fit the solution become undecided
-/// again, and one more session weighs them.
 ///
 /// A robot that closures at a single place tie to the others is joined tentatively; see FrameTies.
 /// If the team rejects all closures that tie some members, the robots on each side publish their
@@ -82,8 +82,10 @@ struct [[nodiscard]] TeamOutput {
 /// equal inputs in equal order give equal outputs. Not thread-safe.
 class TeamAgent {
  public:
-  /// Throws ConfigError if `config` is out of bounds.
-  TeamAgent(const PoseGraphConfig& config, TeamPeer self, MemberSolverFactory factory);
+  /// `dimension` 2: poses and measurements are planar, as in TreeNewtonOptions. Throws ConfigError
+  /// if `config` is out of bounds.
+  TeamAgent(const PoseGraphConfig& config, TeamPeer self, MemberSolverFactory factory,
+            int dimension = 3);
 
   /// Adds own measurements and decisions on them; see OwnGraph for the ignored ones. False if
   /// nothing has changed. refused() counts invalid inputs.
@@ -93,7 +95,7 @@ class TeamAgent {
   bool add(const PositionFix& fix);
 
   /// Continues from the solution of a former process, once as many keyframes are added as it has
-  /// poses. Until the other robots return, their poses are held, and decisions are provisional.
+  /// poses. Until the other robots return, their poses are held.
   /// Call before all other inputs.
   void restore(const TeamSolution& solution);
 
@@ -121,8 +123,8 @@ class TeamAgent {
   /// bytes that this robot has sent for sessions so far, per receiver, and with forwarded messages.
   TeamOutput step(double now_s, std::uint64_t sent_bytes);
 
-  /// Present own poses in frame().
-  [[nodiscard]] const std::vector<SE3>& poses() const;
+  /// Own poses in frame(): the last result, and odometry since.
+  [[nodiscard]] const std::vector<SE3>& poses() const { return poses_.T_frame_kf(); }
   [[nodiscard]] const TeamFrame& frame() const { return frame_.frame(); }
   /// The present or last session of this robot.
   [[nodiscard]] const SessionPart* part() const { return part_ ? &*part_ : nullptr; }
@@ -159,9 +161,6 @@ class TeamAgent {
   bool take(const TeamPeer& sender, const ReliableMessage& message);
   bool refuse(const std::string& what) { return notices_.refuse(what); }
   [[nodiscard]] TeamStatus make_status();
-  [[nodiscard]] std::uint32_t revision() const {
-    return graph_.revision() + decisions_.reconsidered();
-  }
   void send_status(TeamOutput& output);
 
   // Plans and sessions that this robot coordinates.
@@ -173,6 +172,7 @@ class TeamAgent {
   [[nodiscard]] std::uint64_t price_bytes() const;
   [[nodiscard]] bool is_next_due() const;
   void open_session(TeamOutput& output);
+  [[nodiscard]] TeamFrame choose_frame(const Session& session) const;
   void announce(TeamOutput& output);
   [[nodiscard]] bool well_formed(const Session& session) const;
   [[nodiscard]] bool accepts(const Session& session) const;
@@ -181,15 +181,15 @@ class TeamAgent {
   // The session that this robot is in.
   bool join(const Session& session);
   [[nodiscard]] std::optional<FrozenPart> freeze(const Session& session) const;
-  void extend_poses();
-  void set_start(SessionGraph& graph) const;
+  void set_start(const Session& session, SessionGraph& graph);
+  [[nodiscard]] std::vector<SE3> relaxed_own_start(const Session& session, SessionGraph graph);
   [[nodiscard]] bool expects_false() const {
     return config_.robust && config_.method == PgoMethod::kNewton;
   }
   [[nodiscard]] std::size_t known_closures() const;
+  [[nodiscard]] std::size_t closures_inside() const;
   void refine_alone();
   void advance(TeamOutput& output);
-  void enter_stage(TeamOutput& output);
   void publish_poses(TeamOutput& output);
   void conclude(TeamOutput& output);
   void leave(bool with_solution);
@@ -202,9 +202,6 @@ class TeamAgent {
   [[nodiscard]] bool has_failed() const;
   void decide(const std::vector<WeighedClosure>& verdicts);
   void decide_with(const MemberPoses& poses);
-  void reconsider();
-  [[nodiscard]] std::optional<SE3> own_pose(KeyframeIndex index) const;
-  [[nodiscard]] std::optional<SE3> public_pose(const KeyframeId& id) const;
 
   // Results.
   [[nodiscard]] std::map<KeyframeId, SE3> held_poses(const SE3& T_world_frame) const;
@@ -212,8 +209,6 @@ class TeamAgent {
   [[nodiscard]] std::optional<World> tied_world() const;
   [[nodiscard]] bool is_located() const;
   [[nodiscard]] bool is_tied_to_earlier_runs() const;
-  [[nodiscard]] std::map<KeyframeId, SE3> known_poses(const TeamFrame& frame) const;
-  void place_first_by_fixes(bool upright);
   [[nodiscard]] std::uint64_t own_datum() const;
   [[nodiscard]] std::uint64_t datum_of(RobotId robot) const;
   [[nodiscard]] std::optional<RobotId> robot_in_datum() const;
@@ -227,6 +222,7 @@ class TeamAgent {
   PoseGraphConfig config_;
   TeamPeer self_;
   MemberSolverFactory factory_;
+  int dimension_;
   OwnGraph graph_;
   std::uint64_t map_id_ = 0;           // 0: the run does not begin in a finished map
   std::size_t awaited_keyframes_ = 1;  // nothing is optimised before
@@ -244,12 +240,19 @@ class TeamAgent {
 
   OwnFrame frame_;
   OwnPoses poses_;
-  FixPlacement placement_;  // in the present or last session
+  // The start of this robot in sessions of several robots, and what it follows from.
+  struct Relaxed {
+    std::uint32_t revision = 0;
+    bool upright = false;
+    std::vector<SE3> poses = {};
+  };
+  std::optional<Relaxed> relaxed_;
+  std::optional<RobotId> solution_anchor_;  // anchor of the last session with a solution
+  FixPlacement placement_;                  // in the present or last session
   ClosureDecisions decisions_;
   RefinementSchedule refinement_;
   std::optional<SessionPart> part_;
   SessionState state_ = SessionState::kNone;  // state of the session of part_
-  bool reconsider_due_ = false;               // once all members have sent the solution
   Objective objective_before_;                // in the session before
   std::uint32_t rounds_before_ = 0;           // rounds of earlier sessions
   double optimising_s_ = 0.0;                 // in earlier sessions
@@ -259,7 +262,6 @@ class TeamAgent {
   std::optional<RobotId> published_anchor_;
   double now_s_ = 0.0;
   double session_sent_s_ = -1e9;
-  double published_s_ = -1e9;
 };
 
 }  // namespace km

@@ -27,7 +27,8 @@ void TeamAgent::make_plan() {
   // If the anchor leaves while no closure ties this robot to it, it stays in another frame.
   if (frame_.world() && !plan.has_member(frame_.world()->anchor)) frame_.set_world(tied_world());
   const bool graph_changed = !same_graph(plan, plan_);
-  const std::uint64_t closures = closures_between(plan, statuses);
+  const std::uint64_t closures =
+      plan.members.size() == 1 ? closures_inside() : closures_between(plan, statuses);
   plan_ = std::move(plan);
   for (const auto& [robot, status] : statuses)
     if (const auto own = datum_of(self_.robot);
@@ -60,11 +61,9 @@ void TeamAgent::announce(TeamOutput& output) {
   session_sent_s_ = now_s_;
   if (!session.finished) {
     const SolverState state = part_->state();
-    session.round =
-        std::max(session.round, state.round - std::min(state.round, state.rounds_behind));
+    session.round = state.round;
     session.cost = state.cost;
     session.gradient = state.gradient;
-    part_->commit(session.round);
   }
   if (part_->members().size() > 1) output.messages.emplace_back(session);
 }
@@ -88,7 +87,8 @@ std::uint64_t TeamAgent::price_bytes() const {
 
 bool TeamAgent::is_next_due() const {
   if (!schedule_.is_within_budget(price_bytes(), part_->last_activity_s(), now_s_)) return false;
-  return plan_.members.size() == 1 || !same_members(part_->session().plan, plan_) ||
+  const bool costs_nothing = plan_.members.size() == 1 && closures_inside() == 0;
+  return costs_nothing || !same_members(part_->session().plan, plan_) ||
          schedule_.is_worthwhile(part_->last_activity_s(), now_s_);
 }
 
@@ -117,16 +117,31 @@ void TeamAgent::open_session(TeamOutput& output) {
   session.method = config_.method;
   session.upright = all_upright(plan_);
   session.max_rounds = static_cast<std::uint32_t>(config_.max_rounds);
+  session.plan.frame = choose_frame(session);
   session.anchor = coordinator_of(plan_);
   // `world` keeps its place when its robot is no longer a member.
   const std::optional<World>& world = frame_.world();
-  if (world && world->anchor < session.anchor && frame_.frame() == plan_.frame) {
+  if (world && world->anchor < session.anchor && frame_.frame() == session.plan.frame) {
     session.anchor = world->anchor;
     session.T_frame_world = world->T_frame_world;
   }
   if (!join(session)) return;
   schedule_.opened();
   announce(output);
+}
+
+// A session begins a new frame, so that its start does not depend on earlier sessions. It continues
+// the frame of its first member only to hold the poses of robots out of reach in it.
+TeamFrame TeamAgent::choose_frame(const Session& session) const {
+  const PublicPoses& results = roster_.results();
+  const RobotId first = session.plan.members.front().peer.robot;
+  const auto of_first = results.find(first);
+  if (first != self_.robot && of_first == results.end()) return session.id;
+  const TeamFrame& frame = first == self_.robot ? frame_.frame() : of_first->second.frame;
+  const bool holds = std::ranges::any_of(results, [&](const auto& result) {
+    return result.second.frame == frame && !session.plan.has_member(result.first);
+  });
+  return holds ? frame : session.id;
 }
 
 // The session may come from a hostile robot: checks everything on which join() relies.
@@ -189,10 +204,9 @@ void TeamAgent::consider(const Session& session) {
 std::optional<FrozenPart> TeamAgent::freeze(const Session& session) const {
   std::vector<RobotId> peers;
   for (const auto& [robot, peer] : roster_.peers()) peers.push_back(robot);
-  auto part = freeze_part(session, self_.robot, graph_, peers, roster_.public_poses());
+  auto part = freeze_part(session, self_.robot, graph_, peers, roster_.results());
   if (!part) return std::nullopt;
-  part->in_frame =
-      frame_.frame() == session.plan.frame || session.plan.members.front().peer == self_;
+  part->in_frame = session.plan.members.front().peer == self_;
   part->closures_may_be_false = expects_false();
   return part;
 }
@@ -207,42 +221,57 @@ bool TeamAgent::join(const Session& session) {
   auto part = freeze(session);
   if (!part) return false;
   if (in_session()) leave(all_solved());
-  const bool alone = session.plan.members.size() == 1;
-  decisions_.begin_session(!alone);
+  const bool continues = session.plan.frame != session.id;
+  if (continues && part->in_frame && session.plan.frame != frame_.frame()) return false;
   if (part_) {
     objective_before_ = objective();
     rounds_before_ += part_->state().round;
     optimising_s_ += part_->last_activity_s() - part_->started_s();
   }
-  extend_poses();
-  if (alone && part->graph.to_absent.empty())
-    poses_.improve_alone(graph_, self_.robot, !expects_false());
-  place_first_by_fixes(session.upright);
-  if (placement_.state.located)
-    part->graph.fixes = fix_edges(graph_.fixes(), placement_.kept, poses_.T_frame_kf());
-  set_start(part->graph);
+  poses_.extend(graph_, self_.robot);
+  set_start(session, part->graph);
   refinement_.used(known_closures());
-  if (!alone && expects_false())
-    part->graph.start =
-        relaxed_start(part->graph, known_poses(session.plan.frame), {.barc = config_.barc});
   part_.emplace(session, self_, std::move(*part), factory_, now_s_);
   if (roster_.find(session.id.coordinator.robot) != nullptr)
     roster_.at(session.id.coordinator.robot).joined = session.id.number;
   state_ = SessionState::kRunning;
-  reconsider_due_ = false;
   return true;
 }
 
-void TeamAgent::extend_poses() {
-  poses_.extend(graph_);
-  poses_.correct(graph_.odometry_breaks());
-  poses_.place_runs(graph_, self_.robot);
+// The start follows from the measurements of this robot alone. Only the place of the first member
+// in a frame that the session continues is that of the last result.
+void TeamAgent::set_start(const Session& session, SessionGraph& graph) {
+  graph.start = own_start(graph_, self_.robot, !expects_false(), dimension_);
+  // Until the fixes determine the absolute frame, keyframe 0 stays, and no fix is an edge.
+  if (!graph_.fixes().empty()) {
+    placement_ = place_fixes(graph_.fixes(), graph.start, graph_.mean_step_precision(),
+                             session.upright && graph_.verticals().size() > 1);
+    if (placement_.state.located) {
+      graph.start.front() = placement_.T_frame_datum;
+      graph.fixes = fix_edges(graph_.fixes(), placement_.kept, graph.start);
+    }
+  }
+  if (session.plan.members.size() > 1 && expects_false())
+    graph.start = relaxed_own_start(session, graph);
+  if (session.plan.frame != session.id && session.plan.members.front().peer == self_) {
+    const SE3 T_frame_start = poses_.T_frame_kf().front() * graph.start.front().inverse();
+    for (SE3& T : graph.start) T = T_frame_start * T;
+  }
+  for (const PoseEdge& e : graph.to_absent)
+    if (const auto decided = decisions_.decided().find(e.id());
+        decided != decisions_.decided().end())
+      graph.decided.insert(*decided);
 }
 
-void TeamAgent::set_start(SessionGraph& graph) const {
-  graph.start = poses_.T_frame_kf();
-  graph.decided = decisions_.decided();
-  graph.noise = decisions_.noise();
+std::vector<SE3> TeamAgent::relaxed_own_start(const Session& session, SessionGraph graph) {
+  const std::uint32_t revision = graph_.revision();
+  const bool known = graph.fixes.empty() && relaxed_ && relaxed_->revision == revision &&
+                     relaxed_->upright == session.upright;
+  if (known) return relaxed_->poses;
+  for (auto* edges : {&graph.between, &graph.to_absent, &graph.datum_ties}) edges->clear();
+  relaxed_ = {revision, session.upright,
+              relaxed_start(std::move(graph), {.dimension = dimension_, .barc = config_.barc})};
+  return relaxed_->poses;
 }
 
 // Number of closures of this robot in the newest sets of edges.
@@ -256,13 +285,18 @@ std::size_t TeamAgent::known_closures() const {
   return closures;
 }
 
+std::size_t TeamAgent::closures_inside() const {
+  const auto* inside = graph_.newest_edges(self_.robot);
+  return inside == nullptr ? 0 : inside->size();
+}
+
 // Odometry since the last session drifts, and the next session may be minutes away. The graph is
 // that of a session without the other robots, whose last poses are held. Nothing is decided: the
-// next session weighs the new closures. Fixes wait for it, because it places their frame.
+// next session weighs all closures. Fixes wait for it, because it places their frame.
 void TeamAgent::refine_alone() {
   const std::size_t closures = known_closures();
   if (!refinement_.is_due(closures, now_s_) || state_ != SessionState::kSolved ||
-      part_->members().size() == 1 || !expects_false() || !graph_.fixes().empty())
+      !expects_false() || !graph_.fixes().empty())
     return;
   Session alone;
   alone.plan.frame = frame_.frame();
@@ -272,29 +306,14 @@ void TeamAgent::refine_alone() {
   auto part = freeze(alone);
   if (!part) return;
   refinement_.began(closures, now_s_);
-  extend_poses();
-  set_start(part->graph);
-  poses_.set(relaxed_start(std::move(part->graph), {}, {.barc = config_.barc}));
+  poses_.extend(graph_, self_.robot);
+  SessionGraph& graph = part->graph;
+  graph.start = poses_.T_frame_kf();
+  graph.again = true;
+  graph.decided = decisions_.decided();
+  graph.noise = part_->noise();
+  poses_.set(relaxed_start(std::move(graph), {.dimension = dimension_, .barc = config_.barc}));
   publish_due_ = true;
-}
-
-// The poses that other robots have last sent in `frame`, if this robot is in it as well.
-std::map<KeyframeId, SE3> TeamAgent::known_poses(const TeamFrame& frame) const {
-  std::map<KeyframeId, SE3> known;
-  if (frame_.frame() != frame) return known;
-  for (const auto& [robot, poses] : roster_.public_poses())
-    for (std::size_t k = 0; poses.frame == frame && k < poses.keyframes.size(); ++k)
-      known[{robot, poses.keyframes[k]}] = poses.T_frame_kf[k].pose();
-  return known;
-}
-
-// Until the fixes determine the absolute frame, keyframe 0 stays, and no fix is an edge.
-void TeamAgent::place_first_by_fixes(bool upright) {
-  if (graph_.fixes().empty()) return;
-  placement_ = place_fixes(graph_.fixes(), poses_.T_frame_kf(), poses_.T_frame_kf().front(),
-                           graph_.mean_step_precision(), upright && graph_.verticals().size() > 1,
-                           placement_.state.located);
-  if (placement_.state.located) poses_.place_first(placement_.T_frame_datum);
 }
 
 bool TeamAgent::misses_member(const SessionPlan& plan) const {
@@ -320,30 +339,21 @@ void TeamAgent::advance(TeamOutput& output) {
   for (const RobotId sender : part_->take_refused())
     refuse("a message of robot " + std::to_string(sender) + " that is of no use");
   output.more |= part_->worked();
-  publish_due_ |= part_->worked() && part_->stage() == MemberStage::kEntered;
-  if (part_->stage() != stage) enter_stage(output);
-  if (in_session()) conclude(output);
-}
-
-void TeamAgent::enter_stage(TeamOutput& output) {
-  const Session& session = part_->session();
-  output.more = true;
-  if (part_->stage() == MemberStage::kEntered) {
-    frame_.enter(session.plan.frame);
-    plan_outdated_ = true;
+  if (part_->stage() != stage) {
+    output.more = true;
+    if (part_->stage() == MemberStage::kFailed)
+      notices_.add("session " + std::to_string(part_->session().id.number) + " of robot " +
+                   std::to_string(part_->session().id.coordinator.robot) +
+                   " cannot be solved: " + part_->failure());
+    publish_poses(output);
   }
-  if (part_->stage() == MemberStage::kFailed)
-    notices_.add("session " + std::to_string(session.id.number) + " of robot " +
-                 std::to_string(session.id.coordinator.robot) +
-                 " cannot be solved: " + part_->failure());
-  publish_poses(output);
+  if (in_session()) conclude(output);
 }
 
 void TeamAgent::publish_poses(TeamOutput& output) {
   MemberPoses message{.sender = self_, .session = part_->session().id};
   message.stage = *part_->stage();
-  message.frame = frame_.frame();
-  message.frame_version = frame_.version();
+  message.frame = part_->session().plan.frame;
   message.step_precision = graph_.mean_step_precision();
   message.keyframes = part_->public_keyframes();
   message.T_frame_kf = part_->public_poses();
@@ -359,7 +369,7 @@ void TeamAgent::publish_poses(TeamOutput& output) {
 }
 
 void TeamAgent::decide(const std::vector<WeighedClosure>& verdicts) {
-  decisions_.decide(verdicts, part_->members().size() == 1 || part_->state().held);
+  decisions_.decide(verdicts);
   plan_outdated_ = true;
 }
 
@@ -375,49 +385,9 @@ void TeamAgent::decide_with(const MemberPoses& poses) {
   decide(of_both);
 }
 
-// Deferred closures have not been weighed; a deferred closure that fits the solution may be true.
-// For a closure between robots, both robots use the poses that both have sent, and so decide
-// equally.
-void TeamAgent::reconsider() {
-  if (!reconsider_due_ || !all_solved()) return;
-  reconsider_due_ = false;
-  for (const RobotId member : part_->members()) {
-    const auto* closures = graph_.newest_edges(member);
-    if (closures == nullptr) continue;
-    const bool inside = member == self_.robot;
-    const auto pose = [&](const KeyframeId& id) {
-      return inside ? own_pose(id.index) : public_pose(id);
-    };
-    plan_outdated_ |= decisions_.reconsider(*closures, pose, part_->state().barc);
-  }
-}
-
-std::optional<SE3> TeamAgent::own_pose(KeyframeIndex index) const {
-  const std::vector<SE3>& own = poses_.T_frame_kf();
-  return index < own.size() ? std::optional(own[index]) : std::nullopt;
-}
-
-// The pose that its robot has sent.
-std::optional<SE3> TeamAgent::public_pose(const KeyframeId& id) const {
-  const MemberPoses& sent = roster_.public_poses().at(id.robot);
-  const auto at = std::ranges::lower_bound(sent.keyframes, id.index);
-  if (at == sent.keyframes.end() || *at != id.index) return std::nullopt;
-  return sent.T_frame_kf[static_cast<std::size_t>(at - sent.keyframes.begin())].pose();
-}
-
-// Ends the session or sets `world`, if the poses received from the members allow it.
+// Ends the session if the poses received from the members allow it.
 void TeamAgent::conclude(TeamOutput& output) {
   Session& session = part_->session();
-  const RobotId anchor = session.anchor;
-  const std::optional<World>& known = frame_.world();
-  if (part_->stage() == MemberStage::kEntered && (!known || known->anchor != anchor)) {
-    const bool published =
-        anchor == self_.robot || poses_of(anchor, MemberStage::kEntered) != nullptr;
-    if (session.T_frame_world)
-      frame_.set_world(World{anchor, *session.T_frame_world});
-    else if (const auto world = published ? world_of(anchor) : std::nullopt)
-      frame_.set_world(world);
-  }
   const bool coordinates = session.id.coordinator == self_;
   if (all_solved() && coordinates) {
     const SolverState state = part_->state();
@@ -425,9 +395,9 @@ void TeamAgent::conclude(TeamOutput& output) {
     session.cost = state.cost;
     session.gradient = state.gradient;
     session.finished = true;
-    if (const auto world = world_of(session.anchor)) session.T_frame_world = world->T_frame_world;
-    announce(output);
     leave(true);
+    if (frame_.world()) session.T_frame_world = frame_.world()->T_frame_world;
+    announce(output);
   } else if (has_failed()) {
     session.finished = coordinates;
     if (coordinates) announce(output);
@@ -437,29 +407,27 @@ void TeamAgent::conclude(TeamOutput& output) {
   }
 }
 
+// Without a solution of all members, the result of the last session remains.
 void TeamAgent::leave(bool with_solution) {
-  if (part_->stage()) {
-    if (with_solution)
-      poses_.set(part_->poses(), part_->covariances());
-    else
-      poses_.set(part_->committed_poses());
-  }
   state_ = with_solution ? SessionState::kSolved : SessionState::kAbandoned;
-  const Session& session = part_->session();
-  if (with_solution && session.finished && session.T_frame_world)
-    frame_.set_world(World{session.anchor, *session.T_frame_world});
-  publish_due_ = true;
   plan_outdated_ = true;
   if (!with_solution) return;
-  if (session.plan.members.size() > 1) solved_ = session.plan;
+  publish_due_ = true;
+  const Session& session = part_->session();
+  poses_.set(part_->poses(), part_->covariances());
+  frame_.enter(session.plan.frame);
+  decisions_.begin_result(part_->members());
   decide(part_->verdicts().closures);
   for (const RobotId member : part_->members())
-    if (const MemberPoses* published = poses_of(member, MemberStage::kSolved);
-        published && member != self_.robot)
-      decide_with(*published);
-  decisions_.set_noise(part_->noise(), part_->members().size() > 1);
-  notices_.closures(decisions_.noise());
-  reconsider_due_ = part_->state().deferred;
+    if (const MemberPoses* published = poses_of(member, MemberStage::kSolved)) {
+      roster_.keep_result(member);
+      if (member != self_.robot) decide_with(*published);
+    }
+  frame_.set_world(session.T_frame_world ? World{session.anchor, *session.T_frame_world}
+                                         : world_of(session.anchor));
+  solution_anchor_ = session.anchor;
+  if (session.plan.members.size() > 1) solved_ = session.plan;
+  notices_.closures(part_->noise());
   part_->keep_only_results();
 }
 

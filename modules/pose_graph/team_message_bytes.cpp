@@ -37,8 +37,6 @@ class MessageWriter {
 
  private:
   void put(const TeamStatus& m) {
-    put(m.frame);
-    out_.varint(m.frame_version);
     out_.varint(m.keyframes);
     out_.varint(m.revision);
     out_.varint(m.offers.size());
@@ -91,7 +89,6 @@ class MessageWriter {
     put(m.session);
     out_.varint(static_cast<std::uint32_t>(m.stage));
     put(m.frame);
-    out_.varint(m.frame_version);
     out_.f64(m.step_precision.kappa);
     out_.f64(m.step_precision.tau);
     out_.varint(m.keyframes.size());
@@ -182,8 +179,6 @@ class MessageReader {
   TeamStatus status() {
     TeamStatus m;
     m.sender = sender_;
-    m.frame = peer();
-    m.frame_version = u32();
     m.keyframes = u32();
     m.revision = u32();
     m.offers.resize(in_.count(kMaxOffers, kOfferBytes));
@@ -218,7 +213,7 @@ class MessageReader {
 
   SessionPlan plan() {
     SessionPlan p;
-    p.frame = peer();
+    p.frame = session_id();
     p.members.resize(in_.count(kMaxTeam, kMemberBytes));
     std::vector<RobotId> robots;
     for (SessionMember& member : p.members) {
@@ -288,8 +283,7 @@ class MessageReader {
     const std::uint32_t stage = u32();
     require(stage <= static_cast<std::uint32_t>(MemberStage::kFailed), "an unknown stage");
     m.stage = static_cast<MemberStage>(stage);
-    m.frame = peer();
-    m.frame_version = u32();
+    m.frame = session_id();
     m.step_precision = {weight(), weight()};
     m.keyframes.resize(in_.count(kMaxPublicPoses, kPoseBytes));
     std::uint64_t next = 0;

@@ -20,10 +20,6 @@
 
 namespace km {
 
-/// The frame of poses, identified by the process whose own frame it was. Robots with equal frames
-/// need no alignment to each other.
-using TeamFrame = TeamPeer;
-
 /// A rigid transform in single precision, as in messages.
 struct SinglePose {
   Eigen::Quaternionf q = Eigen::Quaternionf::Identity();
@@ -64,8 +60,6 @@ struct EdgeSetOffer {
 /// when it changes.
 struct TeamStatus {
   TeamPeer sender;
-  TeamFrame frame;                  ///< Frame of its present solution.
-  std::uint32_t frame_version = 0;  ///< Counts the changes of its frame.
   std::uint32_t keyframes = 0;
   std::uint32_t revision = 0;  ///< Increases with its keyframes and the closures inside it.
   std::vector<EdgeSetOffer> offers = {};
@@ -85,6 +79,10 @@ struct SessionId {
   auto operator<=>(const SessionId&) const = default;
 };
 
+/// The frame of poses: the session that has begun it. A later session continues it only if it holds
+/// poses of robots out of reach. Number 0: the odometry frame of the coordinator.
+using TeamFrame = SessionId;
+
 struct SessionMember {
   TeamPeer peer;
   std::uint32_t revision = 0;          ///< Revision in its status when the session was planned.
@@ -102,7 +100,7 @@ struct SessionPair {
 
 /// Members of a session, the edges that they optimise, and the order of alignment.
 struct SessionPlan {
-  TeamFrame frame;                     ///< Members in other frames are aligned to it first.
+  TeamFrame frame;                     ///< That of the first member; the others are aligned to it.
   std::vector<SessionMember> members;  ///< In order of alignment.
   std::vector<SessionPair> pairs;      ///< Ascending.
   [[nodiscard]] bool has_member(RobotId robot) const {
@@ -131,6 +129,7 @@ struct Session {
 /// How far a member is in a session.
 enum class MemberStage : std::uint8_t {
   kEntered,  ///< It is in the frame of the session, and its poses are those of the start.
+  kLooked,   ///< Its poses are a solution without the deferred closures, which are now weighed.
   kSolved,   ///< Its poses are the solution.
   kFailed,   ///< It could not complete the session, which is then over for all members.
 };
@@ -141,12 +140,10 @@ struct MemberPoses {
   SessionId session = {};
   MemberStage stage = MemberStage::kEntered;
   TeamFrame frame = {};
-  std::uint32_t frame_version = 0;  ///< As in TeamStatus: the message with the higher one is newer.
-  Precision step_precision = {};    ///< Mean weights of one step of its odometry.
+  Precision step_precision = {};              ///< Mean weights of one step of its odometry.
   std::vector<KeyframeIndex> keyframes = {};  ///< Ascending, 0 first.
   std::vector<SinglePose> T_frame_kf = {};
-  /// Verdicts on closures to other robots. Before the session: known decisions of earlier sessions.
-  /// After it: results for the closures that this robot weighs.
+  /// Verdicts of a solution on the closures to other robots that this robot weighs.
   std::vector<WeighedClosure> verdicts = {};
   /// Bytes that it has sent in this session so far, per receiver, and with forwarded messages.
   std::uint64_t sent_bytes = 0;

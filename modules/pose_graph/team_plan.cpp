@@ -55,36 +55,20 @@ std::set<RobotId> component_of(RobotId self, Partners& partners) {
   return component;
 }
 
-TeamFrame choose_frame(const std::set<RobotId>& members,
-                       const std::map<RobotId, TeamStatus>& statuses, Partners& partners) {
-  struct Support {
-    std::uint64_t robots = 0;
-    std::uint64_t edges = 0;
-  };
-  std::map<TeamFrame, Support> support;
-  for (const RobotId robot : members) {
-    Support& of_frame = support[statuses.at(robot).frame];
-    ++of_frame.robots;
-    for (const auto& [other, edges] : partners[robot]) of_frame.edges += edges;
-  }
-  const auto less = [](const auto& x, const auto& y) {
-    return std::tie(x.second.robots, x.second.edges) < std::tie(y.second.robots, y.second.edges);
-  };
-  return std::max_element(support.begin(), support.end(), less)->first;
-}
-
 void place_members(SessionPlan& plan, std::set<RobotId> waiting,
                    const std::map<RobotId, TeamStatus>& statuses, Partners& partners) {
-  std::map<RobotId, std::uint64_t> to_placed;  // edges to the robots that are placed
+  // Edges to the robots that are placed; for the first robot those to all others.
+  std::map<RobotId, std::uint64_t> to_placed;
+  for (const auto& [robot, others] : partners)
+    for (const auto& [other, edges] : others) to_placed[robot] += edges;
   const auto place = [&](RobotId robot) {
     const TeamStatus& status = statuses.at(robot);
     plan.members.push_back(
         {.peer = status.sender, .revision = status.revision, .datum = status.datum});
+    if (plan.members.size() == 1) to_placed.clear();
     for (const auto& [other, edges] : partners[robot]) to_placed[other] += edges;
     waiting.erase(robot);
   };
-  for (const auto& [robot, status] : statuses)
-    if (waiting.contains(robot) && status.frame == plan.frame) place(robot);
   while (!waiting.empty()) {
     const auto fewer = [&](RobotId x, RobotId y) { return to_placed[x] < to_placed[y]; };
     place(*std::max_element(waiting.begin(), waiting.end(), fewer));
@@ -120,7 +104,7 @@ SessionPlan plan_session(const std::map<RobotId, TeamStatus>& statuses, RobotId 
   const Agreements agreements = find_agreements(statuses);
   Partners partners = partners_of(agreements);
   const std::set<RobotId> members = component_of(self, partners);
-  SessionPlan plan{choose_frame(members, statuses, partners), {}, {}};
+  SessionPlan plan;
   for (const auto& [pair, offer] : agreements)
     if (members.contains(pair.first)) plan.pairs.push_back({pair.first, pair.second, offer.id});
   place_members(plan, members, statuses, partners);

@@ -15,14 +15,13 @@ namespace km {
 /// The newest edge set that robots a and b both offer; nullopt if there is none.
 [[nodiscard]] std::optional<EdgeSetOffer> agreed_edges(const TeamStatus& a, const TeamStatus& b);
 
-/// Plan of the session of robot `self` without its tree, from the latest status of every robot
-/// within reach (including its own, keyed by robot). The members are the connected component over
-/// agreed edge sets. Robots with equal knowledge compute equal plans; the member with the lowest id
-/// coordinates the session.
+/// Plan of the session of robot `self` without its frame and its tree, from the latest status of
+/// every robot within reach (including its own, keyed by robot). The members are the connected
+/// component over agreed edge sets. Robots with equal knowledge compute equal plans; the member
+/// with the lowest id coordinates the session.
 ///
-/// The frame is the present frame of most members (ties: most edges to other members, then the
-/// lowest robot). Robots that are in this frame come first in the order of alignment. The next
-/// robot is always the one with the most edges to the robots before it.
+/// The order of alignment begins with the robot with the most edges. The next robot is always the
+/// one with the most edges to the robots before it.
 ///
 /// Throws std::invalid_argument if there is no status of `self`.
 [[nodiscard]] SessionPlan plan_session(const std::map<RobotId, TeamStatus>& statuses, RobotId self);

@@ -36,6 +36,7 @@ TeamRoster::Meeting TeamRoster::meet(const TeamPeer& peer) {
   const std::uint64_t before = entry->second.boot;
   if (before == peer.boot) return Meeting::kKnown;
   public_poses_.erase(peer.robot);
+  results_.erase(peer.robot);
   entry->second = Peer{.boot = peer.boot};
   return is_same_incarnation(before, peer.boot) ? Meeting::kOtherProcess
                                                 : Meeting::kOtherIncarnation;
@@ -67,10 +68,7 @@ std::map<RobotId, TeamStatus> TeamRoster::statuses(TeamStatus own) const {
   statuses.emplace(self_.robot, std::move(own));
   for (const auto& [robot, peer] : peers_) {
     if (!peer.status || peer.other_method || !in_reach(peer.status->sender)) continue;
-    TeamStatus& status = statuses.emplace(robot, *peer.status).first->second;
-    const auto poses = public_poses_.find(robot);
-    if (poses != public_poses_.end() && poses->second.frame_version > status.frame_version)
-      status.frame = poses->second.frame;
+    statuses.emplace(robot, *peer.status);
   }
   return statuses;
 }
@@ -78,14 +76,13 @@ std::map<RobotId, TeamStatus> TeamRoster::statuses(TeamStatus own) const {
 void OwnFrame::enter(const TeamFrame& frame) {
   if (frame_ == frame) return;
   frame_ = frame;
-  ++version_;
   world_.reset();
 }
 
 std::optional<World> OwnFrame::world_of(RobotId anchor, const TeamRoster& roster,
                                         const SE3& T_odom_first, bool upright) const {
-  const auto poses = roster.public_poses().find(anchor);
-  if (poses == roster.public_poses().end() || poses->second.frame != frame_) return std::nullopt;
+  const auto poses = roster.results().find(anchor);
+  if (poses == roster.results().end() || poses->second.frame != frame_) return std::nullopt;
   const TeamRoster::Peer* peer = roster.find(anchor);
   const bool own = anchor == self_.robot;
   if (!own && (peer == nullptr || !peer->status)) return std::nullopt;

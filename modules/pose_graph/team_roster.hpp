@@ -46,6 +46,8 @@ class TeamRoster {
   void take(const TeamStatus& status);
   void take(const Session& session);
   void take(const MemberPoses& poses) { public_poses_[poses.sender.robot] = poses; }
+  /// The newest public poses of a robot are the result of a session.
+  void keep_result(RobotId robot) { results_[robot] = public_poses_.at(robot); }
 
   /// Adopts the robots that `links` connect to this one.
   void connect(const TeamLinks& links) { component_ = links.component(self_.robot); }
@@ -59,10 +61,11 @@ class TeamRoster {
   [[nodiscard]] Peer& at(RobotId robot) { return peers_.at(robot); }
   /// The newest public poses of each robot, those of this robot included.
   [[nodiscard]] const PublicPoses& public_poses() const { return public_poses_; }
+  /// The poses of each robot by the last session that it has completed, as far as they are known.
+  [[nodiscard]] const PublicPoses& results() const { return results_; }
 
   /// The statuses from which sessions are planned: `own`, and those of robots in reach with the
-  /// same method. Poses are sent at once, but statuses only periodically. The frame of a robot is
-  /// that of the newer of these two messages.
+  /// same method.
   [[nodiscard]] std::map<RobotId, TeamStatus> statuses(TeamStatus own) const;
 
  private:
@@ -70,6 +73,7 @@ class TeamRoster {
   PgoMethod method_;
   std::map<RobotId, Peer> peers_;
   PublicPoses public_poses_;
+  PublicPoses results_;
   std::set<RobotId> component_;
 };
 
@@ -83,11 +87,9 @@ struct World {
 /// The frame of the present solution of one robot, and `world` in it. Not thread-safe.
 class OwnFrame {
  public:
-  explicit OwnFrame(TeamPeer self) : self_(self), frame_(self) {}
+  explicit OwnFrame(TeamPeer self) : self_(self), frame_{.coordinator = self} {}
 
   [[nodiscard]] const TeamFrame& frame() const { return frame_; }
-  /// Counts the changes of the frame.
-  [[nodiscard]] std::uint32_t version() const { return version_; }
   /// nullopt before `world` is known in this frame.
   [[nodiscard]] const std::optional<World>& world() const { return world_; }
 
@@ -107,7 +109,6 @@ class OwnFrame {
  private:
   TeamPeer self_;
   TeamFrame frame_;
-  std::uint32_t version_ = 0;
   std::optional<World> world_;
 };
 

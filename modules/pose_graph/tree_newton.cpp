@@ -75,7 +75,7 @@ TreeNewton::TreeNewton(SessionGraph graph, TreePlace place, const TreeNewtonOpti
     known_.push_back({.edge = e});
   }
   classify();
-  if (!place_.parent) root_.emplace(place_.members, options_, graph_.upright);
+  if (!place_.parent) root_.emplace(place_.members, options_, graph_.upright, graph_.again);
 }
 
 const SE3& TreeNewton::start_of(const KeyframeId& id) const {
@@ -91,11 +91,9 @@ void TreeNewton::classify() {
   if (!options_.robust) return;
   for (const auto& [peer, closures] : by_peer()) {
     const bool any_new = std::any_of(closures.begin(), closures.end(), [&](std::size_t k) {
-      const ClosureId id = known_[k].edge.id();
-      return !graph_.decided.contains(id) && !graph_.trusted.contains(id);
+      return !graph_.decided.contains(known_[k].edge.id());
     });
     for (const std::size_t k : closures) {
-      if (graph_.trusted.contains(known_[k].edge.id())) continue;
       const auto decided = graph_.decided.find(known_[k].edge.id());
       if (decided != graph_.decided.end() && !decided->second)
         known_[k].trust = Trust::kRejected;
@@ -309,6 +307,8 @@ UpMessage TreeNewton::first_message() {
   sums.fixed = static_cast<std::uint32_t>(graph_.to_absent.size());
   count_closures(sums);
   if (!options_.robust || round_ > 0) return message;
+  sums.lengths = graph_.noise.lengths;
+  if (graph_.again) return message;
   const std::size_t most =
       place_.members.size() < kEnoughToOutvote ? kEnoughLengths : kShareOfLengths;
   const std::vector<SE3> odometry = odometry_poses();
@@ -316,12 +316,7 @@ UpMessage TreeNewton::first_message() {
     const Corroboration::PoseOf pose = pose_before_closures(peer, odometry);
     std::vector<PoseEdge> closures;
     for (const std::size_t k : indices)
-      if (known_[k].trust == Trust::kOpen && reports(known_[k]) &&
-          !graph_.decided.contains(known_[k].edge.id()))
-        closures.push_back(known_[k].edge);
-    // Counts only cycles of closures that no session has decided, so each cycle is counted in one
-    // session. Decided closures have changed the poses, so their cycles would show too little
-    // noise.
+      if (known_[k].trust == Trust::kOpen && reports(known_[k])) closures.push_back(known_[k].edge);
     Corroboration(closures, pose, graph_.step_precision, options_.dimension)
         .count_lengths(graph_.noise.lengths, most);
   }
@@ -540,7 +535,6 @@ std::vector<SolverMessage> TreeNewton::go_down(const DownMessage& message) {
             .noise_scale = v.noise_scale,
             .barc = options_.robust ? v.barc : 0.0,
             .deferred = deferred,
-            .held = !v.free,
             .failed = state_.failed};
   if (!done()) phase_ = Phase::kUp;
   ++round_;
@@ -587,7 +581,7 @@ ClosureVerdicts TreeNewton::verdicts() const {
   ClosureVerdicts verdicts;
   if (!options_.robust || verdict_.weighing != Weighing::kDecided) return verdicts;
   for (const Known& k : known_) {
-    if (k.odometry || graph_.trusted.contains(k.edge.id())) continue;
+    if (k.odometry) continue;
     const bool reported = takes_part(k) ? k.own : reports(k);
     if (reported) verdicts.closures.push_back({k.edge.id(), takes_part(k) && k.weight > 0.5});
   }

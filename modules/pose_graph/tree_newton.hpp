@@ -32,10 +32,10 @@ namespace km {
 /// Every closure has a weight: graduated non-convexity with truncated least squares (Yang et al.,
 /// RA-L 2020) sets the weights between two steps. The result is the plain optimum of the closures
 /// that are kept. The team estimates the largest admissible residual from closures near each other
-/// (see Corroboration). If most of these agree, closures that stand alone are deferred at first.
-/// Decisions of earlier sessions persist. A pair of robots with new closures weighs its closures
-/// again, except for the rejected ones. A closure to a held pose is left out if an earlier session
-/// has rejected it, and otherwise has weight 1.
+/// (see Corroboration). If most of these agree, closures that stand alone are deferred at first. In
+/// a second look (SessionGraph::again), a pair with undecided closures weighs its closures again,
+/// except for the rejected ones. A closure to a held pose is left out if an earlier session has
+/// rejected it, and otherwise has weight 1.
 ///
 /// If closures inside a robot mostly_fit() its start, the start decides them. The second
 /// derivatives of the robot then change with the weights of fewer edges. The team weighs such a
@@ -66,7 +66,7 @@ class TreeNewton final : public MemberSolver {
 
  private:
   enum class Phase { kUp, kDown, kDone };
-  /// kFixed: not weighed. kOpen: may be rejected. kRejected: by an earlier session.
+  /// kFixed: not weighed. kOpen: may be rejected. kRejected: by the first look.
   enum class Trust { kFixed, kOpen, kRejected };
   /// An edge that this robot knows. The other robot of the edge may be the one that weighs it.
   struct Known {

@@ -35,10 +35,10 @@ void TreeNewton::weigh_by_noise() {
     const Corroboration::PoseOf pose = pose_before_closures(peer, odometry);
     std::vector<PoseEdge> closures;
     for (const std::size_t k : indices)
-      if (known_[k].trust == Trust::kOpen && !graph_.decided.contains(known_[k].edge.id()))
-        closures.push_back(known_[k].edge);
+      if (known_[k].trust == Trust::kOpen) closures.push_back(known_[k].edge);
     PairCycles& cycles = graph_.noise.pairs[peer];
-    Corroboration(closures, pose, graph_.step_precision, options_.dimension).count_cycles(cycles);
+    if (!graph_.again)  // the poses now fit the closures that the first look has kept
+      Corroboration(closures, pose, graph_.step_precision, options_.dimension).count_cycles(cycles);
     cycles.factor = estimate_closure_noise(cycles, verdict_.noise_scale) / verdict_.noise_scale;
     weaken(indices, cycles.factor);
   }

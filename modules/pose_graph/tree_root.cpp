@@ -161,11 +161,12 @@ DownMessage TreeRoot::decide_start(const TreeSums& sums, std::uint32_t round) {
   if (noise) noise_scale_ = noise->scale;
   const double margin = noise_scale_ < 1.0 ? std::min(1.0, kMargin * noise_scale_) : noise_scale_;
   barc_ = options_.barc > 0.0 ? options_.barc : margin * default_threshold(options_.dimension);
-  may_defer_ = noise && noise->consistent >= kMostlyConsistent && sums.open > kFewOpen;
+  may_defer_ = !again_ && noise && noise->consistent >= kMostlyConsistent && sums.open > kFewOpen;
   alone_ = options_.robust && members_.size() > 1 && sums.open > 0;
   DownMessage message = may_defer_ || alone_ ? answer(Next::kCount) : start(false, sums);
   if (message.verdict.next == Next::kCount) message.verdict.deferred = may_defer_;
-  if (options_.robust && free_ && sums.open > 0) message.verdict.moves = moves_of(sums.votes);
+  if (options_.robust && free_ && !again_ && sums.open > 0)
+    message.verdict.moves = moves_of(sums.votes);
   return message;
 }
 

@@ -27,9 +27,10 @@ struct TreeNewtonOptions {
 /// which solves the equations of the whole team. Not thread-safe.
 class TreeRoot {
  public:
-  /// `members`: of the session, ascending.
-  TreeRoot(std::vector<RobotId> members, const TreeNewtonOptions& options, bool upright)
-      : members_(std::move(members)), options_(options), upright_(upright) {}
+  /// `members`: of the session, ascending. `again`: see SessionGraph.
+  TreeRoot(std::vector<RobotId> members, const TreeNewtonOptions& options, bool upright,
+           bool again = false)
+      : members_(std::move(members)), options_(options), upright_(upright), again_(again) {}
 
   /// Decides, before there are equations, when the team starts and with which closures.
   [[nodiscard]] DownMessage decide_start(const TreeSums& sums, std::uint32_t round);
@@ -57,6 +58,7 @@ class TreeRoot {
   std::vector<RobotId> members_;
   TreeNewtonOptions options_;
   bool upright_;
+  bool again_;
   RobustSchedule schedule_;
   std::optional<TreeSums> first_;  // sums before any closure was deferred or decided
   bool alone_ = false;             // robots have decided the closures inside them

@@ -274,7 +274,6 @@ void MemberRbcd::adopt(const Progress& progress) {
   const auto& [round, total] = progress.at;
   poses_ = round == 0 ? graph_.start : round_to_poses(history_.at(round), progress.anchor);
   state_.round = round;
-  state_.rounds_behind = kMaxAhead;
   state_.cost = total.cost;
   state_.gradient = total.gradient;
   done_ = progress.stop;

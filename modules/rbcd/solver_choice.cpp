@@ -17,14 +17,15 @@ TreeNewtonOptions newton_options(const PoseGraphConfig& config) {
   return options;
 }
 
-MemberSolverFactory solver_choice(const PoseGraphConfig& config) {
-  return [config](const Session& session, SessionGraph graph,
-                  TreePlace place) -> std::unique_ptr<MemberSolver> {
+MemberSolverFactory solver_choice(const PoseGraphConfig& config, int dimension) {
+  return [config, dimension](const Session& session, SessionGraph graph,
+                             TreePlace place) -> std::unique_ptr<MemberSolver> {
     if (session.method == PgoMethod::kRbcd) {
       return std::make_unique<MemberRbcd>(std::move(graph), place,
                                           RbcdOptions{.max_rounds = session.max_rounds});
     }
     TreeNewtonOptions options = newton_options(config);
+    options.dimension = dimension;
     if (session.max_rounds > 0) options.max_rounds = session.max_rounds;
     return std::make_unique<TreeNewton>(std::move(graph), std::move(place), options);
   };

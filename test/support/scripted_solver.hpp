@@ -14,7 +14,7 @@
 namespace km {
 
 /// A solver of a session for tests of the layers below. It reaches the optimum of the closures that
-/// earlier sessions have not rejected. The test decides which closures it rejects, what it reports,
+/// the first look has not rejected. The test decides which closures it rejects, what it reports,
 /// and whether it fails.
 class ScriptedSolver final : public MemberSolver {
  public:
@@ -25,7 +25,6 @@ class ScriptedSolver final : public MemberSolver {
     std::set<ClosureId> rejects = {};
     double barc = 0.0;  ///< Fields of the reported SolverState.
     bool deferred = false;
-    bool held = false;
   };
 
   ScriptedSolver(SessionGraph graph, TreePlace place, Options options)
@@ -59,7 +58,6 @@ class ScriptedSolver final : public MemberSolver {
     SolverState state = solver_->state();
     state.barc = options_.barc;
     state.deferred = options_.deferred;
-    state.held = options_.held;
     state.failed = failed_;
     return state;
   }

@@ -110,7 +110,7 @@ MemberPoses many_poses(std::uint32_t number) {
 
 Session large_session(std::uint32_t number) {
   Session session{.id = {made_up(number), number + 1}, .plan = {}};
-  session.plan.frame = session.id.coordinator;
+  session.plan.frame = session.id;
   for (RobotId robot = 1000; robot < 1000 + kMaxTeam; ++robot)
     session.plan.members.push_back({{robot, 1}, 1, {}});
   return session;
@@ -144,7 +144,7 @@ std::vector<Flood> all_floods() {
        kLowFlooder},
       {"team statuses",
        [](FloodPeer& from, std::uint32_t i) {
-         forward(from, TeamStatus{.sender = made_up(i), .frame = made_up(i)}, i);
+         forward(from, TeamStatus{.sender = made_up(i)}, i);
        }},
       {"links",
        [](FloodPeer& from, std::uint32_t i) {
@@ -220,8 +220,8 @@ class Scene {
     friend_.requests.to_peers().publish(
         {kVictim, std::make_shared<const KeyframeRequest>(
                       KeyframeRequest{kFriend, number, {kVictim, 0}, 0})});
-    OverlayMessage status = overlay_message(
-        TeamStatus{.sender = friend_.self(), .frame = friend_.self(), .keyframes = number});
+    OverlayMessage status =
+        overlay_message(TeamStatus{.sender = friend_.self(), .keyframes = number});
     status.number = number;
     friend_.send(kVictim, std::move(status));
   }

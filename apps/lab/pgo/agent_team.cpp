@@ -1,12 +1,15 @@
 #include "apps/lab/pgo/agent_team.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 #include <map>
 #include <memory>
 #include <optional>
+#include <random>
 #include <set>
 #include <stdexcept>
+#include <tuple>
 #include <utility>
 
 #include "modules/outlier_rejection/witnessed_pair.hpp"
@@ -21,6 +24,8 @@ namespace {
 
 constexpr double kTick_s = 0.05;  // period of TeamNode
 constexpr double kDelay_s = 1e-3;
+constexpr double kLatestMeeting_s = 20.0;  // with random times
+constexpr double kMeanDelay_s = 0.03;      // with random times
 // Most bytes with which the network states kind, number and receiver of a message of its sender.
 constexpr std::size_t kMessageHead = 8;
 // Longest wait for the next session, beyond PoseGraphConfig::session_wait_s. A team without a
@@ -28,9 +33,9 @@ constexpr std::size_t kMessageHead = 8;
 constexpr double kMargin_s = 5.0;
 
 // An edge in the robots' own numbering of poses.
-RelativePose relative_pose(const TeamGraph& graph, const BlockEdge& e) {
+RelativePose relative_pose(const TeamGraph& graph, const BlockEdge& e, int dimension) {
   return {graph.keyframe_of(e.i), graph.keyframe_of(e.j), e.T_i_j,
-          covariance_in({e.kappa, e.tau}, graph.dimension)};
+          covariance_in({e.kappa, e.tau}, dimension)};
 }
 
 bool inside_a_robot(const TeamGraph& graph, const BlockEdge& e) {
@@ -39,12 +44,13 @@ bool inside_a_robot(const TeamGraph& graph, const BlockEdge& e) {
 
 // The steps of odometry of each robot; [k][i] is robot k's step from keyframe i to i + 1. Throws
 // std::invalid_argument if a robot's odometry is interrupted.
-std::vector<std::vector<RelativePose>> team_odometry(const TeamGraph& graph) {
+std::vector<std::vector<RelativePose>> team_odometry(const TeamGraph& graph, int dimension) {
   const std::vector<bool> odometry = odometry_edges(graph);
   std::vector<std::vector<RelativePose>> steps(graph.robots());
   for (std::size_t k = 0; k < odometry.size(); ++k)
     if (odometry[k] && inside_a_robot(graph, graph.edges[k]))
-      steps[graph.robot_of(graph.edges[k].i)].push_back(relative_pose(graph, graph.edges[k]));
+      steps[graph.robot_of(graph.edges[k].i)].push_back(
+          relative_pose(graph, graph.edges[k], dimension));
   for (std::size_t robot = 0; robot < graph.robots(); ++robot) {
     std::ranges::sort(steps[robot], {}, [](const RelativePose& step) { return step.from; });
     std::size_t chained = 0;
@@ -58,6 +64,13 @@ std::vector<std::vector<RelativePose>> team_odometry(const TeamGraph& graph) {
 
 using RobotPair = std::pair<RobotId, RobotId>;
 
+// The state of keyframe 0 in which its measured vertical is up.
+SE3 upright_pose(const Eigen::Vector3d& up) {
+  return make_pose(
+      Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ()).toRotationMatrix(),
+      Eigen::Vector3d::Zero());
+}
+
 // A closure, and the time at which both of its ends have been played.
 struct PlayedClosure {
   double at_s = 0.0;
@@ -67,8 +80,12 @@ struct PlayedClosure {
 // Decides whether a pair of robots is joined, as PcmNode does.
 class PlayedPair {
  public:
-  PlayedPair(const RobotPair& pair, const PcmConfig& config)
-      : pair_(pair), wait_s_(config.witness_wait_s), closures_(pair.first, pair.second, config) {}
+  // The robots meet at `met_s`.
+  PlayedPair(const RobotPair& pair, const PcmConfig& config, double met_s)
+      : pair_(pair),
+        wait_s_(config.witness_wait_s),
+        met_s_(met_s),
+        closures_(pair.first, pair.second, config) {}
 
   void add(const Closure& closure, double now_s) {
     const PcmAddResult result = closures_.add(closure);
@@ -78,7 +95,8 @@ class PlayedPair {
   // The inlier set, if it has changed and its closures count.
   std::optional<InlierSet> take(double now_s) {
     const bool inside = pair_.first == pair_.second;
-    if (!changed_ || !(inside || closures_.is_witnessed() || now_s - *since_s_ >= wait_s_))
+    if (!changed_ || now_s < met_s_ ||
+        !(inside || closures_.is_witnessed() || now_s - *since_s_ >= wait_s_))
       return std::nullopt;
     changed_ = false;
     return InlierSet{pair_.first, pair_.second, ++version_, closures_.closures()};
@@ -88,6 +106,7 @@ class PlayedPair {
  private:
   RobotPair pair_;
   double wait_s_;
+  double met_s_;
   WitnessedPair closures_;
   std::optional<double> since_s_;
   bool changed_ = false;
@@ -97,21 +116,31 @@ class PlayedPair {
 class AgentTeam {
  public:
   AgentTeam(const TeamGraph& graph, const AgentTeamOptions& options)
-      : graph_(graph), options_(options), odometry_(team_odometry(graph)) {
+      : graph_(graph), options_(options), odometry_(team_odometry(graph, 3)), rng_(options.seed) {
+    for (std::size_t k = 0; k < graph.robots(); ++k)
+      starts_s_.push_back(random_s(kLatestMeeting_s));
+    for (const VerticalPrior& prior : graph.verticals)
+      verticals_[graph.keyframe_of(prior.pose)] = {prior.up, 1.0 / std::sqrt(prior.weight)};
     for (const TeamClosure& measured : team_closures(graph)) {
       const Closure& closure = measured.closure;
       const auto later = std::max(closure.from.id.index, closure.to.id.index);
-      closures_.push_back({played_s(later), closure});
+      const double started_s =
+          std::max(starts_s_[closure.from.id.robot], starts_s_[closure.to.id.robot]);
+      closures_.push_back({started_s + played_s(later), closure});
+      closures_.back().closure.covariance = covariance_of(precision_at(measured.edge));
     }
     std::ranges::stable_sort(closures_, {}, &PlayedClosure::at_s);
     for (std::size_t k = 0; k < graph.robots(); ++k)
-      members_.push_back({.agent = std::make_unique<TeamAgent>(options.pose_graph, peer(k),
-                                                               solver_choice(options.pose_graph))});
+      members_.push_back(
+          {.agent = std::make_unique<TeamAgent>(options.pose_graph, peer(k),
+                                                solver_choice(options.pose_graph, graph.dimension),
+                                                graph.dimension)});
     LinksReport links{.links = {}, .version = 1};
     for (std::size_t k = 0; k < members_.size(); ++k) {
       std::set<RobotId> others;
       for (std::size_t other = 0; other < members_.size(); ++other)
-        if (other != k) others.insert(static_cast<RobotId>(other));
+        if (other != k && (options.shape == TeamShape::kAll || other + 1 == k || k + 1 == other))
+          others.insert(static_cast<RobotId>(other));
       links.links.report(static_cast<RobotId>(k), std::move(others));
     }
     for (const Member& member : members_) member.agent->update_links(links);
@@ -126,13 +155,12 @@ class AgentTeam {
       if (played || pending() || !settled()) last_change_s = now_s_;
       if (settled() && changed_) last_change_s = now_s_;
       changed_ = false;
-      if (idle) {
-        next_tick_s_ = std::max(next_tick_s_, now_s_) + kTick_s;
-        now_s_ = next_tick_s_;
-        for (Member& member : members_) member.due = true;
-      } else {
-        now_s_ += kDelay_s;
-      }
+      const double next_s =
+          in_flight_.empty() ? next_tick_s_ : std::min(next_tick_s_, in_flight_.begin()->first);
+      now_s_ = idle ? std::max(now_s_, next_s) : now_s_ + kDelay_s;
+      if (now_s_ < next_tick_s_) continue;
+      next_tick_s_ = now_s_ + kTick_s;
+      for (Member& member : members_) member.due = true;
     }
     return result(now_s_ - last_change_s >= quiet_s, last_change_s);
   }
@@ -153,6 +181,13 @@ class AgentTeam {
   };
 
   static TeamPeer peer(std::size_t robot) { return {static_cast<RobotId>(robot), 1}; }
+  // A random time; 0 without a seed.
+  double random_s(double latest_s) {
+    return options_.seed == 0 ? 0.0 : std::uniform_real_distribution<double>(0.0, latest_s)(rng_);
+  }
+  [[nodiscard]] Precision precision_at(std::size_t edge) const {
+    return {graph_.edges[edge].kappa, graph_.edges[edge].tau};
+  }
   [[nodiscard]] double played_s(KeyframeIndex keyframe) const {
     return options_.keyframes_per_s > 0.0 ? keyframe / options_.keyframes_per_s : 0.0;
   }
@@ -164,9 +199,13 @@ class AgentTeam {
       Member& member = members_[k];
       const auto poses = static_cast<std::size_t>(graph_.poses_of(k));
       for (std::size_t& i = member.keyframes;
-           i < poses && played_s(static_cast<KeyframeIndex>(i)) <= now_s_; ++i) {
+           i < poses && starts_s_[k] + played_s(static_cast<KeyframeIndex>(i)) <= now_s_; ++i) {
         KeyframeOdometry keyframe;
         keyframe.id = {static_cast<RobotId>(k), static_cast<KeyframeIndex>(i)};
+        if (const auto vertical = verticals_.find(keyframe.id); vertical != verticals_.end()) {
+          keyframe.vertical = vertical->second;
+          if (i == 0) keyframe.T_odom_kf = upright_pose(vertical->second.up_body);
+        }
         if (i > 0) {
           keyframe.T_previous_kf = odometry_[k][i - 1].T_from_to;
           keyframe.covariance = odometry_[k][i - 1].covariance;
@@ -181,7 +220,8 @@ class AgentTeam {
       const RobotPair pair = std::minmax({closure.from.id.robot, closure.to.id.robot});
       for (const RobotId robot : std::set{pair.first, pair.second})
         (void)members_[robot].agent->add(closure);
-      pairs_.try_emplace(pair, pair, options_.pcm).first->second.add(closure, now_s_);
+      const double met_s = pairs_.contains(pair) ? 0.0 : random_s(kLatestMeeting_s);
+      pairs_.try_emplace(pair, pair, options_.pcm, met_s).first->second.add(closure, now_s_);
       any = true;
     }
     for (auto& [pair, played] : pairs_)
@@ -200,6 +240,16 @@ class AgentTeam {
            std::ranges::any_of(pairs_, [](const auto& pair) { return pair.second.waits(); });
   }
 
+  // The time at which a message arrives. Messages of one origin and kind arrive in order, except
+  // for reliable ones.
+  double arrival_s(std::size_t robot, std::size_t to, const TeamMessage& message) {
+    if (options_.seed == 0) return now_s_ + kDelay_s;
+    const double at_s = now_s_ + std::exponential_distribution<double>(1.0 / kMeanDelay_s)(rng_);
+    if (std::holds_alternative<ReliableMessage>(message)) return at_s;
+    double& last_s = last_arrival_s_[{robot, to, message.index()}];
+    return last_s = std::max(last_s, at_s);
+  }
+
   // Calls work(agent) and adds its CPU time to that of the robot.
   decltype(auto) measure(Member& member, auto&& work) {
     const CpuStopwatch stopwatch{options_.meter, member.cost.cpu_s};
@@ -209,15 +259,21 @@ class AgentTeam {
   // Delivers the messages in flight and steps each robot that is due. True if no robot is due and
   // no message is in flight afterwards.
   bool exchange() {
-    for (const Delivery& delivery : std::exchange(in_flight_, {})) {
+    std::vector<double> before_s;
+    for (const Member& member : members_) before_s.push_back(member.cost.cpu_s);
+    while (!in_flight_.empty() && in_flight_.begin()->first <= now_s_) {
+      const Delivery delivery = in_flight_.extract(in_flight_.begin()).mapped();
       measure(members_[delivery.to],
               [&](TeamAgent& agent) { (void)agent.receive(delivery.message); });
       members_[delivery.to].due = true;
     }
     for (std::size_t k = 0; k < members_.size(); ++k)
       if (members_[k].due) step(k);
-    return in_flight_.empty() &&
-           std::ranges::none_of(members_, [](const Member& member) { return member.due; });
+    double slowest_s = 0.0;
+    for (std::size_t k = 0; k < members_.size(); ++k)
+      slowest_s = std::max(slowest_s, members_[k].cost.cpu_s - before_s[k]);
+    critical_path_s_ += slowest_s;
+    return std::ranges::none_of(members_, [](const Member& member) { return member.due; });
   }
 
   void step(std::size_t robot) {
@@ -244,7 +300,7 @@ class AgentTeam {
                                           .to = static_cast<RobotId>(to),
                                           .bytes = bytes});
       if (!decoded.value) throw std::runtime_error("run_agent_team: a message cannot be decoded");
-      in_flight_.push_back({to, std::move(*decoded.value)});
+      in_flight_.emplace(arrival_s(robot, to, message), Delivery{to, std::move(*decoded.value)});
       const std::size_t sent = kMessageHead + bytes.size();
       members_[robot].session_bytes += std::holds_alternative<TeamStatus>(message) ? 0 : sent;
       members_[robot].cost.sent[message.index()] += sent;
@@ -266,6 +322,8 @@ class AgentTeam {
                      .kept = odometry_edges(graph_),
                      .settled = settled,
                      .seconds = seconds,
+                     .last = members_.front().agent->part()->state(),
+                     .critical_path_s = critical_path_s_,
                      .bytes = bytes_,
                      .costs = {},
                      .sessions = sessions_.size(),
@@ -305,7 +363,12 @@ class AgentTeam {
   std::size_t next_closure_ = 0;
   std::map<RobotPair, PlayedPair> pairs_;
   std::vector<Member> members_;
-  std::vector<Delivery> in_flight_;
+  std::mt19937 rng_;
+  std::vector<double> starts_s_;  // by robot
+  std::map<KeyframeId, Vertical> verticals_;
+  std::multimap<double, Delivery> in_flight_;  // by time of arrival
+  std::map<std::tuple<std::size_t, std::size_t, std::size_t>, double> last_arrival_s_;
+  double critical_path_s_ = 0.0;
   std::size_t bytes_ = 0;
   std::set<SessionId> sessions_;
   std::vector<std::string> notices_;
@@ -318,7 +381,7 @@ class AgentTeam {
 
 std::vector<TeamClosure> team_closures(const TeamGraph& graph) {
   std::vector<OdometryPose> poses;
-  const auto odometry = team_odometry(graph);
+  const auto odometry = team_odometry(graph, graph.dimension);
   for (std::size_t robot = 0; robot < graph.robots(); ++robot) {
     RecordedGraph chain;
     chain.robot = static_cast<RobotId>(robot);
@@ -330,7 +393,7 @@ std::vector<TeamClosure> team_closures(const TeamGraph& graph) {
   for (std::size_t k = 0; k < graph.edges.size(); ++k) {
     const BlockEdge& e = graph.edges[k];
     if (step[k] && inside_a_robot(graph, e)) continue;
-    const RelativePose measured = relative_pose(graph, e);
+    const RelativePose measured = relative_pose(graph, e, graph.dimension);
     closures.push_back({k, Closure{.from = poses[static_cast<std::size_t>(e.i)],
                                    .to = poses[static_cast<std::size_t>(e.j)],
                                    .T_from_to = measured.T_from_to,
@@ -340,8 +403,6 @@ std::vector<TeamClosure> team_closures(const TeamGraph& graph) {
 }
 
 AgentTeamRun run_agent_team(const TeamGraph& graph, const AgentTeamOptions& options) {
-  if (graph.dimension != 3)
-    throw std::invalid_argument("run_agent_team: the graph is planar, robots solve in space");
   return AgentTeam(graph, options).run();
 }
 

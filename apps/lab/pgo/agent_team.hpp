@@ -9,6 +9,7 @@
 #include "apps/lab/pgo/team_graph.hpp"
 #include "modules/core/pose_graph.hpp"
 #include "modules/outlier_rejection/pcm_config.hpp"
+#include "modules/pose_graph/member_solver.hpp"
 #include "modules/pose_graph/pose_graph_config.hpp"
 
 namespace km {
@@ -31,6 +32,10 @@ struct AgentTeamOptions {
                                  ///< witness.
   double keyframes_per_s = 0.0;  ///< Rate at which robots play their graphs [1/s]; 0: all at once.
   double longest_s = 3600.0;     ///< Limit of the virtual time of the run [s].
+  TeamShape shape = TeamShape::kAll;
+  /// Seed of random times: robots start and meet within the first 20 s, and messages take 30 ms on
+  /// average. 0: robots meet at once, and each message takes 1 ms.
+  unsigned seed = 0;
   TeamMeter meter = {};
 };
 
@@ -51,10 +56,13 @@ struct AgentTeamRun {
   std::vector<bool> kept;         ///< By edge of the graph: used in the published solution.
   bool settled = false;           ///< False: the run ended at longest_s.
   double seconds = 0.0;           ///< Virtual time of the last change [s].
-  std::size_t rounds = 0;         ///< Maximum over the robots.
-  std::size_t bytes = 0;          ///< Sent by all robots; a message counts once per receiver.
-  std::vector<AgentCost> costs;   ///< By robot.
-  std::size_t sessions = 0;       ///< Number of sessions of the team.
+  std::size_t rounds = 0;         ///< In all sessions, maximum over the robots.
+  SolverState last = {};          ///< State of robot 0 at the end of its last session.
+  double critical_path_s =
+      0.0;                ///< CPU time of the slowest robot, summed over all steps of the team.
+  std::size_t bytes = 0;  ///< Sent by all robots; a message counts once per receiver.
+  std::vector<AgentCost> costs;  ///< By robot.
+  std::size_t sessions = 0;      ///< Number of sessions of the team.
   std::vector<std::string> notices;
 };
 
@@ -63,8 +71,8 @@ struct AgentTeamRun {
 /// perfect links in virtual time. Closures inside a robot count at once. Closures between two
 /// robots count when WitnessedPair has its witnesses, or `pcm.witness_wait_s` after the first one.
 /// If several closures join the same two poses, the robots use one (see OwnGraph), and all of
-/// them have the same value in `kept`. Deterministic. Throws std::invalid_argument if the graph is
-/// planar or the odometry of a robot is interrupted.
+/// them have the same value in `kept`. Deterministic. Throws std::invalid_argument if the odometry
+/// of a robot is interrupted.
 [[nodiscard]] AgentTeamRun run_agent_team(const TeamGraph& graph, const AgentTeamOptions& options);
 
 }  // namespace km

@@ -5,10 +5,6 @@
 #include <stdexcept>
 #include <utility>
 
-#include "apps/lab/pgo/odometry_start.hpp"
-#include "modules/pose_graph/lone_solution.hpp"
-#include "modules/pose_graph/odometry_noise.hpp"
-#include "modules/pose_graph/pair_consensus.hpp"
 #include "modules/pose_graph/pose_edge.hpp"
 #include "modules/pose_graph/team_plan.hpp"
 
@@ -16,31 +12,10 @@ namespace km {
 
 using Eigen::Index;
 
-namespace {
-
-// Corrects weights as robots do when a session begins. All robots know the weights of each other.
-void weigh_as_robots(std::vector<SessionGraph>& parts) {
-  std::map<RobotId, OdometryNoise> noise;
-  for (SessionGraph& part : parts) {
-    const std::span<PoseEdge> own(part.own);
-    const OdometryJudgement judgement =
-        judge_odometry(own.first(part.odometry), own.subspan(part.odometry));
-    judgement.correct(own.first(part.odometry));
-    noise[part.self] = judgement.noise;
-  }
-  for (SessionGraph& part : parts) {
-    for (auto& [robot, step] : part.step_precision) step = noise.at(robot).corrected(step);
-    limit_precisions(part);
-  }
-}
-
-}  // namespace
-
-MemberTeam::MemberTeam(const TeamGraph& graph, Index rank, std::vector<SE3> start, Factory make,
-                       TeamShape shape, bool as_robots)
+MemberTeam::MemberTeam(const TeamGraph& graph, Index rank, std::vector<SE3> start,
+                       const Factory& make, TeamShape shape)
     : graph_(graph),
       rank_(rank),
-      make_(std::move(make)),
       parts_(graph.robots()),
       sent_(graph.robots(), 0),
       received_(graph.robots(), 0) {
@@ -48,13 +23,10 @@ MemberTeam::MemberTeam(const TeamGraph& graph, Index rank, std::vector<SE3> star
     throw std::invalid_argument("MemberTeam: " + std::to_string(start.size()) +
                                 " start poses for " + std::to_string(graph.poses()));
   for (std::size_t k = 0; k < parts_.size(); ++k) parts_[k] = part_of(graph, k);
-  if (as_robots) {
-    weigh_as_robots(parts_);
-    solve_alone_first(start);
-  }
   places_ = places(shape);
   announce_starts(std::move(start));
-  open_session();
+  for (std::size_t k = 0; k < parts_.size(); ++k)
+    members_.push_back(make(parts_[k], places_.at(k)));
   take_poses();
 }
 
@@ -86,16 +58,6 @@ std::map<std::size_t, TreePlace> MemberTeam::places(TeamShape shape) const {
   return places;
 }
 
-void MemberTeam::solve_alone_first(std::vector<SE3>& start) {
-  for (std::size_t k = 0; k < parts_.size(); ++k) {
-    SessionGraph alone = parts_[k];
-    const auto begin = start.begin() + graph_.first[k];
-    alone.start.assign(begin, start.begin() + graph_.first[k + 1]);
-    std::ranges::copy(relaxed_start(std::move(alone), {}, {.dimension = graph_.dimension}), begin);
-  }
-  start = placed_by_closures(graph_, std::move(start));
-}
-
 // Sends all public poses to all robots in single precision, as MemberPoses does.
 void MemberTeam::announce_starts(std::vector<SE3> start) {
   std::set<KeyframeId> ends;
@@ -125,17 +87,6 @@ void MemberTeam::announce_starts(std::vector<SE3> start) {
   }
 }
 
-void MemberTeam::open_session() {
-  const auto before = std::exchange(members_, {});
-  in_flight_.clear();
-  for (std::size_t k = 0; k < parts_.size(); ++k) {
-    parts_[k].decided = decisions_.decided();
-    if (k < before.size()) parts_[k].noise = before[k]->noise();
-    members_.push_back(make_(parts_[k], places_.at(k)));
-  }
-  rounds_before_ = rounds_;
-}
-
 void MemberTeam::take_poses() {
   blocks_.clear();
   for (const auto& member : members_) blocks_.push_back(lift(member->poses(), rank_));
@@ -144,10 +95,10 @@ void MemberTeam::take_poses() {
 }
 
 int MemberTeam::step(RoundMeter& meter) {
-  if (done() && !reconsider()) return 0;
+  if (done()) return 0;
   meter.sent(std::exchange(to_announce_, 0));
   const std::uint32_t before = rounds_;
-  const std::uint32_t round = rounds_ - rounds_before_ + 1;
+  const std::uint32_t round = rounds_ + 1;
   const auto arrived = [&] {
     return std::all_of(members_.begin(), members_.end(),
                        [&](const auto& m) { return m->done() || m->state().round >= round; });
@@ -157,7 +108,7 @@ int MemberTeam::step(RoundMeter& meter) {
       throw std::runtime_error("MemberTeam: the members wait for each other");
   take_poses();
   // A solver may publish its state every few rounds only.
-  rounds_ = rounds_before_ + std::max(round, state_.round);
+  rounds_ = std::max(round, state_.round);
   return static_cast<int>(rounds_ - before);
 }
 
@@ -188,29 +139,6 @@ bool MemberTeam::pass_on(std::uint32_t round, RoundMeter& meter) {
   }
   meter.finish_exchange();
   return worked;
-}
-
-bool MemberTeam::reconsider() {
-  for (const auto& member : members_) decisions_.decide(member->verdicts().closures, false);
-  if (!state_.deferred) return false;
-  std::vector<SE3> poses;
-  for (const auto& member : members_)
-    poses.insert(poses.end(), member->poses().begin(), member->poses().end());
-  const auto pose = [&](const KeyframeId& id) {
-    return poses[static_cast<std::size_t>(graph_.first[id.robot] + id.index)];
-  };
-  bool any = false;
-  for (const SessionGraph& part : parts_) {
-    std::vector<PoseEdge> closures(part.own.begin() + static_cast<std::ptrdiff_t>(part.odometry),
-                                   part.own.end());
-    for (const PoseEdge& e : part.between)
-      if (part.self < e.other(part.self).robot) closures.push_back(e);
-    any |= decisions_.reconsider(closures, pose, state_.barc);
-  }
-  if (!any) return false;
-  announce_starts(std::move(poses));
-  open_session();
-  return true;
 }
 
 std::vector<bool> MemberTeam::kept() const {

@@ -48,20 +48,6 @@ TeamGraph with_weights(const TeamGraph& graph, const std::vector<double>& weight
   return weighed;
 }
 
-PlacedTeam solve_by_newton(const TeamGraph& graph, std::vector<bool> kept, int max_rounds) {
-  const SolverRun run = run_solver(with_edges(graph, kept), {},
-                                   {.method = "newton", .run = {.max_rounds = max_rounds}}, {});
-  std::size_t in_part = 0;
-  for (std::size_t k = 0; k < kept.size(); ++k)
-    if (kept[k]) kept[k] = run.decision->kept[in_part++];
-  return {.T_frame_kf = round_to_poses(run.X, run.X.leftCols<4>()),
-          .frame_of = std::vector<Index>(static_cast<std::size_t>(graph.poses()), 0),
-          .kept = std::move(kept),
-          .decided = run.decision->decided,
-          .rounds = static_cast<std::size_t>(run.rounds.back().round),
-          .bytes = run.rounds.back().work.bytes};
-}
-
 PlacedTeam solve_reference(const ScenarioGraph& drawn) {
   TeamGraph honest = drawn.graph;
   std::vector<bool> kept;
@@ -73,11 +59,15 @@ PlacedTeam solve_reference(const ScenarioGraph& drawn) {
   return solve_centrally(honest, std::move(kept), drawn.truth);
 }
 
-PlacedTeam solve_by_robots(const TeamGraph& graph) {
-  AgentTeamRun run = run_agent_team(graph, {});
+// The robots receive only the `known` edges.
+PlacedTeam solve_by_robots(const TeamGraph& graph, std::vector<bool> known) {
+  AgentTeamRun run = run_agent_team(with_edges(graph, known), {});
+  std::size_t in_part = 0;
+  for (std::size_t k = 0; k < known.size(); ++k)
+    if (known[k]) known[k] = run.kept[in_part++];
   PlacedTeam placed{.T_frame_kf = std::move(run.T_world_kf),
                     .frame_of = {},
-                    .kept = std::move(run.kept),
+                    .kept = std::move(known),
                     .decided = run.settled,
                     .rounds = run.rounds,
                     .bytes = run.bytes};
@@ -91,12 +81,10 @@ PlacedTeam solve_by(const std::string& method, const ScenarioGraph& drawn,
                     const OutlierStudyOptions& options) {
   const TeamGraph& graph = drawn.graph;
   if (method == "reference") return solve_reference(drawn);
-  if (method == "robots") return solve_by_robots(graph);
   if (method == "gnc") return solve_by_gnc(graph);
   std::vector<bool> kept(graph.edges.size(), true);
   if (method.starts_with("pcm")) kept = pairwise_consistent(graph, options.pcm);
-  if (method.ends_with("newton"))
-    return solve_by_newton(graph, std::move(kept), options.max_rounds);
+  if (method.ends_with("robots")) return solve_by_robots(graph, std::move(kept));
   if (method != "pcm" && method != "trust-all")
     throw std::invalid_argument("outlier study: unknown method " + method);
   std::vector<SE3> start = chordal_start(graph, kept);

@@ -14,16 +14,15 @@
 namespace km {
 
 /// Methods against false closures:
-/// - robots: the robots' own code at its defaults, see run_agent_team(); not for planar graphs;
-/// - newton: the members of the robots' sessions, started from odometry;
-/// - pcm+newton: newton on the closures that pairwise consistency keeps;
+/// - robots: the robots' own code at its defaults, see run_agent_team();
+/// - pcm+robots: robots that receive the closures that pairwise consistency keeps;
 /// - pcm: the closures that pairwise consistency keeps, by Newton's method on one computer;
 /// - gnc: graduated non-convexity on one computer, see solve_by_gnc();
 /// - trust-all: all closures, on one computer;
 /// - reference: only the true closures, all edges weighed by the noise that was drawn, on one
 ///   computer, started at the truth: the best achievable result.
-inline const std::vector<std::string> kRejections = {"robots", "newton",    "pcm+newton", "pcm",
-                                                     "gnc",    "trust-all", "reference"};
+inline const std::vector<std::string> kRejections = {"robots", "pcm+robots", "pcm",
+                                                     "gnc",    "trust-all",  "reference"};
 
 struct OutlierStudyOptions {
   std::optional<Scenario> scenario = {};  ///< nullopt: the measurements of the graph.
@@ -32,7 +31,6 @@ struct OutlierStudyOptions {
   std::vector<std::string> methods = {};  ///< Names from kRejections.
   std::vector<unsigned> seeds = {1};
   PcmConfig pcm = {};
-  int max_rounds = 300;  ///< Only for newton and pcm+newton.
 };
 
 /// Result of one method on one graph with false closures.

@@ -20,12 +20,11 @@ false closures for every 100 true ones. They join uniformly drawn pairs of poses
 uniform rotation and translation, and the weights of a true closure.
 
 Methods:
-  robots     the robots' own code, from measurements to published poses; not in the plane
-  newton     the robots' members of sessions, see solve: they reject false closures
+  robots     the robots' own code, from measurements to published poses
   pcm        pairwise consistency: between two robots, and inside one, the largest set of
              closures that agree pairwise along the odometry, by exact clique search;
              then the optimum of odometry and these closures, on one computer
-  pcm+newton newton on the closures that pcm keeps
+  pcm+robots robots that receive the closures that pcm keeps
   gnc        graduated non-convexity at the claimed noise, on one computer
   trust-all  all closures, on one computer
   reference  only the true closures, weighed by the noise that was drawn
@@ -42,14 +41,14 @@ around it. Scenarios, and the graph each is meant for:
          R"(
 Examples:
   kimera_multi_pgo outliers sphere2500.g2o --json out.json --plot out.html
-  kimera_multi_pgo outliers parking-garage.g2o --shares 30,100,400 --methods newton \
+  kimera_multi_pgo outliers parking-garage.g2o --shares 30,100,400 --methods robots \
       --seeds 1,2,3
   kimera_multi_pgo outliers sphere2500.g2o --scenario noisy-odometry --seeds 1,2,3)";
 }
 
 struct OutliersCommand {
   GraphInput input{.robots = 5};
-  OutlierStudyOptions study{.methods = {"pcm", "newton", "pcm+newton"}};
+  OutlierStudyOptions study{.methods = {"pcm", "robots", "pcm+robots"}};
   std::string scenario = {};
   ReportFiles files = {};
 };
@@ -72,8 +71,6 @@ void define(CLI::App& app, OutliersCommand& command) {
   app.add_option("--seeds", study.seeds,
                  "Seeds of the false closures, one run each. In a scenario the default is 1 to 10")
       ->delimiter(',');
-  app.add_option("--rounds", study.max_rounds, "newton: largest number of rounds")
-      ->check(CLI::Range(1, 1000000));
 }
 
 // The graph without the closures that the file labels as false.

@@ -40,8 +40,8 @@ Methods:
                of robots. It estimates how noisy closures are and rejects false ones
                (graduated non-convexity: weights and a step, in turn). It ends with the
                optimum of the closures that it keeps. --trust-all keeps all closures
-newton starts from odometry; each robot first relaxes the closures inside it. newton
---trust-all and the other methods start from the chordal initialisation of the whole
+newton is the robots' own code, from measurements to published poses, over an ideal network.
+newton --trust-all and the other methods start from the chordal initialisation of the whole
 graph, whose time is shown separately (local: of each robot's own graph).
 
 A round is one exchange of messages. For newton it is one pass up the tree and one pass down.
@@ -49,9 +49,9 @@ For rbcd it is an update by every robot, and poses are available after every fif
 The table shows when each gap to the certified optimum was reached (computed centrally):
 the number of rounds, the bytes sent by all robots so far, and the CPU time, both
 summed over the slowest robot of each exchange and over all robots. newton and rbcd encode
-the robots' own messages, which have one receiver each. Messages of other methods are not
-encoded, and a broadcast counts once. The certificate proves an upper bound of the gap. For
-newton without --trust-all the table shows the kept closures instead.
+the robots' own messages. Messages of other methods are not encoded, and a broadcast counts
+once. The certificate proves an upper bound of the gap. For newton without --trust-all the
+table shows the kept closures instead; a message to several robots counts for each of them.
 
 If a JRL file labels false closures, a table shows how many false and true ones were kept. If
 it has true poses, a table shows the ATE: the RMSE [m] of the positions of all robots under

@@ -1,13 +1,15 @@
 #include "apps/lab/pgo/solvers.hpp"
 
 #include <algorithm>
+#include <array>
 #include <memory>
+#include <numeric>
 #include <stdexcept>
 
+#include "apps/lab/pgo/agent_team.hpp"
 #include "apps/lab/pgo/central_solver.hpp"
 #include "apps/lab/pgo/gauss_seidel_team.hpp"
 #include "apps/lab/pgo/local_team.hpp"
-#include "apps/lab/pgo/odometry_start.hpp"
 #include "modules/core/symmetric_eigen.hpp"
 #include "modules/pose_graph/chordal.hpp"
 #include "modules/pose_graph/tree_newton.hpp"
@@ -50,14 +52,6 @@ class CentralTeam : public TeamSolver {
   std::vector<LiftedPoses> blocks_;
 };
 
-// The configuration of robots with these options.
-PoseGraphConfig config_of(const SolverOptions& options) {
-  PoseGraphConfig config;
-  config.robust = !options.trust_all;
-  config.barc = options.barc;
-  return config;
-}
-
 // The robots' own block descent, with their own stopping rule.
 std::unique_ptr<TeamSolver> rbcd_team(const TeamGraph& graph, const std::vector<SE3>& start,
                                       const SolverOptions& options) {
@@ -82,32 +76,49 @@ std::unique_ptr<TeamSolver> make_team(const TeamGraph& graph, const std::vector<
   throw std::invalid_argument("unknown method " + method);
 }
 
-// No gradient tolerance ends the run: at a gradient of 0 the weights may still change.
-SolverRun run_newton(const TeamGraph& graph, std::vector<SE3> start, const SolverOptions& options,
-                     const TeamMeter& meter) {
-  TreeNewtonOptions newton = newton_options(config_of(options));
+// The members of one session that trust all closures. No gradient tolerance ends the run.
+SolverRun run_trusting(const TeamGraph& graph, const std::vector<SE3>& start,
+                       const SolverOptions& options, const TeamMeter& meter) {
+  TreeNewtonOptions newton = newton_options({.robust = false});
   newton.dimension = graph.dimension;
   newton.absolute_tolerance = 1e-12;
-  if (start.empty()) start = odometry_start(graph);
   MemberTeam team(
-      graph, kRigidRank, std::move(start),
+      graph, kRigidRank, start,
       [&](SessionGraph part, TreePlace place) {
         return std::make_unique<TreeNewton>(std::move(part), std::move(place), newton);
       },
-      options.shape, !options.trust_all);
+      options.shape);
   SolverRun run;
   run.rounds = run_team(graph, team,
                         {.max_rounds = options.run.max_rounds, .gradient_tolerance = -1.0}, meter);
   run.X = team_poses(graph, team);
-  run.decision = Decision{.kept = team.kept(),
-                          .noise_scale = team.state().noise_scale,
-                          .threshold = team.state().barc,
-                          .decided = team.done() && !team.state().failed};
-  for (std::size_t k = 0; k < graph.robots(); ++k) {
-    run.decision->most_sent = std::max(run.decision->most_sent, team.sent_by(k));
-    run.decision->most_received = std::max(run.decision->most_received, team.received_by(k));
-  }
   return run;
+}
+
+// The robots' own code from measurements to published poses, over an ideal network.
+SolverRun run_agents(const TeamGraph& graph, const SolverOptions& options, const TeamMeter& meter) {
+  AgentTeamOptions team{.shape = options.shape, .meter = meter};
+  team.pose_graph.barc = options.barc;
+  team.pose_graph.max_rounds = options.run.max_rounds;
+  team.pcm.witness_wait_s = 0.0;
+  AgentTeamRun robots = run_agent_team(graph, team);
+  TeamRound end{.round = static_cast<int>(robots.last.round),
+                .cost = robots.last.cost,
+                .gradient_norm = robots.last.gradient,
+                .work = {.bytes = robots.bytes, .critical_path_s = robots.critical_path_s}};
+  Decision decision{.kept = std::move(robots.kept),
+                    .noise_scale = robots.last.noise_scale,
+                    .threshold = robots.last.barc,
+                    .decided = robots.settled && end.round < options.run.max_rounds};
+  const auto bytes = [](const std::array<std::size_t, 4>& by_kind) {
+    return std::accumulate(by_kind.begin(), by_kind.end(), std::size_t{0});
+  };
+  for (const AgentCost& cost : robots.costs) {
+    end.work.total_cpu_s += cost.cpu_s;
+    decision.most_sent = std::max(decision.most_sent, bytes(cost.sent));
+    decision.most_received = std::max(decision.most_received, bytes(cost.received));
+  }
+  return {{end}, lift(robots.T_world_kf, kRigidRank), std::move(decision)};
 }
 
 }  // namespace
@@ -118,7 +129,8 @@ SolverRun run_solver(const TeamGraph& graph, const std::vector<SE3>& start,
     throw std::invalid_argument("method dgs does not know verticals, and the graph has " +
                                 std::to_string(graph.verticals.size()) +
                                 ": leave them out by --no-vertical");
-  if (options.method == "newton") return run_newton(graph, start, options, meter);
+  if (options.rejects()) return run_agents(graph, options, meter);
+  if (options.method == "newton") return run_trusting(graph, start, options, meter);
   const auto team = make_team(graph, start, options);
   SolverRun run;
   run.rounds = run_team(graph, *team, options.run, meter);

@@ -46,13 +46,15 @@ struct Decision {
 };
 
 struct SolverRun {
-  std::vector<TeamRound> rounds;  ///< [0]: the start. Costs of all edges, at weight 1.
+  /// [0]: the start, with costs of all edges at weight 1. A method that rejects closures reports
+  /// only the last round, with the cost of the closures that it keeps.
+  std::vector<TeamRound> rounds;
   LiftedPoses X;
   std::optional<Decision> decision;  ///< Only of newton.
 };
 
-/// Solves `graph` from `start`. If `start` is empty, newton begins at odometry. Throws
-/// std::invalid_argument if method, options and graph do not fit together.
+/// Solves `graph` from `start`. newton starts from measurements alone unless it trusts all
+/// closures. Throws std::invalid_argument if method, options and graph do not fit together.
 [[nodiscard]] SolverRun run_solver(const TeamGraph& graph, const std::vector<SE3>& start,
                                    const SolverOptions& options, const TeamMeter& meter);
 

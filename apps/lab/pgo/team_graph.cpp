@@ -92,7 +92,6 @@ SessionGraph part_of(const TeamGraph& graph, std::size_t robot) {
     }
     if (edge.from.robot != part.self && edge.to.robot != part.self) continue;
     (!inside ? part.between : odometry[k] ? part.own : closures).push_back(edge);
-    if (!inside && odometry[k]) part.trusted.insert(edge.id());
   }
   part.odometry = part.own.size();
   part.own.insert(part.own.end(), closures.begin(), closures.end());

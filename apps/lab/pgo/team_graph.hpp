@@ -51,13 +51,19 @@ struct TeamGraph {
 [[nodiscard]] std::vector<Eigen::Index> part_of_poses(const TeamGraph& graph);
 
 /// The edges and priors that one robot of the team knows, without any poses: `start` and
-/// `public_poses` are empty. Ids are those of TeamGraph::keyframe_of(). Odometry that was cut
-/// between two robots is trusted. `step_precision` has the values of all robots.
+/// `public_poses` are empty. Ids are those of TeamGraph::keyframe_of(). `step_precision` has the
+/// values of all robots.
 [[nodiscard]] SessionGraph part_of(const TeamGraph& graph, std::size_t robot);
 
 /// Cost function of the whole graph at rank r. Throws std::invalid_argument as QuadraticProblem
 /// does.
 [[nodiscard]] QuadraticProblem problem_of(const TeamGraph& graph, Eigen::Index rank);
+
+/// Links between the robots of a team.
+enum class TeamShape {
+  kAll,    ///< Every robot receives all others.
+  kChain,  ///< Robot k receives only k - 1 and k + 1.
+};
 
 /// By robot: the robots with which it shares edges, ascending.
 using TeamNeighbours = std::vector<std::vector<std::size_t>>;

@@ -12,7 +12,7 @@ using Robots = std::vector<RobotId>;
 const Robots kMembers{0, 1, 2, 3, 4};
 
 TeamStatus status_of(RobotId robot, std::vector<EdgeSetOffer> offers) {
-  return {.sender = {robot, 1}, .frame = {robot, 1}, .offers = std::move(offers)};
+  return {.sender = {robot, 1}, .offers = std::move(offers)};
 }
 
 }  // namespace

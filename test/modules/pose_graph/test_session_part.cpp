@@ -42,7 +42,7 @@ class OrderlySolver final : public MemberSolver {
 struct Correspondence {
   std::uint32_t taken = 0;  // number of messages that the solver has taken
   Session session{.id = {kSelf, 1},
-                  .plan = {.frame = kSelf,
+                  .plan = {.frame = {kSelf, 1},
                            .members = {{.peer = kSelf}, {.peer = kOther, .parent = kSelf.robot}},
                            .pairs = {}}};
   SessionPart part{session,

@@ -39,7 +39,7 @@ TEST_CASE("A changed status is sent twice per period, one with a grown graph onc
   CHECK(schedule.due(status, 0.5) == Due::kNo);
   CHECK(schedule.due(status, 1.0) == Due::kStatus);
   status.keyframes = 7;
-  status.frame_version = 1;
+  status.upright = true;
   CHECK(schedule.due(status, 1.5) == Due::kStatus);
   CHECK(schedule.due(status, 2.0) == Due::kNo);
   CHECK(schedule.due(status, 2.5) == Due::kProgress);

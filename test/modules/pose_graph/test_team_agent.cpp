@@ -141,7 +141,7 @@ TEST_CASE("the data of a restarted robot is discarded, and it takes part again",
   check_optimum(network, problem);
 }
 
-TEST_CASE("decisions on closures are valid for both robots and carry over", "[pose_graph][agent]") {
+TEST_CASE("decisions on closures are valid for both robots", "[pose_graph][agent]") {
   TeamProblem problem = ring(4);
   PoseEdge wrong = problem.edges.back();
   wrong.from = {7, 3};
@@ -159,15 +159,8 @@ TEST_CASE("decisions on closures are valid for both robots and carry over", "[po
     REQUIRE(network.agent(id).decided().contains(wrong.id()));
     CHECK_FALSE(network.agent(id).decided().at(wrong.id()));
     CHECK(network.robots.at(id).verdicts.rejected() > 0);
-    for (const auto& [closure, kept] : network.agent(id).decided()) problem.decided[closure] = kept;
   }
   CHECK_FALSE(network.agent(50).decided().contains(wrong.id()));
-  // The next session begins with the decisions of this one.
-  for (const RobotId id : {RobotId{7}, RobotId{33}})
-    (void)network.agent(id).add(inlier_set(problem, 7, 33, 2));
-  (void)network.run(1.0);
-  REQUIRE(settle(network));
-  check_optimum(network, problem);
 }
 
 TEST_CASE("a graph that cannot be solved ends the session for all, with a notice",
@@ -185,8 +178,7 @@ TEST_CASE("a graph that cannot be solved ends the session for all, with a notice
   for (const RobotId id : kIds) {
     CAPTURE(id);
     CHECK_FALSE(network.agent(id).in_session());
-    CHECK(network.agent(id).frame() == network.agent(7).frame());
-    CHECK(network.robots.at(id).trajectory);
+    CHECK(network.robots.at(id).trajectory->anchor == id);  // the result of the robot alone
   }
   CHECK(network.agent(7).part()->session().id.number < 5);  // without endless repetition
 }
@@ -308,12 +300,12 @@ TEST_CASE("false messages are refused or do no lasting harm", "[pose_graph][agen
   TeamAgent& victim = network.agent(33);
   network.appear(33, {666, 1});
   for (int k = 0; k < 400; ++k) {
-    TeamStatus status{.sender = {666, 1}, .frame = peer()};
+    TeamStatus status{.sender = {666, 1}};
     status.offers = {{robot(), any(rng) + 1, {any(rng), any(rng)}}};
     network.inject({666, 1}, 33, status, any(rng));
 
     Session session{.id = {peer(), any(rng)},
-                    .plan = {.frame = peer(), .members = {}, .pairs = {}}};
+                    .plan = {.frame = {peer(), any(rng)}, .members = {}, .pairs = {}}};
     if (session.id.coordinator.robot != 666 && session.id.coordinator.robot != 667)
       session.id.coordinator = {666, 1};  // otherwise it is identical to a true one
     for (std::uint32_t n = any(rng) % 5; n > 0; --n)
@@ -325,7 +317,7 @@ TEST_CASE("false messages are refused or do no lasting harm", "[pose_graph][agen
     network.inject({666, 1}, 33, session, any(rng));
 
     MemberPoses poses{.sender = {666, 1}, .session = session.id};
-    poses.stage = static_cast<MemberStage>(any(rng) % 3);
+    poses.stage = static_cast<MemberStage>(any(rng) % 4);
     poses.keyframes = {any(rng) % 2, any(rng)};
     poses.T_frame_kf.resize(any(rng) % 3);
     poses.verdicts = {{closure_id({7, 1}, {33, 2}), false}};

@@ -257,8 +257,7 @@ TEST_CASE("a divided team continues as two teams in one frame, and unites again"
   check_optimal(network, problem);
 }
 
-TEST_CASE("an interrupted session results in an improvement or the start",
-          "[pose_graph][network]") {
+TEST_CASE("after an interrupted session robots keep the last result", "[pose_graph][network]") {
   const int cut_after = GENERATE(range(20, 320, 20));
   const PgoMethod method = GENERATE(PgoMethod::kNewton, PgoMethod::kRbcd);
   CAPTURE(cut_after, to_string(method));
@@ -272,25 +271,24 @@ TEST_CASE("an interrupted session results in an improvement or the start",
   add_all(network, problem, config);
   network.wire(line(ids));
   int steps = 0;
-  std::map<RobotId, std::vector<SE3>> start;
+  std::map<RobotId, std::vector<SE3>> alone;  // results of the robots alone
   network.on_step = [&](const TeamNetwork::Robot& robot) {
     const SessionPart* part = robot.agent->part();
     if (part == nullptr || part->members().size() < 5 || !part->stage()) return;
     if (part->worked()) ++steps;
-    if (part->state().round == 0) start[robot.peer.robot] = robot.agent->poses();
+    alone.try_emplace(robot.peer.robot, robot.agent->poses());
   };
   (void)network.run(600.0, [&] { return steps >= cut_after || network.all_settled(); });
   network.wire({});
   // The result before any robot begins a session alone.
   (void)network.run(KnownRobots::kLinkPatience_s + network.lease_s - 0.1);
-  TeamPoses left;
-  for (const auto& [id, robot] : network.robots)
-    left[id] =
-        robot.agent->in_session() ? robot.agent->part()->committed_poses() : robot.agent->poses();
-  const CentralProblem whole(problem);
-  CAPTURE(steps, whole.cost(start), whole.cost(left));
-  REQUIRE(start.size() == 5);
-  CHECK(whole.cost(left) <= whole.cost(start) * (1.0 + 1e-9));
+  REQUIRE(alone.size() == 5);
+  for (const auto& [id, robot] : network.robots) {
+    if (robot.progress.members.size() == 5 && robot.progress.settled) continue;
+    CAPTURE(id);
+    for (std::size_t k = 0; k < alone.at(id).size(); ++k)
+      CHECK(robot.agent->poses()[k].matrix() == alone.at(id)[k].matrix());
+  }
 }
 
 // Each keyframe has a step of odometry: 176 bytes, at most twice that with the spare room of a

@@ -6,11 +6,7 @@ namespace km {
 namespace {
 
 TeamStatus status_of(RobotId robot, std::vector<EdgeSetOffer> offers) {
-  return {.sender = {robot, 9},
-          .frame = {robot, 9},
-          .keyframes = 5,
-          .revision = 5,
-          .offers = std::move(offers)};
+  return {.sender = {robot, 9}, .keyframes = 5, .revision = 5, .offers = std::move(offers)};
 }
 
 std::map<RobotId, TeamStatus> by_robot(const std::vector<TeamStatus>& statuses) {
@@ -94,7 +90,6 @@ TEST_CASE("the plan contains the connected component, best connected robots firs
                 status_of(21, {{20, 4, {1, 4}}}), status_of(30, {{3, 99, {1, 5}}})});
   const SessionPlan plan = plan_session(statuses, 5);
   CHECK(order_of(plan) == std::vector<RobotId>{3, 8, 5});
-  CHECK(plan.frame == TeamFrame{3, 9});
   CHECK(coordinator_of(plan) == 3);
   CHECK(plan.pairs == std::vector<SessionPair>{{3, 5, {1, 2}}, {3, 8, {1, 1}}, {5, 8, {1, 3}}});
   for (const RobotId member : {RobotId{3}, RobotId{8}})
@@ -128,14 +123,11 @@ TEST_CASE("ties join the members of each datum to the lowest one", "[pose_graph]
   CHECK(datum_ties(without_7, 7).empty());
 }
 
-TEST_CASE("the frame of most members stays", "[pose_graph][session]") {
-  auto statuses =
-      by_robot({status_of(1, {{2, 3, {1, 1}}}), status_of(2, {{1, 3, {1, 1}}, {3, 3, {1, 2}}}),
-                status_of(3, {{2, 3, {1, 2}}})});
-  statuses[3].frame = statuses[2].frame;
+TEST_CASE("the order of alignment begins with the robot with the most edges",
+          "[pose_graph][session]") {
+  const auto statuses = chain_of({1, 2, 3, 4}, {3, 4, 2});
   const SessionPlan plan = plan_session(statuses, 1);
-  CHECK(plan.frame == TeamFrame{2, 9});
-  CHECK(order_of(plan) == std::vector<RobotId>{2, 3, 1});
+  CHECK(order_of(plan) == std::vector<RobotId>{2, 3, 1, 4});
   CHECK(coordinator_of(plan) == 1);
 }
 
@@ -203,7 +195,7 @@ TEST_CASE("plans with different trees and frames can have the same graph",
   const auto statuses = chain_of({1, 2, 3}, {1, 1});
   const SessionPlan x = planned(statuses, links_of({{1, 2}, {2, 3}}), 1);
   SessionPlan y = planned(statuses, links_of({{1, 3}, {2, 3}}), 1);
-  y.frame = {3, 9};
+  y.frame = {{3, 9}, 1};
   CHECK_FALSE(x == y);
   CHECK(same_graph(x, y));
   CHECK_FALSE(has_lost_member(x, y));

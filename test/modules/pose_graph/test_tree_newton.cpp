@@ -92,7 +92,6 @@ TEST_CASE("Held poses of absent robots fix the frame of the others", "[pose_grap
   const CentralProblem central(problem);
   SolverTeam team = solver_team(problem, chain(problem.members()), {}, newton(kTrusting));
   REQUIRE(team.run());
-  for (const RobotId robot : problem.members()) CHECK(team.member(robot).state().held);
   CHECK(central.cost(team.poses()) == Approx(central.optimum(problem.start)).epsilon(kRelativeGap));
 }
 

@@ -84,7 +84,6 @@ TEST_CASE("Every edge belongs to one robot or to two, and parallel edges all cou
     CHECK(part->between[0].from == KeyframeId{0, 1});
     CHECK(part->between[0].to == KeyframeId{1, 0});
     CHECK(part->between[1].from == KeyframeId{1, 0});
-    CHECK(part->trusted == std::set<ClosureId>{closure_id({0, 1}, {1, 0})});
   }
 }
 

@@ -1,0 +1,123 @@
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <numeric>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/lab/pgo/agent_team.hpp"
+#include "apps/lab/pgo/scenario.hpp"
+#include "apps/lab/pgo/solvers.hpp"
+#include "apps/lab/pgo/team_graph_file.hpp"
+#include "modules/rbcd/stiefel.hpp"
+#include "test/support/shared_data.hpp"
+
+// The law: a team ends with the decisions and the poses that follow from the measurements, in
+// whatever order and at whatever times its robots have met.
+
+namespace km {
+namespace {
+
+constexpr double kInRooms_m = 1e-6, kOverKilometres_m = 1e-5;
+
+struct Answer {
+  std::vector<bool> kept;       // by edge of the graph
+  std::vector<SE3> T_first_kf;  // in the numbering of the graph
+};
+
+// The graph with the robots in another order. Edges keep their order.
+TeamGraph reordered(const TeamGraph& graph, const std::vector<std::size_t>& order) {
+  TeamGraph result{.dimension = graph.dimension, .first = {0}, .edges = graph.edges};
+  std::vector<Eigen::Index> number(static_cast<std::size_t>(graph.poses()));
+  for (const std::size_t robot : order)
+    for (Eigen::Index i = graph.first[robot]; i < graph.first[robot + 1]; ++i) {
+      number[static_cast<std::size_t>(i)] = static_cast<Eigen::Index>(result.ids.size());
+      result.ids.push_back(graph.ids[static_cast<std::size_t>(i)]);
+      if (i + 1 == graph.first[robot + 1])
+        result.first.push_back(static_cast<Eigen::Index>(result.ids.size()));
+    }
+  for (BlockEdge& e : result.edges) {
+    e.i = number[static_cast<std::size_t>(e.i)];
+    e.j = number[static_cast<std::size_t>(e.j)];
+  }
+  return result;
+}
+
+// The answer of robots with ids in this order.
+Answer answer(const TeamGraph& graph, const AgentTeamOptions& options,
+              std::vector<std::size_t> order = {}) {
+  if (order.empty()) {
+    order.resize(graph.robots());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+  }
+  AgentTeamRun run = run_agent_team(reordered(graph, order), options);
+  CHECK(run.settled);
+  Answer result{std::move(run.kept), std::vector<SE3>(run.T_world_kf.size())};
+  auto T = run.T_world_kf.begin();
+  for (const std::size_t robot : order)
+    for (Eigen::Index i = graph.first[robot]; i < graph.first[robot + 1]; ++i)
+      result.T_first_kf[static_cast<std::size_t>(i)] = *T++;
+  const SE3 T_first_world = result.T_first_kf.front().inverse();
+  for (SE3& T_kf : result.T_first_kf) T_kf = T_first_world * T_kf;
+  return result;
+}
+
+void check_same(const Answer& one, const Answer& other, double tolerance_m) {
+  std::size_t differ = 0;
+  for (std::size_t k = 0; k < one.kept.size(); ++k) differ += one.kept[k] != other.kept[k] ? 1 : 0;
+  CHECK(differ == 0);
+  double largest_m = 0.0;
+  for (std::size_t i = 0; i < one.T_first_kf.size(); ++i)
+    largest_m = std::max(
+        largest_m, (one.T_first_kf[i].translation() - other.T_first_kf[i].translation()).norm());
+  CHECK(largest_m < tolerance_m);
+}
+
+struct LawCase {
+  const char* name;
+  std::size_t robots;  // 0: those of the file; of a scenario its own
+  const char* scenario;
+  double tolerance_m;
+};
+
+// A recorded graph, or a scenario that is drawn around its optimum.
+std::optional<TeamGraph> graph_of(const LawCase& recorded) {
+  const auto file = shared_data(recorded.name);
+  if (!file) return std::nullopt;
+  if (recorded.robots == 0) return labelled_team(read_jrl(*file), file->string()).graph;
+  const bool drawn = recorded.scenario != std::string();
+  const TeamGraph graph =
+      partition_contiguously(read_g2o(*file), drawn ? 1 : recorded.robots, recorded.name);
+  if (!drawn) return without_cut_steps(graph);
+  const CentralOptimum optimum = central_optimum(graph);
+  return draw_scenario(graph, round_to_poses(optimum.X, optimum.X.leftCols<4>()),
+                       scenario_of(recorded.scenario), 1)
+      .graph;
+}
+
+TEST_CASE("A team ends alike, in whatever order and at whatever rate its robots meet",
+          "[pgo][law]") {
+  const LawCase recorded =
+      GENERATE(LawCase{"cosmo_bench/kth_r3_00_d06_d09_d10_wifi.jrl", 0, "", kOverKilometres_m},
+               LawCase{"cosmo_bench/ntu_r3_02_d02_n04_n13_wifi.jrl", 0, "", kOverKilometres_m},
+               LawCase{"pose_graphs/3d/parking-garage.g2o", 4, "", kInRooms_m},
+               LawCase{"pose_graphs/3d/parking-garage.g2o", 4, "clusters", kInRooms_m},
+               LawCase{"pose_graphs/3d/sphere2500.g2o", 5, "noisy-odometry", kInRooms_m});
+  CAPTURE(recorded.name, recorded.scenario);
+  const auto graph = graph_of(recorded);
+  if (!graph) return;
+  const Answer at_once = answer(*graph, {});
+  for (const unsigned seed : {1U, 2U, 3U})
+    for (const double keyframes_per_s : {0.0, 20.0}) {
+      CAPTURE(seed, keyframes_per_s);
+      check_same(at_once, answer(*graph, {.keyframes_per_s = keyframes_per_s, .seed = seed}),
+                 recorded.tolerance_m);
+    }
+  std::vector<std::size_t> reversed(graph->robots());
+  for (std::size_t k = 0; k < reversed.size(); ++k) reversed[k] = reversed.size() - 1 - k;
+  CAPTURE(reversed);
+  check_same(at_once, answer(*graph, {}, reversed), recorded.tolerance_m);
+}
+
+}  // namespace
+}  // namespace km
