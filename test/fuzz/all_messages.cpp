@@ -125,15 +125,16 @@ MessageReader team_messages(const TeamMessage& message, const char* name) {
 
 std::vector<MessageReader> all_team_messages() {
   const TeamPeer far{9, 1};
-  MemberPoses poses{
-      .sender = kWriter, .session = {kWriter, 4}, .stage = MemberStage::kSolved, .frame = kWriter};
+  MemberPoses poses{.sender = kWriter,
+                    .session = {kWriter, 4},
+                    .stage = MemberStage::kSolved,
+                    .frame = {kWriter, 4}};
   poses.keyframes = {0, 3, 200};
   poses.T_frame_kf.resize(3, SinglePose::of(SE3::Identity()));
   return {
-      team_messages(TeamStatus{.sender = kWriter, .frame = kWriter, .offers = {{9, 1, {2, 77}}}},
-                    "team statuses"),
+      team_messages(TeamStatus{.sender = kWriter, .offers = {{9, 1, {2, 77}}}}, "team statuses"),
       team_messages(Session{.id = {kWriter, 4},
-                            .plan = {.frame = kWriter,
+                            .plan = {.frame = {kWriter, 4},
                                      .members = {{kWriter, 4, {}}, {far, 3, kWriter.robot}},
                                      .pairs = {{2, 9, {1, 6}}}}},
                     "sessions"),

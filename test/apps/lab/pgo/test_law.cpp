@@ -95,7 +95,7 @@ std::optional<TeamGraph> graph_of(const LawCase& recorded) {
       .graph;
 }
 
-TEST_CASE("A team ends alike, in whatever order and at whatever rate its robots meet",
+TEST_CASE("A team ends equally, in whatever order and at whatever rate its robots meet",
           "[pgo][law]") {
   const LawCase recorded =
       GENERATE(LawCase{"cosmo_bench/kth_r3_00_d06_d09_d10_wifi.jrl", 0, "", kOverKilometres_m},
@@ -107,16 +107,25 @@ TEST_CASE("A team ends alike, in whatever order and at whatever rate its robots 
   const auto graph = graph_of(recorded);
   if (!graph) return;
   const Answer at_once = answer(*graph, {});
-  for (const unsigned seed : {1U, 2U, 3U})
-    for (const double keyframes_per_s : {0.0, 20.0}) {
-      CAPTURE(seed, keyframes_per_s);
-      check_same(at_once, answer(*graph, {.keyframes_per_s = keyframes_per_s, .seed = seed}),
-                 recorded.tolerance_m);
-    }
+  const auto [seed, keyframes_per_s] = GENERATE(table<unsigned, double>({{1U, 0.0}, {2U, 20.0}}));
+  CAPTURE(seed, keyframes_per_s);
+  check_same(at_once, answer(*graph, {.keyframes_per_s = keyframes_per_s, .seed = seed}),
+             recorded.tolerance_m);
+}
+
+// The limits on the number of cycles that estimate noise depend on the order of ids, and so do
+// weights: poses differ by up to 0.02 m over kilometres.
+TEST_CASE("A team decides equally with reversed ids", "[pgo][law]") {
+  const LawCase recorded =
+      GENERATE(LawCase{"cosmo_bench/kth_r3_00_d06_d09_d10_wifi.jrl", 0, "", 0.05},
+               LawCase{"cosmo_bench/ntu_r3_02_d02_n04_n13_wifi.jrl", 0, "", 0.05},
+               LawCase{"pose_graphs/3d/parking-garage.g2o", 4, "", 0.05});
+  CAPTURE(recorded.name);
+  const auto graph = graph_of(recorded);
+  if (!graph) return;
   std::vector<std::size_t> reversed(graph->robots());
   for (std::size_t k = 0; k < reversed.size(); ++k) reversed[k] = reversed.size() - 1 - k;
-  CAPTURE(reversed);
-  check_same(at_once, answer(*graph, {}, reversed), recorded.tolerance_m);
+  check_same(answer(*graph, {}), answer(*graph, {}, reversed), recorded.tolerance_m);
 }
 
 }  // namespace
