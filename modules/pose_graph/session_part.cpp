@@ -14,11 +14,15 @@
 namespace km {
 namespace {
 
+void add_public_poses(const MemberPoses& poses, std::map<KeyframeId, SE3>& public_poses) {
+  for (std::size_t k = 0; k < poses.keyframes.size(); ++k)
+    public_poses[{poses.sender.robot, poses.keyframes[k]}] = poses.T_frame_kf[k].pose();
+}
+
 // Adds the received poses of a robot that is not a member, and the closures to these poses.
 void add_absent(const MemberPoses& poses, RobotId self, const std::vector<PoseEdge>& edges,
                 SessionGraph& graph) {
-  for (std::size_t k = 0; k < poses.keyframes.size(); ++k)
-    graph.public_poses[{poses.sender.robot, poses.keyframes[k]}] = poses.T_frame_kf[k].pose();
+  add_public_poses(poses, graph.public_poses);
   for (const PoseEdge& e : edges)
     if (graph.public_poses.contains(e.other(self))) graph.to_absent.push_back(e);
 }
@@ -30,11 +34,6 @@ constexpr double kSecondLook = 5.0;
 // Limit of the messages kept before there is a solver. Senders repeat the messages beyond it.
 constexpr std::size_t kMaxEarlyMessages = 1000;
 constexpr std::size_t kMaxEarlyBytes = 1U << 26U;
-
-void add_public_poses(const MemberPoses& poses, std::map<KeyframeId, SE3>& public_poses) {
-  for (std::size_t k = 0; k < poses.keyframes.size(); ++k)
-    public_poses[{poses.sender.robot, poses.keyframes[k]}] = poses.T_frame_kf[k].pose();
-}
 
 }  // namespace
 

@@ -58,11 +58,10 @@ struct AgentTeamRun {
   double seconds = 0.0;           ///< Virtual time of the last change [s].
   std::size_t rounds = 0;         ///< In all sessions, maximum over the robots.
   SolverState last = {};          ///< State of robot 0 at the end of its last session.
-  double critical_path_s =
-      0.0;                ///< CPU time of the slowest robot, summed over all steps of the team.
-  std::size_t bytes = 0;  ///< Sent by all robots; a message counts once per receiver.
-  std::vector<AgentCost> costs;  ///< By robot.
-  std::size_t sessions = 0;      ///< Number of sessions of the team.
+  double critical_path_s = 0.0;   ///< CPU time of the slowest robot, summed over all steps.
+  std::size_t bytes = 0;          ///< Sent by all robots; a message counts once per receiver.
+  std::vector<AgentCost> costs;   ///< By robot.
+  std::size_t sessions = 0;       ///< Number of sessions of the team.
   std::vector<std::string> notices;
 };
 
