@@ -23,7 +23,7 @@ constexpr int kIterations = 40;
 // interval).
 constexpr double kDoubt = 4.0;
 // A larger scale may be that of false cycles. Chosen by graphs that were seen: closures of the
-// tunnels are 3.8 times as noisy as stated. False cycles of a smaller scale are taken for noise.
+// tunnels are 3.8 times as noisy as stated. False cycles of a smaller scale are treated as noise.
 constexpr double kSuspicious = 10.0;
 // Least ratio of the sizes of false cycles and noise. One population whose lengths are not exactly
 // those of normal vectors would otherwise count as two.
@@ -75,7 +75,7 @@ Densities densities_of(const NoiseHistogram& histogram, const Population& popula
 }
 
 struct Fit {
-  std::vector<double> shares = {};  // of the populations; the other lengths may have any value
+  std::vector<double> shares = {};  // Populations; the other lengths may be any
   double log_likelihood = 0.0;
 };
 

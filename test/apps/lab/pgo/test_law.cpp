@@ -113,8 +113,8 @@ TEST_CASE("A team ends equally, in whatever order and at whatever rate its robot
              recorded.tolerance_m);
 }
 
-// The limits on the number of cycles that estimate noise depend on the order of ids, and so do
-// weights: poses differ by up to 0.02 m over kilometres, and by up to 0.3 mm in the garage.
+// Limits on the number of cycles that estimate noise depend on the order of ids, and so do weights.
+// Poses differ by up to 0.02 m over kilometres, and by up to 0.3 mm in the garage.
 TEST_CASE("A team decides equally with reversed ids", "[pgo][law]") {
   const LawCase recorded =
       GENERATE(LawCase{"cosmo_bench/kth_r3_00_d06_d09_d10_wifi.jrl", 0, "", 0.025},
