@@ -14,17 +14,14 @@ struct Precision {
   double tau = 1.0;    ///< Weight of the translation [1/m^2].
 };
 
-/// Isotropic weights of a 6x6 covariance, tangent [rotation; translation]: kappa = 3 / (2 tr
-/// Sigma_R), tau = 3 / tr Sigma_t, as SE-Sync reads pose graphs (Rosen et al., "SE-Sync", IJRR
-/// 2019). For block-diagonal information matrices of g2o both readings agree exactly; cross terms
-/// are dropped. Throws std::invalid_argument unless both traces are positive and finite.
-[[nodiscard]] inline Precision precision_of(const Matrix6& covariance) {
-  const double rotation = covariance.topLeftCorner<3, 3>().trace();
-  const double translation = covariance.bottomRightCorner<3, 3>().trace();
-  if (!(rotation > 0.0 && translation > 0.0 && std::isfinite(rotation + translation)))
-    throw std::invalid_argument("precision_of: a trace of the covariance is not positive");
-  return {3.0 / (2.0 * rotation), 3.0 / translation};
-}
+/// Isotropic weights of a 6x6 covariance, tangent [rotation; translation], as SE-Sync reads g2o
+/// files (Rosen et al., "SE-Sync", IJRR 2019). With the diagonal blocks I_R, I_t of the information
+/// matrix, kappa = 3 / (2 tr I_R^-1) and tau = 3 / tr I_t^-1. I_R^-1 is the covariance of the
+/// rotation if the translation is known. With a long lever arm between the two, it is much smaller
+/// than that of the rotation alone. Only the upper triangle counts, which is what robots send: all
+/// of them compute equal weights, to the last bit. A covariance that is singular has the weights of
+/// its own blocks. Throws std::invalid_argument unless the traces are positive and finite.
+[[nodiscard]] Precision precision_of(const Matrix6& covariance);
 
 /// The isotropic covariance with these weights: Sigma_R = 1/(2 kappa) I, Sigma_t = 1/tau I.
 /// Throws std::invalid_argument unless both are positive and finite.

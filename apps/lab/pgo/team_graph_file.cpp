@@ -32,10 +32,8 @@ std::set<KeyframeId> poses_of(const G2oGraph& graph, const std::string& file) {
   return poses;
 }
 
-Precision weight_of(const RelativePose& e, EdgeWeights weights, int dimension,
-                    const std::string& file) try {
-  return weights == EdgeWeights::kAsTheTeam ? precision_of(e.covariance)
-                                            : precision_of_blocks(e.covariance, dimension);
+Precision weight_of(const RelativePose& e, int dimension, const std::string& file) try {
+  return precision_of_blocks(e.covariance, dimension);
 } catch (const std::invalid_argument&) {
   throw std::runtime_error(file + ": the information matrix of edge " + to_string(e.from) + " -> " +
                            to_string(e.to) + " is not positive definite to the digits of a double");
@@ -65,13 +63,8 @@ std::filesystem::path nonempty_folder(const std::filesystem::path& folder) {
   return folder;
 }
 
-struct PartFiles {
-  std::vector<std::filesystem::path> files;
-  EdgeWeights weights;
-};
-
 // Files of the pose graphs of a team's run. Without a run: the files in the folder itself.
-PartFiles part_files(const std::filesystem::path& folder) {
+std::vector<std::filesystem::path> part_files(const std::filesystem::path& folder) {
   std::vector<std::filesystem::path> results, files;
   for (const auto& entry : std::filesystem::directory_iterator(nonempty_folder(folder))) {
     const auto extension = entry.path().extension();
@@ -80,13 +73,12 @@ PartFiles part_files(const std::filesystem::path& folder) {
     else if ((extension == ".csv" || extension == ".g2o") && entry.path().stem() != "fullGraph")
       files.push_back(entry.path());
   }
-  const bool of_a_run = !results.empty();
-  std::vector<std::filesystem::path>& chosen = of_a_run ? results : files;
+  std::vector<std::filesystem::path>& chosen = results.empty() ? files : results;
   if (chosen.empty())
     throw std::runtime_error(folder.string() +
                              ": no *.csv and no *.g2o in it, and no robot's pose_graph.g2o below");
   std::sort(chosen.begin(), chosen.end());
-  return {chosen, of_a_run ? EdgeWeights::kAsTheTeam : EdgeWeights::kAsSeSync};
+  return chosen;
 }
 
 void check_complete(const std::vector<RecordedGraph>& parts, const std::filesystem::path& folder) {
@@ -128,9 +120,8 @@ Precision precision_of_blocks(const Matrix6& covariance, int dimension) {
     const Eigen::Matrix3d information = inverse_of<3>(planar);
     return {information(0, 0), 2.0 / inverse_of<2>(information.bottomRightCorner<2, 2>()).trace()};
   }
-  const Matrix6 information = inverse_of<6>(covariance);
-  return {1.5 / inverse_of<3>(information.topLeftCorner<3, 3>()).trace(),
-          3.0 / inverse_of<3>(information.bottomRightCorner<3, 3>()).trace()};
+  (void)inverse_of<6>(covariance);  // a file is refused where a robot has a way out
+  return precision_of(covariance);
 }
 
 TeamGraph partition_contiguously(const G2oGraph& graph, std::size_t robots,
@@ -148,7 +139,7 @@ TeamGraph partition_contiguously(const G2oGraph& graph, std::size_t robots,
 }
 
 TeamGraph partition_graph(const G2oGraph& graph, const std::map<KeyframeId, std::size_t>& robot_of,
-                          const std::string& file, EdgeWeights weights) {
+                          const std::string& file) {
   TeamGraph team{.dimension = graph.dimension, .indefinite_edges = graph.indefinite_edges};
   std::map<std::size_t, std::vector<KeyframeId>> poses_of_robot;
   const std::set<KeyframeId> poses = poses_of(graph, file);
@@ -177,7 +168,7 @@ TeamGraph partition_graph(const G2oGraph& graph, const std::map<KeyframeId, std:
     team.first.push_back(static_cast<Eigen::Index>(team.ids.size()));
   }
   for (const RelativePose& e : graph.edges) {
-    const Precision weight = weight_of(e, weights, graph.dimension, file);
+    const Precision weight = weight_of(e, graph.dimension, file);
     team.edges.push_back(
         {number_of.at(e.from), number_of.at(e.to), e.T_from_to, weight.kappa, weight.tau});
   }
@@ -189,8 +180,7 @@ TeamGraph partition_graph(const G2oGraph& graph, const std::map<KeyframeId, std:
 }
 
 TeamGraph read_team_folder(const std::filesystem::path& folder) {
-  const auto [files, weights] = part_files(folder);
-  const std::vector<RecordedGraph> parts = read_parts(files);
+  const std::vector<RecordedGraph> parts = read_parts(part_files(folder));
   check_complete(parts, folder);
   G2oGraph all{.dimension = 3, .vertices = {}, .edges = {}};
   std::map<KeyframeId, std::size_t> robot_of;
@@ -214,7 +204,7 @@ TeamGraph read_team_folder(const std::filesystem::path& folder) {
   for (const RecordedGraph& part : parts)
     for (const RelativePose& e : part.inter_closures)
       if (e.to.robot == part.robot && !from_start.contains({e.from, e.to})) all.edges.push_back(e);
-  return partition_graph(all, robot_of, folder.string(), weights);
+  return partition_graph(all, robot_of, folder.string());
 }
 
 LabelledTeamGraph labelled_team(const JrlGraph& graph, const std::string& file) {
@@ -232,7 +222,7 @@ LabelledTeamGraph labelled_team(const JrlGraph& graph, const std::string& file) 
     all.edges.push_back(measured.edge);
     if (graph.has_labels) truth.is_false.push_back(measured.is_false);
   }
-  TeamGraph team = partition_graph(all, robot_of, file, EdgeWeights::kAsTheTeam);
+  TeamGraph team = partition_graph(all, robot_of, file);
   if (!graph.truth.empty())
     for (const KeyframeId& id : team.ids) {
       const auto pose = graph.truth.find(id);

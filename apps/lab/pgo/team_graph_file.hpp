@@ -12,19 +12,11 @@
 
 namespace km {
 
-/// Weights of a relative pose, as SE-Sync reads them from a g2o file. kappa and tau come from the
-/// diagonal blocks of the information matrix. Cross terms are dropped before the blocks are
-/// inverted; precision_of() drops them afterwards. Dimension 2: kappa = I_33, tau = 2 / tr(I_t^-1).
-/// Dimension 3: kappa = 3 / (2 tr(I_R^-1)), tau = 3 / tr(I_t^-1). `covariance` is that of
-/// read_g2o(). Throws std::invalid_argument if it is not positive definite (in the plane, for
-/// dimension 2).
+/// Weights of a relative pose in a graph of this dimension. 3: precision_of(), as robots weigh
+/// their measurements. 2: kappa = I_33, tau = 2 / tr(I_t^-1) of the information matrix in the
+/// plane, as SE-Sync reads g2o files. Throws std::invalid_argument if `covariance` (in the plane,
+/// for dimension 2) is not positive definite.
 [[nodiscard]] Precision precision_of_blocks(const Matrix6& covariance, int dimension);
-
-/// Rule for the weights of edges.
-enum class EdgeWeights {
-  kAsSeSync,   ///< precision_of_blocks(), to compare with published costs of public graphs.
-  kAsTheTeam,  ///< precision_of(), as robots weigh their measurements.
-};
 
 /// Divides the poses of a graph among `robots` robots, in ascending order of ids. Each robot gets a
 /// contiguous block of equal length, and the last robot also gets the rest. `file` names the source
@@ -41,16 +33,14 @@ enum class EdgeWeights {
 /// Robots are 0 to N - 1, and each has a pose. Otherwise as partition_contiguously().
 [[nodiscard]] TeamGraph partition_graph(const G2oGraph& graph,
                                         const std::map<KeyframeId, std::size_t>& robot_of,
-                                        const std::string& file,
-                                        EdgeWeights weights = EdgeWeights::kAsSeSync);
+                                        const std::string& file);
 
-/// Reads the result of a team's run in `folder`: pose_graph.g2o in the run folder of every robot,
-/// with the weights of the run. If there are none, it reads one file per robot, *.csv or *.g2o,
-/// with the weights kAsSeSync (see read_recorded_graph()). fullGraph.g2o is left out, because it
-/// repeats all edges. Robots are numbered by ascending id. The number of edges between two poses of
-/// two robots is that in the file of the robot from which they start. If that file has none, it is
-/// the number in the file of the other robot. Throws std::runtime_error as partition_graph() does,
-/// and if the file of a robot is missing.
+/// Reads the result of a team's run in `folder`: pose_graph.g2o in the run folder of every robot.
+/// If there are none, it reads one file per robot, *.csv or *.g2o (see read_recorded_graph()).
+/// fullGraph.g2o is left out, because it repeats all edges. Robots are numbered by ascending id.
+/// The number of edges between two poses of two robots is that in the file of the robot from which
+/// they start. If that file has none, it is the number in the file of the other robot. Throws
+/// std::runtime_error as partition_graph() does, and if the file of a robot is missing.
 [[nodiscard]] TeamGraph read_team_folder(const std::filesystem::path& folder);
 
 /// Ground truth of a data set on a team's graph, hidden from solvers. A member is empty if the data
@@ -68,7 +58,7 @@ struct LabelledTeamGraph {
 };
 
 /// The team of a JRL file. Robot k is the k-th robot of the file. Edges are in the order of the
-/// measurements and have the weights of robots (kAsTheTeam). `file` names the source in errors.
+/// measurements and have the weights of robots. `file` names the source in errors.
 /// Throws std::runtime_error as partition_graph() does.
 [[nodiscard]] LabelledTeamGraph labelled_team(const JrlGraph& graph, const std::string& file);
 
