@@ -26,10 +26,15 @@ namespace km {
 //     archive(pose.id, pose.T_odom_kf, pose.covariance);
 //   }
 // The archive is an ArchiveWriter, and the value constant, or an ArchiveReader, which assigns it.
+// An archive also takes values of types that have such a function.
 
 /// T, constant or not.
 template <typename T, typename U>
 concept As = std::same_as<std::remove_const_t<T>, U>;
+
+/// True if the archive assigns the values that it is given.
+template <typename Archive>
+inline constexpr bool kReads = std::remove_reference_t<Archive>::kReads;
 
 [[nodiscard]] constexpr bool is_printable(char c) {
   return c >= ' ' && c <= '~';
@@ -46,6 +51,7 @@ class ArchiveWriter {
   }
   void fixed(std::uint16_t value) { out_.u16(value); }
   void fixed(std::int32_t value) { out_.u32(static_cast<std::uint32_t>(value)); }
+  void fixed(std::uint64_t value) { out_.u64(value); }
   /// A pose in single precision: quaternion and position.
   void single(const SE3& T) {
     const Eigen::Quaterniond q(T.linear());
@@ -62,6 +68,10 @@ class ArchiveWriter {
     out_.varint(text.size());
     for (const char c : text) out_.u8(static_cast<std::uint8_t>(is_printable(c) ? c : '?'));
   }
+  /// The number of the elements that follow: up to `most`, of at least `least_bytes` each.
+  void count(std::size_t elements, std::size_t /*most*/, std::size_t /*least_bytes*/) {
+    out_.varint(elements);
+  }
   /// Up to `most` elements of at least `least_bytes` each.
   template <typename T, typename Each>
   void list(const std::vector<T>& values, std::size_t /*most*/, std::size_t /*least_bytes*/,
@@ -69,6 +79,19 @@ class ArchiveWriter {
     out_.varint(values.size());
     for (const T& value : values) each(value);
   }
+  template <typename T>
+  void list(const std::vector<T>& values, std::size_t /*most*/, std::size_t /*least_bytes*/) {
+    out_.varint(values.size());
+    for (const T& value : values) put(value);
+  }
+  /// Up to eight flags in a byte.
+  void flags(std::same_as<bool> auto... values) {
+    unsigned byte = 0, bit = 0;
+    ((byte |= (values ? 1U : 0U) << bit++), ...);
+    out_.u8(static_cast<std::uint8_t>(byte));
+  }
+  /// All bytes up to the end.
+  void rest(std::span<const std::uint8_t> bytes) { out_.bytes(bytes); }
   template <typename T, typename Each>
   void optional(const std::optional<T>& value, const Each& each) {
     put(value.has_value());
@@ -92,6 +115,9 @@ class ArchiveWriter {
   void put(std::unsigned_integral auto value) { out_.varint(value); }
   void put(int value) { out_.u32(static_cast<std::uint32_t>(value)); }
   void put(Stamp value) { out_.u64(static_cast<std::uint64_t>(value)); }
+  template <typename T>
+  requires requires(ArchiveWriter& archive, const T& value) { describe(archive, value); }
+  void put(const T& value) { describe(*this, value); }
   void put(float value) { out_.f32(value); }
   void put(double value) { out_.f64(value); }
   void put(const KeyframeId& id) { (*this)(id.robot, id.index); }
@@ -131,6 +157,7 @@ class ArchiveReader {
   }
   void fixed(std::uint16_t& value) { value = in_.u16(); }
   void fixed(std::int32_t& value) { value = static_cast<std::int32_t>(in_.u32()); }
+  void fixed(std::uint64_t& value) { value = in_.u64(); }
   void single(SE3& T) {
     constexpr double kUnitTolerance = 1e-3, kMaxTranslation_m = 1e7;
     float x = 0, y = 0, z = 0, w = 0;
@@ -151,11 +178,24 @@ class ArchiveReader {
     get(text);
     require(std::ranges::all_of(text, is_printable));
   }
+  void count(std::size_t& elements, std::size_t most, std::size_t least_bytes) {
+    elements = in_.count(most, least_bytes);
+  }
   template <typename T, typename Each>
   void list(std::vector<T>& values, std::size_t most, std::size_t least_bytes, const Each& each) {
     values.resize(in_.count(most, least_bytes));
     for (T& value : values) each(value);
   }
+  template <typename T>
+  void list(std::vector<T>& values, std::size_t most, std::size_t least_bytes) {
+    list(values, most, least_bytes, [this](T& value) { get(value); });
+  }
+  void flags(std::same_as<bool> auto&... values) {
+    unsigned byte = in_.u8();
+    ((values = (byte & 1U) != 0, byte >>= 1U), ...);
+    require(byte == 0);
+  }
+  [[nodiscard]] std::span<const std::uint8_t> rest() { return in_.bytes(in_.left()); }
   template <typename T, typename Each>
   void optional(std::optional<T>& value, const Each& each) {
     bool has = false;
@@ -175,6 +215,8 @@ class ArchiveReader {
 
   /// True if all bytes were read and no value was impossible.
   [[nodiscard]] bool done() const { return in_.done(); }
+  [[nodiscard]] bool failed() const { return in_.failed(); }
+  [[nodiscard]] std::size_t left() const { return in_.left(); }
 
  private:
   void get(bool& value) {
@@ -190,6 +232,9 @@ class ArchiveReader {
   }
   void get(int& value) { value = static_cast<int>(in_.u32()); }
   void get(Stamp& value) { value = static_cast<Stamp>(in_.u64()); }
+  template <typename T>
+  requires requires(ArchiveReader& archive, T& value) { describe(archive, value); }
+  void get(T& value) { describe(*this, value); }
   void get(float& value) { value = finite(in_.f32()); }
   void get(double& value) { value = finite(in_.f64()); }
   void get(KeyframeId& id) { (*this)(id.robot, id.index); }

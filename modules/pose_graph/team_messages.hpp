@@ -1,6 +1,5 @@
 #pragma once
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <compare>
 #include <cstddef>
@@ -17,22 +16,9 @@
 #include "modules/core/precision.hpp"
 #include "modules/core/robot_identity.hpp"
 #include "modules/pose_graph/pgo_method.hpp"
+#include "modules/pose_graph/single_pose.hpp"
 
 namespace km {
-
-/// A rigid transform in single precision, as in messages.
-struct SinglePose {
-  Eigen::Quaternionf q = Eigen::Quaternionf::Identity();
-  Eigen::Vector3f t = Eigen::Vector3f::Zero();  ///< [m]
-
-  [[nodiscard]] static SinglePose of(const SE3& T) {
-    return {Eigen::Quaterniond(T.linear()).cast<float>(), T.translation().cast<float>()};
-  }
-  /// The transform in double precision, equal on all robots to the last bit.
-  [[nodiscard]] SE3 pose() const {
-    return make_pose(q.cast<double>().normalized().toRotationMatrix(), t.cast<double>());
-  }
-};
 
 /// Identity of the set of edges between two robots. Both robots offer the sets that they hold, and
 /// optimise one that both hold. `hash` covers the version, and the ids, translations and weights of

@@ -121,7 +121,7 @@ struct TreeVerdict {
     kStop,     ///< The new poses are not accepted; the accepted ones are the result.
   };
   /// Weights of this round. kWeigh: new ones. kHold: unchanged. kDecided: final.
-  enum class Weighing : std::uint8_t { kWeigh = 1, kHold, kDecided };
+  enum class Weighing : std::uint8_t { kWeigh, kHold, kDecided };
 
   std::uint32_t round = 0;  ///< Round to which this is the answer.
   Next next = Next::kStep;

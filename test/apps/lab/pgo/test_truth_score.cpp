@@ -159,11 +159,11 @@ TEST_CASE("outliers leaves out the closures that a JRL file labels as false", "[
 TEST_CASE("True closures of COSMO-Bench lead to their known errors", "[truth]") {
   struct Set {
     const char* name;
-    double ate_m;  // error of the certified optimum with kappa and tau, rounded to 1 cm
+    double ate_m;  // error of the certified optimum with the weights of robots, rounded to 1 cm
   };
   const Set set = GENERATE(
-      Set{"kth_r3_00_d06_d09_d10_wifi", 1.93}, Set{"kth_r3_00_d06_d09_d10_proradio", 1.25},
-      Set{"ntu_r3_02_d02_n04_n13_wifi", 2.56}, Set{"ntu_r3_02_d02_n04_n13_proradio", 2.84});
+      Set{"kth_r3_00_d06_d09_d10_wifi", 1.90}, Set{"kth_r3_00_d06_d09_d10_proradio", 1.24},
+      Set{"ntu_r3_02_d02_n04_n13_wifi", 2.48}, Set{"ntu_r3_02_d02_n04_n13_proradio", 2.81});
   const auto file = shared_data(std::string("cosmo_bench/") + set.name + ".jrl");
   if (!file) return;
   CAPTURE(set.name);
