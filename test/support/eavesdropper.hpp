@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "apps/lab/pgo/member_team.hpp"
-#include "apps/lab/pgo/odometry_start.hpp"
+#include "modules/pose_graph/chordal.hpp"
 #include "modules/pose_graph/member_solver.hpp"
 #include "modules/pose_graph/tree_messages.hpp"
 #include "modules/pose_graph/tree_newton.hpp"
@@ -169,7 +169,8 @@ inline Eavesdropper listen_to(const TeamGraph& graph, int max_rounds) {
   Eavesdropper ear(graph);
   const TreeNewtonOptions options{.dimension = graph.dimension};
   REQUIRE(options.robust);
-  MemberTeam team(graph, 3, odometry_start(graph), [&](SessionGraph part, TreePlace place) {
+  std::vector<SE3> start = chordal_initialisation(graph.poses(), graph.edges);
+  MemberTeam team(graph, 3, std::move(start), [&](SessionGraph part, TreePlace place) {
     const RobotId self = part.self;
     ear.announced(part);
     auto member = std::make_unique<TreeNewton>(std::move(part), std::move(place), options);

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "apps/lab/pgo/agent_team.hpp"
-#include "apps/lab/pgo/odometry_start.hpp"
 #include "apps/lab/pgo/solvers.hpp"
 #include "apps/lab/pgo/team_graph.hpp"
 #include "modules/evaluation/trajectory_error.hpp"
@@ -136,9 +135,7 @@ PlacedTeam solve_by_gnc(const TeamGraph& graph) {
   const double c2 = chi_squared_6_quantile(kConfidence);
   const std::vector<bool> odometry = odometry_edges(graph);
   const std::vector<bool> all(graph.edges.size(), true);
-  const bool joined = std::ranges::count(part_of_poses(graph), 0) == graph.poses();
-  PlacedTeam placed =
-      solve_centrally(graph, all, joined ? odometry_start(graph) : chordal_start(graph, all));
+  PlacedTeam placed = solve_centrally(graph, all, chordal_start(graph, all));
   double largest = 0.0;
   for (std::size_t k = 0; k < odometry.size(); ++k)
     if (!odometry[k]) largest = std::max(largest, residual(graph.edges[k], placed.T_frame_kf));

@@ -99,8 +99,8 @@ struct PlacedTeam {
 /// Graduated non-convexity with truncated least squares at a fixed scale (Yang et al., "Graduated
 /// Non-Convexity for Robust Spatial Perception", RA-L 2020, Algorithm 1). Closures are rejected if
 /// their squared residual exceeds the 99 % quantile of chi-squared with 6 degrees of freedom.
-/// Odometry is trusted. The start is odometry_start(), or chordal if closures do not join all
-/// robots. Each change of the weights is followed by at most 20 Newton steps.
+/// Odometry is trusted. The start is chordal. Each change of the weights is followed by at most 20
+/// Newton steps.
 [[nodiscard]] PlacedTeam solve_by_gnc(const TeamGraph& graph);
 
 /// Counts closures lost and kept, and computes the errors of `placed`. Method, share, seed and time

@@ -7,7 +7,6 @@
 
 #include "apps/lab/pgo/agent_team.hpp"
 #include "apps/lab/pgo/central_solver.hpp"
-#include "apps/lab/pgo/odometry_start.hpp"
 #include "modules/core/lie.hpp"
 #include "modules/pose_graph/chordal.hpp"
 #include "modules/rbcd/stiefel.hpp"
@@ -98,7 +97,7 @@ TEST_CASE("The robots' own code refuses interrupted graphs", "[pgo][agents]") {
 void mistake_a_place(TeamGraph& graph, Eigen::Index closures) {
   const SE3 off =
       make_pose(so3_exp(Eigen::Vector3d(0.0, 0.0, 2.0)), Eigen::Vector3d(3.0, 4.0, 0.0));
-  const std::vector<SE3> T = odometry_start(graph);
+  const std::vector<SE3> T = chordal_initialisation(graph.poses(), graph.edges);
   const Eigen::Index a = graph.first[0] + 15, b = graph.first[1] + 5;
   const auto at = [&](Eigen::Index k) { return T[static_cast<std::size_t>(k)]; };
   for (Eigen::Index k = 0; k < closures; ++k)
