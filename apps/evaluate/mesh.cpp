@@ -1,18 +1,25 @@
+#include <array>
 #include <deque>
 #include <filesystem>
 #include <iostream>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "apps/evaluate/commands.hpp"
 #include "apps/evaluate/inputs.hpp"
+#include "apps/evaluate/surface_image.hpp"
 #include "apps/output_file.hpp"
 #include "apps/stage_progress.hpp"
+#include "modules/evaluation/mesh/map_quality.hpp"
 #include "modules/evaluation/mesh/mesh_error.hpp"
 #include "modules/evaluation/mesh/mesh_report.hpp"
+#include "modules/evaluation/trajectory_file.hpp"
 #include "modules/mesh/mesh_file.hpp"
+#include "modules/sensors/node/open_folder.hpp"
 
 namespace km {
 namespace {
@@ -33,8 +40,49 @@ struct MeshFiles {
   }
 };
 
+// The true surface that the left cameras of recordings saw, a point for each cell. The lens is
+// taken as ideal.
+std::vector<SeenPoint> seen_points(const LabelledMesh& world,
+                                   const std::vector<std::filesystem::path>& recordings) {
+  constexpr double kShrink = 4.0, kInterval_s = 1.0;
+  constexpr float kCell_m = 0.05F;
+  std::map<std::array<int, 3>, SeenPoint> seen;
+  for (const auto& recording : recordings) {
+    const auto mav0 = find_mav0(recording);
+    const Camera camera = read_euroc_rig(mav0).stereo.cameras[0];
+    PictureView view{.width = static_cast<int>(camera.width / kShrink),
+                     .height = static_cast<int>(camera.height / kShrink),
+                     .perspective = true,
+                     .scale = camera.fx / kShrink};
+    std::optional<Stamp> last;
+    for (const auto& [stamp, T_world_body] :
+         read_trajectory(mav0 / "state_groundtruth_estimate0" / "data.csv")) {
+      if (last && seconds_between(*last, stamp) < kInterval_s) continue;
+      last = stamp;
+      view.T_cam_world = (T_world_body * camera.T_body_cam).inverse();
+      const SurfaceImage image = rasterise(world, view);
+      for (int row = 0; row < view.height; ++row)
+        for (int column = 0; column < view.width; ++column) {
+          const std::size_t pixel = image.at(column, row);
+          const float depth_m = image.depth_m[pixel];
+          if (!(depth_m < MapQuality::kDepths_m.back())) continue;
+          const Eigen::Vector3f point =
+              view.unproject(column + 0.5, row + 0.5, static_cast<double>(depth_m)).cast<float>();
+          const Eigen::Array3i cell = (point.array() / kCell_m).floor().cast<int>();
+          const SeenPoint now{point, depth_m, world.face_label(image.faces[pixel])};
+          const auto [known, is_new] = seen.try_emplace({cell.x(), cell.y(), cell.z()}, now);
+          if (!is_new && depth_m < known->second.depth_m) known->second = now;
+        }
+    }
+  }
+  std::vector<SeenPoint> points;
+  for (const auto& [cell, point] : seen) points.push_back(point);
+  return points;
+}
+
 struct MeshCommand {
   std::filesystem::path truth, palette, json;
+  std::vector<std::filesystem::path> seen_by;
   std::vector<std::filesystem::path> estimates, before, trajectories, true_trajectories;
   MeshErrorOptions options;
 
@@ -70,6 +118,10 @@ struct MeshCommand {
         ->capture_default_str();
     app.add_option("--palette", palette,
                    "Names of the labels (CSV); default: label_palette.csv beside the truth");
+    app.add_option(
+        "--seen-by", seen_by,
+        "Recordings (EuRoC/ASL folders) with the true poses: also how much of what their "
+        "left cameras saw is mapped, by distance and class, and how smooth walls are");
     app.add_option("--json", json, "Also write the numbers to this file, as JSON");
   }
 
@@ -111,7 +163,17 @@ struct MeshCommand {
       const MeshReport report =
           placed([&] { return mesh_error(world, after.inputs, options, progress); });
       print(report, names);
-      write_json_output(json, to_json(report, names));
+      Json numbers = to_json(report, names);
+      if (!seen_by.empty()) {
+        progress("what cameras saw", 0.0);
+        LabelledMesh map;
+        for (const MeshInput& input : after.inputs) map.append(input.mesh);
+        map.transform(report.registration.T_truth_estimate);
+        const MapQuality quality = map_quality(world, map, seen_points(world, seen_by), names);
+        std::cout << '\n' << to_table(quality, names);
+        numbers["quality"] = to_json(quality, names);
+      }
+      write_json_output(json, numbers);
     } else {
       const MeshChange change = placed(
           [&] { return mesh_change(world, former.inputs, after.inputs, options, progress); });
