@@ -1,0 +1,32 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "modules/mesh/labelled_mesh.hpp"
+
+namespace km {
+
+/// Smooths noise of a surface and keeps its edges: a bilateral filter of the normals of faces, then
+/// vertices that follow these normals (Sun, Rosin, Martin and Langbein, "Fast and Effective
+/// Feature-Preserving Mesh Denoising", 2007, eqs. (5), (9)). Weights also contain the areas.
+///
+/// A vertex depends on the faces within kFilterRings rings around it only. Equal surroundings give
+/// equal results.
+inline constexpr int kNormalRounds = 8, kVertexRounds = 12;
+inline constexpr int kFilterRings = kNormalRounds + kVertexRounds;
+
+/// The filtered positions of all vertices. Time proportional to the faces.
+[[nodiscard]] std::vector<Eigen::Vector3f> filter_surface(
+    const std::vector<Eigen::Vector3f>& vertices, std::span<const LabelledMesh::Face> faces);
+
+/// Updates `filtered`, the result for an earlier state of the mesh, near the vertices that have
+/// `changed`, or whose faces have.
+void filter_surface(const std::vector<Eigen::Vector3f>& vertices,
+                    std::span<const LabelledMesh::Face> faces,
+                    const std::vector<std::uint32_t>& changed,
+                    std::vector<Eigen::Vector3f>& filtered);
+
+}  // namespace km
