@@ -207,7 +207,9 @@ void BlockFusion::project(const Eigen::Vector3f& start, Row& row) const {
     row.pixel[i] = view_.pixels[static_cast<std::size_t>(row.index[i])];
 }
 
-void BlockFusion::update(Row& row, float* distance, float* weight) const {
+void BlockFusion::update(Row& row, std::size_t first, VoxelBlock& block) const {
+  float* const distance = &block.distance[first];
+  float* const weight = &block.weight[first];
   const float truncation = truncation_, near = near_, max_weight = max_weight_;
   const float ramp = 1.0F / (truncation_ - voxel_);
   const float variance = variance_, quadratic = quadratic_variance_;
@@ -232,6 +234,11 @@ void BlockFusion::update(Row& row, float* distance, float* weight) const {
     weight[i] = sum < max_weight ? sum : max_weight;
     row.observed_weight[i] = w;
   }
+  for (std::size_t i = 0; i < kBlockSide; ++i) {
+    std::uint8_t& views = block.views[first + i];
+    views =
+        static_cast<std::uint8_t>(views + (row.observed_weight[i] > 0.0F && views < 255 ? 1 : 0));
+  }
   row.moved = moved != 0;
   row.near_bits = near_bits;
 }
@@ -253,7 +260,7 @@ void BlockFusion::fuse(VoxelBlock& block) const {
     const auto y = static_cast<float>(r % kBlockSide), z = static_cast<float>(r / kBlockSide);
     project(corner + y * step_.col(1) + z * step_.col(2), row);
     const std::size_t first = r * kBlockSide;
-    update(row, &block.distance[first], &block.weight[first]);
+    update(row, first, block);
     moved |= row.moved;
     if (row.near_bits == 0) continue;
     near = true;
@@ -279,6 +286,7 @@ void BlockFusion::fuse_free(VoxelBlock& block) const {
     block.distance[i] = mean;
     block.weight[i] = sum < max_weight ? sum : max_weight;
   }
+  for (std::uint8_t& views : block.views) views = static_cast<std::uint8_t>(views + (views < 255));
   if (moved != 0 && !block.changed) {
     block.changed = true;
     block.changed_since = keyframe_;

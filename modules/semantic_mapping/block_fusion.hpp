@@ -65,7 +65,7 @@ class BlockFusion {
 
   [[nodiscard]] Eigen::Vector3f corner_of(const VoxelBlock& block) const;
   void project(const Eigen::Vector3f& start, Row& row) const;
-  void update(Row& row, float* distance, float* weight) const;
+  void update(Row& row, std::size_t first, VoxelBlock& block) const;
   void vote(const Row& row, VoxelLabels* labels) const;
   [[nodiscard]] float weight_of(float depth) const;
 

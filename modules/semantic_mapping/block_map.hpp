@@ -42,6 +42,13 @@ struct BlockMesh {
   std::vector<std::uint16_t> cell_of_face;  ///< voxel_index of the cell's lowest corner.
 };
 
+/// Conditions under which an observed voxel counts as known: at least this number of views, and a
+/// sum of weights above this one.
+struct KnownFrom {
+  std::uint8_t views = 1;
+  float weight = 0.0F;
+};
+
 /// 8 x 8 x 8 voxels of the map. Voxel (x, y, z) samples the point
 /// (8 position + (x, y, z)) * voxel size of the odometry frame.
 struct VoxelBlock {
@@ -52,6 +59,9 @@ struct VoxelBlock {
   std::array<float, kBlockVoxels> distance = {};
   std::array<float, kBlockVoxels> weight = {};
 
+  /// Number of views that observed each voxel, at most 255.
+  std::array<std::uint8_t, kBlockVoxels> views = {};
+
   /// Null until a labelled frame showed the block.
   std::unique_ptr<std::array<VoxelLabels, kBlockVoxels>> labels;
 
@@ -60,6 +70,10 @@ struct VoxelBlock {
 
   /// Bit x of row y + 8 z: the voxel was seen near a surface since the block was last meshed.
   std::array<std::uint8_t, kBlockRows> near_rows = {};
+
+  [[nodiscard]] bool knows(std::size_t voxel, const KnownFrom& from) const {
+    return views[voxel] >= from.views && weight[voxel] > from.weight;
+  }
 
   std::uint64_t selected_in = 0;    ///< Last frame for which select_near_blocks() chose the block.
   KeyframeIndex last_seen = 0;      ///< Last keyframe that saw surface in the block.

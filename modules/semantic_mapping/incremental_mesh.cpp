@@ -5,6 +5,8 @@
 #include <limits>
 #include <utility>
 
+#include "modules/mesh/surface_filter.hpp"
+
 namespace km {
 namespace {
 
@@ -59,8 +61,8 @@ class PlaceOfId {
 
 }  // namespace
 
-IncrementalMesh::IncrementalMesh(double voxel_size_m, double min_weight)
-    : voxel_m_(voxel_size_m), min_weight_(static_cast<float>(min_weight)) {}
+IncrementalMesh::IncrementalMesh(double voxel_size_m, const KnownFrom& known)
+    : voxel_m_(voxel_size_m), known_(known) {}
 
 std::size_t IncrementalMesh::update(BlockMap& map) {
   std::vector<VoxelBlock*> blocks;
@@ -105,7 +107,7 @@ void IncrementalMesh::release_faces(VoxelBlock& block) {
 }
 
 void IncrementalMesh::mesh_block(VoxelBlock& block, BlockMap& map) {
-  const BlockCells cells(block, map, min_weight_);
+  const BlockCells cells(block, map, known_);
   if (!cells.any()) return;
   std::array<std::uint32_t, MarchingCubes::kEdges> vertices;
   for (int z = 0; z < kBlockSide; ++z)
@@ -317,7 +319,7 @@ SurfaceDrop IncrementalMesh::drop(const SupersededSurface& superseded) {
   return dropped;
 }
 
-MapMesh IncrementalMesh::snapshot(const BlockMap& map, bool labelled) const {
+MapMesh IncrementalMesh::snapshot(const BlockMap& map, bool labelled) {
   std::vector<std::uint32_t> order;
   order.reserve(vertex_count());
   for (std::size_t i = 0; i < vertices_.size(); ++i)
@@ -328,11 +330,14 @@ MapMesh IncrementalMesh::snapshot(const BlockMap& map, bool labelled) const {
   MapMesh map_mesh;
   map_mesh.voxel_m = voxel_m_;
   LabelledMesh& mesh = map_mesh.mesh;
-  std::vector<std::uint32_t> index(vertices_.size());
+  std::vector<std::uint32_t> index(vertices_.size()), changed;
+  std::vector<Eigen::Vector3f> filtered;
   for (const std::uint32_t place : order) {
     const Vertex& vertex = vertices_[place];
     index[place] = static_cast<std::uint32_t>(mesh.vertices.size());
     mesh.vertices.push_back(vertex.position);
+    filtered.push_back(vertex.filtered);
+    if (vertex.computed > filtered_) changed.push_back(index[place]);
     if (labelled) mesh.labels.push_back(vertex.labels.best());
     map_mesh.seen_by.push_back({vertex.first, vertex.last});
     map_mesh.ids.push_back(vertex.id);
@@ -346,6 +351,10 @@ MapMesh IncrementalMesh::snapshot(const BlockMap& map, bool labelled) const {
   add(final_faces_);
   for (const auto& block : map.blocks())
     if (block->mesh != nullptr) add(block->mesh->faces);
+  filter_surface(mesh.vertices, mesh.faces, changed, filtered);
+  for (std::size_t i = 0; i < order.size(); ++i) vertices_[order[i]].filtered = filtered[i];
+  mesh.vertices = std::move(filtered);
+  filtered_ = update_;
   return map_mesh;
 }
 

@@ -24,8 +24,8 @@ struct SurfaceDrop {
 /// rim of final faces exist too, and still move with the blocks that are in the map.
 class IncrementalMesh {
  public:
-  /// Makes no face at a voxel whose weight is not above `min_weight`.
-  IncrementalMesh(double voxel_size_m, double min_weight);
+  /// Makes no face at a voxel that is not known from `known` on.
+  IncrementalMesh(double voxel_size_m, const KnownFrom& known);
 
   /// Meshes the blocks that changed, and the blocks below them whose cells extend into them.
   /// Returns their number.
@@ -46,8 +46,9 @@ class IncrementalMesh {
   /// ignored. n log n in the mesh.
   SurfaceDrop drop(const SupersededSurface& superseded);
 
-  /// All faces and the vertices they use; no labels unless `labelled`.
-  [[nodiscard]] MapMesh snapshot(const BlockMap& map, bool labelled) const;
+  /// All faces and the vertices they use; no labels unless `labelled`. Positions are those of
+  /// filter_surface(), which runs near the vertices that changed since the last snapshot.
+  [[nodiscard]] MapMesh snapshot(const BlockMap& map, bool labelled);
 
   [[nodiscard]] std::size_t vertex_count() const { return vertices_.size() - free_.size(); }
   [[nodiscard]] std::size_t face_count() const { return faces_; }
@@ -60,6 +61,7 @@ class IncrementalMesh {
 
   struct Vertex {
     Eigen::Vector3f position = Eigen::Vector3f::Zero();
+    Eigen::Vector3f filtered = Eigen::Vector3f::Zero();
     std::uint32_t uses = 0;       // number of face corners that use it
     std::uint64_t id = kRemoved;  // id as in MapMesh::ids; kRemoved: the entry is free
     BlockMesh* owner = nullptr;   // mesh of the block of its edge; null: the block was erased
@@ -87,7 +89,7 @@ class IncrementalMesh {
 
   MarchingCubes table_;
   double voxel_m_;
-  float min_weight_;
+  KnownFrom known_;
 
   std::vector<Vertex> vertices_;
   std::vector<std::uint32_t> free_;          // free indices in vertices_
@@ -97,6 +99,7 @@ class IncrementalMesh {
   std::size_t faces_ = 0;
   std::uint64_t next_id_ = 0;
   std::uint32_t update_ = 0;
+  std::uint32_t filtered_ = 0;  // number of the update before the last snapshot
 };
 
 }  // namespace km

@@ -67,13 +67,13 @@ MarchingCubes::MarchingCubes() {
   first_[256] = static_cast<std::uint16_t>(triangles_.size());
 }
 
-BlockCells::BlockCells(VoxelBlock& block, BlockMap& map, float min_weight) {
+BlockCells::BlockCells(VoxelBlock& block, BlockMap& map, const KnownFrom& known) {
   blocks_[0] = &block;
   for (int i = 1; i < 8; ++i)
     blocks_[static_cast<std::size_t>(i)] =
         map.find(block.position + Eigen::Vector3i(i & 1, i >> 1 & 1, i >> 2 & 1));
   for (int z = 0; z < kSide; ++z)
-    for (int y = 0; y < kSide; ++y) copy_row(y, z, min_weight);
+    for (int y = 0; y < kSide; ++y) copy_row(y, z, known);
   unsigned negative = 0, positive = 0;
   for (std::size_t row = 0; row < negative_.size(); ++row) {
     negative |= negative_[row] & observed_[row];
@@ -82,24 +82,23 @@ BlockCells::BlockCells(VoxelBlock& block, BlockMap& map, float min_weight) {
   any_ = negative != 0 && positive != 0;
 }
 
-void BlockCells::copy_row(int y, int z, float min_weight) {
+void BlockCells::copy_row(int y, int z, const KnownFrom& known) {
   const std::size_t row = row_of(y, z);
   const auto first = static_cast<std::size_t>((y >> 3) << 1 | (z >> 3) << 2);
   const std::size_t voxel = voxel_index(0, y & 7, z & 7);
   unsigned negative = 0, observed = 0;
   if (const VoxelBlock* block = blocks_[first]) {
     const float* distance = &block->distance[voxel];
-    const float* weight = &block->weight[voxel];
     std::copy_n(distance, kBlockSide, values_[row].data());
     for (unsigned x = 0; x < kBlockSide; ++x) {
       negative |= distance[x] < 0.0F ? 1U << x : 0U;
-      observed |= weight[x] > min_weight ? 1U << x : 0U;
+      observed |= block->knows(voxel + x, known) ? 1U << x : 0U;
     }
   }
   if (const VoxelBlock* block = blocks_[first + 1]) {
     values_[row][kBlockSide] = block->distance[voxel];
     negative |= block->distance[voxel] < 0.0F ? 1U << kBlockSide : 0U;
-    observed |= block->weight[voxel] > min_weight ? 1U << kBlockSide : 0U;
+    observed |= block->knows(voxel, known) ? 1U << kBlockSide : 0U;
   }
   negative_[row] = static_cast<std::uint16_t>(negative);
   observed_[row] = static_cast<std::uint16_t>(observed);

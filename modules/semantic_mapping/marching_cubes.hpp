@@ -47,9 +47,9 @@ class MarchingCubes {
 /// of the next blocks along each axis.
 class BlockCells {
  public:
-  /// Copies the values. Voxels of weight up to `min_weight` count as not observed. The blocks must
-  /// outlive this object.
-  BlockCells(VoxelBlock& block, BlockMap& map, float min_weight);
+  /// Copies the values. Voxels that are not known from `known` on count as not observed. The blocks
+  /// must outlive this object.
+  BlockCells(VoxelBlock& block, BlockMap& map, const KnownFrom& known);
 
   /// Cells of row (y, z), as bits by x, that the surface passes through: all corners are observed,
   /// and both signs occur.
@@ -77,7 +77,7 @@ class BlockCells {
   [[nodiscard]] static std::size_t row_of(int y, int z) {
     return static_cast<std::size_t>(y + kSide * z);
   }
-  void copy_row(int y, int z, float min_weight);
+  void copy_row(int y, int z, const KnownFrom& known);
 
   // Block and neighbours, at index x + 2 y + 4 z of their offset; null: no block.
   std::array<VoxelBlock*, 8> blocks_ = {};

@@ -57,7 +57,7 @@ struct SemanticMapper::State {
         camera(its_camera),
         views(camera, config.min_range_m, config.max_range_m, palette),
         coarse_views(camera, noise_of(config), config.min_range_m),
-        mesh(config.voxel_size_m, config.min_weight) {}
+        mesh(config.voxel_size_m, known_from(config)) {}
 
   std::vector<Update> select(const DepthView& view, const BlockFusion& fusion,
                              const SE3& T_odom_cam, IntegrationReport& report);

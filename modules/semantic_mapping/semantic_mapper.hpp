@@ -99,7 +99,7 @@ class SemanticMapper {
 
   /// Free and occupied space of the blocks that changed since the last call, for a distance field;
   /// at first that of all blocks. Free space away from surface is updated with the first frame of
-  /// each keyframe. Voxels up to min_weight are unknown. Precondition: track_space(true).
+  /// each keyframe. Voxels that known_from() excludes are unknown. Precondition: track_space(true).
   [[nodiscard]] SpaceChanges take_space_changes();
 
  private:

@@ -3,6 +3,7 @@
 #include <optional>
 
 #include "modules/core/config.hpp"
+#include "modules/semantic_mapping/block_map.hpp"
 
 namespace km {
 
@@ -14,7 +15,7 @@ struct SemanticMappingConfig {
   double min_range_m = 0.3;
   double max_range_m = 10.0;
   std::optional<double> depth_sigma_per_m = {};
-  double min_weight = 0.05;
+  int min_views = 3;
   double window_m = 8.0;
   int max_blocks = 20000;
 
@@ -46,10 +47,10 @@ struct SemanticMappingConfig {
         "stereo with focal length f [px], baseline b [m] and a "
         "matching error of s px; left out: that of a quarter of a pixel for stereo depth, "
         "0.003 for depth images");
-    visitor.field("min_weight", min_weight, {0.0, 10000.0},
-                  "smallest sum of weights of meshed surface; excludes a few wrong depths. At 0.05 "
-                  "and the standard deviations above, one frame suffices up to 3.8 m, at 6 m six "
-                  "are needed; 0: no bound");
+    visitor.field("min_views", min_views, {1, 255},
+                  "number of images that must show a surface before it is meshed; excludes single "
+                  "wrong depths. More are needed until the standard deviation of their mean depth "
+                  "is below a voxel");
     visitor.field("window_m", window_m, {0.1, 1e6},
                   "[m] distance travelled after which an unseen block becomes final mesh and its "
                   "voxels are discarded; on return it is mapped again; the drift of odometry over "
@@ -59,5 +60,12 @@ struct SemanticMappingConfig {
                   "beyond it the blocks unseen for longest become final mesh");
   }
 };
+
+/// Voxels are known once min_views images have observed them, and the standard deviation of the
+/// mean of their depths is below a voxel.
+[[nodiscard]] inline KnownFrom known_from(const SemanticMappingConfig& config) {
+  const double share = SemanticMappingConfig::kDepthSigma_m / config.voxel_size_m;
+  return {static_cast<std::uint8_t>(config.min_views), static_cast<float>(share * share)};
+}
 
 }  // namespace km

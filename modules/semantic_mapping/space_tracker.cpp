@@ -85,10 +85,10 @@ void SpaceTracker::add_free(const BlockFusion& fusion, double way_m) {
 
 BlockSpace SpaceTracker::space_of(const VoxelBlock& block) const {
   BlockSpace space{.position = block.position};
-  const auto least = static_cast<float>(config_.min_weight);
+  const KnownFrom known = known_from(config_);
   for (std::size_t k = 0; k < kBlockVoxels; ++k) {
     const std::uint64_t bit = std::uint64_t{1} << (k % 64);
-    if (block.weight[k] <= least) continue;
+    if (!block.knows(k, known)) continue;
     space.observed[k / 64] |= bit;
     if (block.distance[k] <= 0.0F) space.inside[k / 64] |= bit;
   }

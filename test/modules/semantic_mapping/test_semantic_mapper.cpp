@@ -76,7 +76,16 @@ TEST_CASE("Two depths are averaged by their weights", "[semantic_mapping]") {
   SemanticMappingConfig config = settings();
   config.depth_sigma_per_m = 0.005;
   SemanticMapper mapper(config, small_camera());
-  const auto flat = [](double depth) { return wall(depth).depth; };
+  // Both images show the same square of surface, because the filter averages over steps.
+  const auto flat = [](double depth) {
+    const Camera camera = small_camera();
+    DepthImage image = wall(depth).depth;
+    for (int v = 0; v < camera.height; ++v)
+      for (int u = 0; u < camera.width; ++u)
+        if (std::max(std::abs(u - camera.cx), std::abs(v - camera.cy)) * depth > 0.5 * camera.fx)
+          image.millimetres[static_cast<std::size_t>(v * camera.width + u)] = 0;
+    return image;
+  };
   (void)mapper.integrate(flat(2.00), nullptr, at(0, 0, 0), 0);
   (void)mapper.integrate(flat(4.04), nullptr, at(0, 0, -2), 0);
   mapper.update_mesh();
@@ -88,11 +97,11 @@ TEST_CASE("Two depths are averaged by their weights", "[semantic_mapping]") {
   CHECK(map.mesh.labels.empty());
   std::size_t seen_twice = 0;
   for (const Eigen::Vector3f& p : map.mesh.vertices) {
-    if (std::abs(p.x()) > 0.8F || std::abs(p.y()) > 0.6F) continue;  // in the first image only
+    if (p.head<2>().cwiseAbs().maxCoeff() > 0.3F) continue;  // the border has one depth in places
     ++seen_twice;
-    CHECK(static_cast<double>(p.z()) == Approx(expected_m).margin(2e-4));  // clamped to the edge
+    CHECK(static_cast<double>(p.z()) == Approx(expected_m).margin(7e-4));
   }
-  CHECK(seen_twice > 100);
+  CHECK(seen_twice > 30);
 }
 
 TEST_CASE("Pixels without depth change nothing", "[semantic_mapping]") {
@@ -199,10 +208,13 @@ TEST_CASE("Labels of another size or outside the palette are dropped and counted
   }
 }
 
-TEST_CASE("Surface is meshed once its weights suffice", "[semantic_mapping]") {
+TEST_CASE("Surface is meshed once enough images show it", "[semantic_mapping]") {
   SemanticMappingConfig config = settings();
-  config.depth_sigma_per_m = 0.0;  // all weights are 1
-  config.min_weight = 2.5;
+  // At a standard deviation of 0.16 m, three means have one of 0.09 m, and two have one of 0.11 m.
+  const bool is_noisy = GENERATE(false, true);
+  CAPTURE(is_noisy);
+  config.depth_sigma_per_m = is_noisy ? 0.04 : 0.0;
+  config.min_views = is_noisy ? 1 : 3;
   SemanticMapper mapper(config, small_camera(), two_classes());
   for (KeyframeIndex looks = 1; looks <= 4; ++looks) {
     REQUIRE(integrate(mapper, wall(2.0), at(0), looks));
@@ -233,7 +245,8 @@ TEST_CASE("Carving removes an object that has gone", "[semantic_mapping]") {
 
 TEST_CASE("A repeated frame keeps every vertex and its first keyframe", "[semantic_mapping]") {
   SemanticMapper mapper(settings(0.05), small_camera(), two_classes());
-  REQUIRE(integrate(mapper, wall(2.51, true), at(0), 4));
+  // At the rim of the ball, voxels far behind the surface have small weights: one frame is too few.
+  for (int look = 0; look < 3; ++look) REQUIRE(integrate(mapper, wall(2.51, true), at(0), 4));
   CHECK(mapper.update_mesh() > 0);
   const MapMesh before = mapper.mesh();
   CHECK(before.ids.size() > 500);

@@ -127,7 +127,8 @@ inline Camera small_camera() {
 
 inline SemanticMappingConfig settings(double voxel_m = 0.1) {
   SemanticMappingConfig config;
-  config.min_weight = 0.0;  // often there is only one frame
+  config.min_views = 1;  // often there is only one frame
+  config.depth_sigma_per_m = 0.0;
   config.voxel_size_m = voxel_m;
   return config;
 }
