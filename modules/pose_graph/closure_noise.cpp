@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "modules/core/symmetric_eigen.hpp"
+#include "modules/outlier_rejection/chi_squared.hpp"
 #include "modules/pose_graph/cycle_mixture.hpp"
 
 namespace km {
@@ -27,7 +28,7 @@ constexpr double kFewPlaces = 5.0;
 // If more cycles of a pair than this share agree with the noise of the team, the pair has that
 // noise. Its other cycles then contain false closures.
 constexpr double kMostAgree = 0.8;
-constexpr double kAgreeingCycle = 16.8;  // 99 % quantile of chi-squared, 6 degrees of freedom
+constexpr double kAgreeing = 0.99;  // share of such cycles that agree, by chi-squared
 // Smaller differences are within the errors of the model: claims are isotropic, and the noise of
 // odometry is that of its mean step.
 constexpr double kNotable = 1.3;
@@ -51,7 +52,7 @@ struct Posterior {
 double log_ratio_of(const NoiseCycle& cycle, double s, double odometry,
                     const Eigen::Vector2d& length = Eigen::Vector2d::Zero()) {
   double log_if_true = 0.0;
-  for (std::size_t k = 0; k < cycle.error.size(); ++k) {
+  for (std::size_t k = 0; k < cycle.axes; ++k) {
     const double variance = odometry * odometry + s * s * static_cast<double>(cycle.variance[k]);
     const double error =
         cycle.error[k] - length(0) * cycle.by_length[0][k] - length(1) * cycle.by_length[1][k];
@@ -74,12 +75,13 @@ Posterior posterior_of(std::span<const NoiseCycle> cycles, std::span<const doubl
 // Share of the cycles that agree with the factor `s`. The odometry is `odometry` times noisier than
 // it claims.
 double agreeing(std::span<const NoiseCycle> cycles, double s, double odometry) {
+  const double limit = pose_quantile(kAgreeing, cycles.front().axes == 3 ? 2 : 3);
   const auto agrees = [&](const NoiseCycle& cycle) {
     double squared = 0.0;
-    for (std::size_t k = 0; k < cycle.error.size(); ++k)
+    for (std::size_t k = 0; k < cycle.axes; ++k)
       squared +=
           cycle.error[k] * cycle.error[k] / (odometry * odometry + s * s * cycle.variance[k]);
-    return squared <= kAgreeingCycle;
+    return squared <= limit;
   };
   return static_cast<double>(std::ranges::count_if(cycles, agrees)) /
          static_cast<double>(cycles.size());
@@ -123,7 +125,7 @@ Eigen::Vector2d fit_length(std::span<const NoiseCycle> cycles, std::span<const d
   Eigen::Matrix2d H = Eigen::Matrix2d::Identity() / (kLengthSigma * kLengthSigma);
   Eigen::Vector2d g = Eigen::Vector2d::Zero();
   for (std::size_t c = 0; c < cycles.size(); ++c)
-    for (std::size_t k = 0; k < cycles[c].error.size(); ++k) {
+    for (std::size_t k = 0; k < cycles[c].axes; ++k) {
       const double variance =
           odometry * odometry + s * s * static_cast<double>(cycles[c].variance[k]);
       const Eigen::Vector2d d(cycles[c].by_length[0][k], cycles[c].by_length[1][k]);
@@ -206,6 +208,7 @@ NoiseCycle NoiseCycle::of(const Vector6& e, const Matrix6& Sigma_o, const Matrix
     return white;
   };
   NoiseCycle cycle{.error = whitened(e),
+                   .axes = static_cast<std::size_t>(size),
                    .by_length = {whitened(by_length[0]), whitened(by_length[1])}};
   for (Eigen::Index k = 0; k < size; ++k) {
     cycle.variance[static_cast<std::size_t>(k)] =

@@ -15,8 +15,9 @@ namespace km {
 /// error of the cycle is written in coordinates in which the covariance of the odometry is the
 /// identity and the claimed covariance of the two closures is diagonal.
 struct NoiseCycle {
-  std::array<float, 6> error = {};  ///< [sigma of the odometry]; planar cycles use three entries.
+  std::array<float, 6> error = {};     ///< [sigma of the odometry]
   std::array<float, 6> variance = {};  ///< Claimed for the two closures, relative to the odometry.
+  std::size_t axes = 6;                ///< Number of entries; 3 in the plane.
   float log_if_false = 0.0F;           ///< Log density if a closure is false, in these coordinates.
   /// Derivatives of `error` with respect to the relative length of the odometry of each robot.
   std::array<std::array<float, 6>, 2> by_length = {};

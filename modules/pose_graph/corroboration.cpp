@@ -2,7 +2,6 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -29,14 +28,6 @@ constexpr double kLargestTurnSigma_rad = 0.5;
 constexpr double kLeastBoxSide_m = 1.0;  // least side of the volume for false closures
 
 }  // namespace
-
-Matrix6 covariance_in(const Precision& precision, int dimension) {
-  Matrix6 Sigma = covariance_of(precision);
-  if (dimension == 3) return Sigma;
-  Sigma(0, 0) = Sigma(1, 1) = Sigma(5, 5) = 0.0;  // roll, pitch, z
-  Sigma(2, 2) = 1.0 / precision.kappa;
-  return Sigma;
-}
 
 Corroboration::Corroboration(std::span<const PoseEdge> closures, const PoseOf& pose,
                              const std::map<RobotId, Precision>& step, int dimension)
@@ -66,13 +57,7 @@ double Corroboration::cycle_length(const Upward& one, const Upward& other) const
                               inverse(measured(other)), chain(other.lower, one.lower)};
   const SE3 T = cycle.T();
   if (!(angle_of(T.linear()) <= kLargestTurn)) return std::numeric_limits<double>::infinity();
-  const Vector6 xi = se3_log(T);
-  const Matrix6 covariance = cycle.covariance();
-  if (dimension_ == 3) return std::sqrt(xi.dot(covariance.ldlt().solve(xi)));
-  const std::array<int, 3> planar{2, 3, 4};  // angle, x, y
-  const Eigen::Vector3d in_plane = xi(planar);
-  const Eigen::Matrix3d Sigma = covariance(planar, planar);
-  return std::sqrt(in_plane.dot(Sigma.ldlt().solve(in_plane)));
+  return std::sqrt(mahalanobis_length(se3_log(T), cycle.covariance(), dimension_).squared);
 }
 
 void Corroboration::count_lengths(NoiseHistogram& histogram, std::size_t most) const {

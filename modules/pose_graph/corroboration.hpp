@@ -12,11 +12,6 @@
 
 namespace km {
 
-/// The covariance that corresponds to the weights of an edge, tangent [rotation; translation]. In
-/// the plane (`dimension` 2) kappa is the precision of the angle (see precision_of_blocks()), and
-/// roll, pitch and z have variance zero.
-[[nodiscard]] Matrix6 covariance_in(const Precision& precision, int dimension);
-
 /// Agreement between the closures of one pair of robots (or inside one robot), before any
 /// optimisation. Robots usually meet for some time. A true closure therefore has other closures
 /// near it that agree with it along the odometry between them; a false one rarely has. Both robots

@@ -1,6 +1,5 @@
 #include "modules/pose_graph/odometry_breaks.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <limits>
 #include <optional>
@@ -9,15 +8,15 @@
 #include <vector>
 
 #include "modules/core/lie.hpp"
+#include "modules/outlier_rejection/chi_squared.hpp"
 #include "modules/pose_graph/closure_places.hpp"
 #include "modules/pose_graph/odometry_cycles.hpp"
 
 namespace km {
 namespace {
 
-// Quantiles of chi-squared, 6 degrees of freedom: 99.9 % and the median.
-constexpr double kConsistent = 22.46;
-constexpr double kMedian = 5.35;
+// Share of the cycles without false closures that are consistent at the claimed noise.
+constexpr double kConsistent = 0.999;
 // Least number of places that show a jump. Two are too few: false closures between the same two
 // similar parts of the environment count as two places if they are more than ten keyframes apart.
 constexpr double kLeastPlaces = 3.0;
@@ -58,12 +57,8 @@ double places_of(const std::vector<Jump>& jumps) {
   return sum;
 }
 
-double squared_length(const Vector6& error, const Matrix6& Sigma) {
-  return error.dot(Sigma.ldlt().solve(error));
-}
-
-std::vector<ErrorCycle> error_cycles(const OdometryChain& chain,
-                                     std::span<const PoseEdge> closures) {
+std::vector<ErrorCycle> error_cycles(const OdometryChain& chain, std::span<const PoseEdge> closures,
+                                     int dimension) {
   std::vector<PoseEdge> inside;
   for (const PoseEdge& e : closures)
     if (std::max(e.from.index, e.to.index) < chain.T_first_kf.size()) inside.push_back(e);
@@ -75,7 +70,7 @@ std::vector<ErrorCycle> error_cycles(const OdometryChain& chain,
     const OdometryCycle cycle = chain.close(inside[k]);
     const Matrix6 Sigma = cycle.claimed();
     cycles.push_back({cycle.lower, cycle.upper, cycle.error, Sigma,
-                      squared_length(cycle.error, Sigma),
+                      mahalanobis_length(cycle.error, Sigma, dimension).squared,
                       static_cast<double>(stride) * weights[k]});
   }
   return cycles;
@@ -130,7 +125,8 @@ struct Suspicion {
 // nullopt unless the cycles allow the step to be wrong: hardly any cycle that contains the step is
 // consistent. The median error of the cycles without the step shows how noisy odometry and closures
 // are; it scales the limit.
-std::optional<Suspicion> suspicion_of(const std::vector<ErrorCycle>& cycles, std::size_t step) {
+std::optional<Suspicion> suspicion_of(const std::vector<ErrorCycle>& cycles, std::size_t step,
+                                      int dimension) {
   std::vector<double> without;
   double places_with = 0.0, places_without = 0.0;
   for (const ErrorCycle& cycle : cycles) {
@@ -140,7 +136,8 @@ std::optional<Suspicion> suspicion_of(const std::vector<ErrorCycle>& cycles, std
   if (std::min(places_with, places_without) < kLeastPlaces) return std::nullopt;
   const auto middle = without.begin() + static_cast<std::ptrdiff_t>(without.size() / 2);
   std::ranges::nth_element(without, middle);
-  const double limit = kConsistent * std::max(1.0, *middle / kMedian);
+  const double limit = pose_quantile(kConsistent, dimension) *
+                       std::max(1.0, *middle / pose_quantile(0.5, dimension));
   double consistent = 0.0;
   for (const ErrorCycle& cycle : cycles)
     if (cycle.contains(step) && cycle.squared <= kConsistentMargin * limit)
@@ -152,7 +149,7 @@ std::optional<Suspicion> suspicion_of(const std::vector<ErrorCycle>& cycles, std
 // Every cycle that contains the step yields the jump after the step that would close it. Returns
 // the largest set of jumps that agree with one jump of the set.
 std::vector<Jump> agreeing_jumps(const OdometryChain& chain, const std::vector<ErrorCycle>& cycles,
-                                 std::size_t step, double limit) {
+                                 std::size_t step, double limit, int dimension) {
   std::vector<Jump> jumps;
   for (const ErrorCycle& cycle : cycles) {
     if (!cycle.contains(step)) continue;
@@ -165,7 +162,8 @@ std::vector<Jump> agreeing_jumps(const OdometryChain& chain, const std::vector<E
   for (const Jump& one : jumps) {
     std::vector<Jump> agreeing;
     for (const Jump& other : jumps)
-      if (squared_length(se3_log(one.T.inverse() * other.T), one.Sigma + other.Sigma) <= limit)
+      if (mahalanobis_length(se3_log(one.T.inverse() * other.T), one.Sigma + other.Sigma, dimension)
+              .squared <= limit)
         agreeing.push_back(other);
     if (places_of(agreeing) > places_of(most)) most = std::move(agreeing);
   }
@@ -203,18 +201,19 @@ OdometryBreak slowest_break(std::span<const PoseEdge> steps, const OdometryChain
 }
 
 std::optional<OdometryBreak> find_break(std::span<const PoseEdge> steps,
-                                        std::span<const PoseEdge> closures,
+                                        std::span<const PoseEdge> closures, int dimension,
                                         std::span<const double> seconds) {
-  const OdometryChain chain(steps);
-  const std::vector<ErrorCycle> cycles = error_cycles(chain, closures);
+  const OdometryChain chain(steps, dimension);
+  const std::vector<ErrorCycle> cycles = error_cycles(chain, closures, dimension);
   const PossibleSteps possible(steps, seconds);
   std::optional<OdometryBreak> found;
   double best = 0.0;  // places for a wrong step minus those against it
   for (const auto& run : runs_of_steps(cycles, steps.size())) {
     const std::size_t middle = (run.first + run.second) / 2;
-    const auto suspicion = suspicion_of(cycles, middle);
+    const auto suspicion = suspicion_of(cycles, middle, dimension);
     if (!suspicion) continue;
-    const std::vector<Jump> jumps = agreeing_jumps(chain, cycles, middle, suspicion->limit);
+    const std::vector<Jump> jumps =
+        agreeing_jumps(chain, cycles, middle, suspicion->limit, dimension);
     const double places = places_of(jumps);
     if (places < kLeastPlaces || places - suspicion->consistent <= best) continue;
     OdometryBreak wrong = slowest_break(steps, chain, possible, run, middle, mean_of(jumps));
@@ -235,12 +234,12 @@ std::optional<OdometryBreak> find_break(std::span<const PoseEdge> steps,
 }  // namespace
 
 std::vector<OdometryBreak> find_odometry_breaks(std::span<const PoseEdge> steps,
-                                                std::span<const PoseEdge> closures,
+                                                std::span<const PoseEdge> closures, int dimension,
                                                 std::span<const double> seconds) {
   std::vector<PoseEdge> corrected(steps.begin(), steps.end());
   std::vector<OdometryBreak> breaks;
   while (!corrected.empty()) {
-    const auto found = find_break(corrected, closures, seconds);
+    const auto found = find_break(corrected, closures, dimension, seconds);
     if (!found) break;
     if (breaks.size() == kMostBreaks) return {};
     breaks.push_back(*found);

@@ -35,8 +35,10 @@ struct OdometryBreak {
 /// claimed noise, because noisy odometry increases the errors of all cycles. If successive steps
 /// are in the same cycles, the one with the slowest correct step is taken. `seconds`: duration of
 /// each step; if it is empty or has a value that is not positive, all steps last equally long.
+/// `dimension` 2: poses are planar.
 [[nodiscard]] std::vector<OdometryBreak> find_odometry_breaks(std::span<const PoseEdge> steps,
                                                               std::span<const PoseEdge> closures,
+                                                              int dimension,
                                                               std::span<const double> seconds = {});
 
 /// Replaces the wrong steps.

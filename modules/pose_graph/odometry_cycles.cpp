@@ -1,6 +1,8 @@
 #include "modules/pose_graph/odometry_cycles.hpp"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
+#include <type_traits>
 
 #include "modules/core/lie.hpp"
 
@@ -12,13 +14,27 @@ UncertainPose exact(UncertainPose pose) {
   return pose;
 }
 
-// From the lower keyframe to the upper one.
-UncertainPose upward(const PoseEdge& closure) {
-  const UncertainPose measured{closure.T_from_to, covariance_of(closure.precision)};
-  return closure.from < closure.to ? measured : inverse(measured);
+}  // namespace
+
+Matrix6 covariance_in(const Precision& precision, int dimension) {
+  Matrix6 Sigma = covariance_of(precision);
+  if (dimension == 3) return Sigma;
+  Sigma(0, 0) = Sigma(1, 1) = Sigma(5, 5) = 0.0;  // roll, pitch, z
+  Sigma(2, 2) = 1.0 / precision.kappa;
+  return Sigma;
 }
 
-}  // namespace
+MahalanobisLength mahalanobis_length(const Vector6& error, const Matrix6& Sigma, int dimension) {
+  const auto length = [](const auto& e, const auto& block) {
+    const Eigen::LLT<std::decay_t<decltype(block)>> factor(block);
+    return MahalanobisLength{factor.matrixL().solve(e).squaredNorm(),
+                             factor.matrixLLT().diagonal().array().log().sum()};
+  };
+  if (dimension == 3) return length(error, Sigma);
+  const Eigen::Vector3d planar = error.segment<3>(2);
+  const Eigen::Matrix3d block = Sigma.block<3, 3>(2, 2);
+  return length(planar, block);
+}
 
 Matrix6 TwoClosureCycle::covariance() const {
   return compose(compose(compose(up, above), down), below).Sigma;
@@ -32,11 +48,12 @@ Matrix6 TwoClosureCycle::covariance_of_closures() const {
   return TwoClosureCycle{up, exact(above), down, exact(below)}.covariance();
 }
 
-OdometryChain::OdometryChain(std::span<const PoseEdge> steps) {
+OdometryChain::OdometryChain(std::span<const PoseEdge> steps, int dimension)
+    : dimension_(dimension) {
   for (const PoseEdge& step : steps) {
     T_first_kf.push_back(T_first_kf.back() * step.T_from_to);
     const Matrix6 Ad = adjoint(T_first_kf.back());
-    const Matrix6 claimed = covariance_of(step.precision);
+    const Matrix6 claimed = covariance_in(step.precision, dimension);
     for (const auto part : {OdometryCycle::kRotation, OdometryCycle::kTranslation}) {
       Matrix6 Sigma = Matrix6::Zero();
       const Eigen::Index begin = part == OdometryCycle::kRotation ? 0 : 3;
@@ -44,6 +61,12 @@ OdometryChain::OdometryChain(std::span<const PoseEdge> steps) {
       covariance_[part].push_back(covariance_[part].back() + Ad * Sigma * Ad.transpose());
     }
   }
+}
+
+// From the lower keyframe to the upper one.
+UncertainPose OdometryChain::upward(const PoseEdge& closure) const {
+  const UncertainPose measured{closure.T_from_to, covariance_in(closure.precision, dimension_)};
+  return closure.from < closure.to ? measured : inverse(measured);
 }
 
 // The covariance is that of one source of noise, at the end of the steps.

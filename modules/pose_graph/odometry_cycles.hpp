@@ -12,6 +12,20 @@
 
 namespace km {
 
+/// The covariance that corresponds to the weights of an edge, tangent [rotation; translation]. In
+/// the plane (`dimension` 2) kappa is the precision of the angle (see precision_of_blocks()), and
+/// roll, pitch and z have variance zero.
+[[nodiscard]] Matrix6 covariance_in(const Precision& precision, int dimension);
+
+/// The squared Mahalanobis length of a tangent vector and the logarithm of the root of det Sigma;
+/// in the plane those of the angle, x and y.
+struct MahalanobisLength {
+  double squared = 0.0;
+  double log_root = 0.0;
+};
+[[nodiscard]] MahalanobisLength mahalanobis_length(const Vector6& error, const Matrix6& Sigma,
+                                                   int dimension);
+
 /// The cycle up along one closure, along odometry, down along another closure, and back along
 /// odometry. It begins and ends at the lower end of the first closure. Without noise, T() is the
 /// identity.
@@ -55,8 +69,8 @@ struct OdometryCycle {
 /// The odometry of one robot, from its first keyframe.
 class OdometryChain {
  public:
-  /// `steps[k]` is from keyframe k to keyframe k + 1.
-  explicit OdometryChain(std::span<const PoseEdge> steps);
+  /// `steps[k]` is from keyframe k to keyframe k + 1. `dimension` 2: poses are planar.
+  OdometryChain(std::span<const PoseEdge> steps, int dimension);
 
   /// The cycle from the lower end along the steps to the upper one, and back by the closure.
   /// Precondition: both ends are keyframes of the chain.
@@ -68,9 +82,11 @@ class OdometryChain {
   std::vector<SE3> T_first_kf{SE3::Identity()};
 
  private:
+  [[nodiscard]] UncertainPose upward(const PoseEdge& closure) const;
   [[nodiscard]] UncertainPose steps(std::size_t from, std::size_t to,
                                     OdometryCycle::Component part) const;
 
+  int dimension_;
   // Claimed covariance of the steps up to each keyframe, as perturbations of the first pose. The
   // difference of two keyframes is the covariance of the chain between them.
   std::array<std::vector<Matrix6>, 2> covariance_{std::vector{Matrix6(Matrix6::Zero())},

@@ -77,38 +77,43 @@ std::vector<Cycle> short_cycles(const OdometryChain& chain, std::span<const Pose
   return cycles;
 }
 
-double log_density_if_true(const Cycle& cycle, const Factors& v) {
-  Matrix6 Sigma = Matrix6::Zero();
-  for (std::size_t f = 0; f < kComponents; ++f) Sigma += v[f] * cycle.covariance[f];
-  const Eigen::LLT<Matrix6> factor(Sigma);
-  const Vector6 white = factor.matrixL().solve(cycle.error);
-  const double log_root = factor.matrixLLT().diagonal().array().log().sum();
-  const double squared = white.squaredNorm();
-  return -0.5 * squared - log_root - 3.0 * std::log(2.0 * std::numbers::pi);
-}
-
-// The volume [m^3] in which a false closure may end: twice the bounding box of the trajectory,
-// enlarged on every side by the length of the longest closure.
-double volume_m3(const OdometryChain& chain, std::span<const PoseEdge> closures) {
+// The volume [m^3] in which a false closure may end, in the plane the area [m^2]. It is twice the
+// bounding box of the trajectory, enlarged on every side by the length of the longest closure.
+double volume_of(const OdometryChain& chain, std::span<const PoseEdge> closures, int dimension) {
   Eigen::AlignedBox3d box;
   for (const SE3& T : chain.T_first_kf) box.extend(T.translation());
   double reach_m = 0.0;
   for (const PoseEdge& closure : closures)
     reach_m = std::max(reach_m, closure.T_from_to.translation().norm());
-  return (2.0 * box.sizes().array() + 2.0 * reach_m + kLeastSide_m).prod();
+  const Eigen::Array3d sides = 2.0 * box.sizes().array() + 2.0 * reach_m + kLeastSide_m;
+  return sides.head(dimension).prod();
 }
 
-std::vector<double> log_if_false(const std::vector<Cycle>& cycles, double volume) {
-  std::vector<double> densities;
-  for (const Cycle& cycle : cycles) densities.push_back(log_density_if_false(cycle.error, volume));
-  return densities;
+// Cycles, and their log densities if they are false.
+struct Cycles {
+  std::vector<Cycle> cycles;
+  std::vector<double> if_false;
+  int dimension;
+
+  Cycles(std::vector<Cycle> all, double volume, int in_dimension)
+      : cycles(std::move(all)), dimension(in_dimension) {
+    for (const Cycle& cycle : cycles)
+      if_false.push_back(log_density_if_false(cycle.error, volume, dimension));
+  }
+};
+
+double log_density_if_true(const Cycle& cycle, const Factors& v, int dimension) {
+  Matrix6 Sigma = Matrix6::Zero();
+  for (std::size_t f = 0; f < kComponents; ++f) Sigma += v[f] * cycle.covariance[f];
+  const MahalanobisLength length = mahalanobis_length(cycle.error, Sigma, dimension);
+  const double axes = dimension == 2 ? 3.0 : 6.0;
+  return -0.5 * length.squared - length.log_root - 0.5 * axes * std::log(2.0 * std::numbers::pi);
 }
 
-std::vector<double> log_ratios(const std::vector<Cycle>& cycles,
-                               const std::vector<double>& if_false, const Factors& v) {
+std::vector<double> log_ratios(const Cycles& all, const Factors& v) {
   std::vector<double> ratios;
-  for (std::size_t k = 0; k < cycles.size(); ++k)
-    ratios.push_back(log_density_if_true(cycles[k], v) - if_false[k]);
+  for (std::size_t k = 0; k < all.cycles.size(); ++k)
+    ratios.push_back(log_density_if_true(all.cycles[k], v, all.dimension) - all.if_false[k]);
   return ratios;
 }
 
@@ -119,11 +124,9 @@ std::vector<double> weights_of(const std::vector<Cycle>& cycles) {
 }
 
 // Log of the posterior density of the factors, at the likeliest share of true closures.
-double log_posterior(const std::vector<Cycle>& cycles, const std::vector<double>& if_false,
-                     const Factors& v) {
+double log_posterior(const Cycles& all, const Factors& v) {
   if (v[kTwoClosures] > v[kClosure]) return -std::numeric_limits<double>::infinity();
-  double log_sum =
-      fit_cycle_mixture(log_ratios(cycles, if_false, v), weights_of(cycles)).log_likelihood;
+  double log_sum = fit_cycle_mixture(log_ratios(all, v), weights_of(all.cycles)).log_likelihood;
   const auto prior = [](double log_root, double sigma) {
     return -0.5 * log_root * log_root / (sigma * sigma);
   };
@@ -138,16 +141,15 @@ struct Fit {
 
 // The largest posterior density without noise of odometry: errors that noise of closures alone
 // explains are no evidence against odometry.
-double log_posterior_of_claims(const std::vector<Cycle>& cycles,
-                               const std::vector<double>& if_false) {
+double log_posterior_of_claims(const Cycles& all) {
   Factors best{1.0, 1.0, 1.0, 1.0};
-  double most = log_posterior(cycles, if_false, best);
+  double most = log_posterior(all, best);
   for (const bool both : {true, false}) {
     Factors next = best;
     for (double v = 1.0 / 64.0; v <= 4096.0; v *= 2.0) {
       next[kTwoClosures] = v;
       if (both) next[kClosure] = v;
-      const double found = log_posterior(cycles, if_false, next);
+      const double found = log_posterior(all, next);
       if (!(found > most)) continue;
       most = found;
       best = next;
@@ -158,7 +160,7 @@ double log_posterior_of_claims(const std::vector<Cycle>& cycles,
 
 // A pattern search, coarse to fine: along each factor, and along both factors of odometry or of
 // closures.
-Fit fit_factors(const std::vector<Cycle>& cycles, double volume) {
+Fit fit_factors(const Cycles& all) {
   constexpr std::array<Factors, 7> kDirections{{{1.0, 0.0, 0.0, 0.0},
                                                 {0.0, 1.0, 0.0, 0.0},
                                                 {0.0, 0.0, 1.0, 0.0},
@@ -166,11 +168,10 @@ Fit fit_factors(const std::vector<Cycle>& cycles, double volume) {
                                                 {0.0, 0.0, 0.0, 1.0},
                                                 {1.0, 1.0, 0.0, 0.0},
                                                 {1.0, -1.0, 0.0, 0.0}}};
-  const std::vector<double> if_false = log_if_false(cycles, volume);
   Fit fit;
-  double most = log_posterior(cycles, if_false, fit.factors);
+  double most = log_posterior(all, fit.factors);
   const auto try_factors = [&](const Factors& v) {
-    const double found = log_posterior(cycles, if_false, v);
+    const double found = log_posterior(all, v);
     if (!(found > most)) return false;
     most = found;
     fit.factors = v;
@@ -191,23 +192,24 @@ Fit fit_factors(const std::vector<Cycle>& cycles, double volume) {
         }
       if (!is_better) break;
     }
-  fit.log_odds = most - log_posterior_of_claims(cycles, if_false);
+  fit.log_odds = most - log_posterior_of_claims(all);
   return fit;
 }
 
 // The cycles of which the errors are about normal with these factors.
-std::vector<Cycle> with_normal_errors(std::vector<Cycle> cycles, const Factors& v) {
+std::vector<Cycle> with_normal_errors(std::vector<Cycle> cycles, const Factors& v, int dimension) {
   std::erase_if(cycles, [&](const Cycle& cycle) {
-    const double variance = cycle.covariance[kRotation].topLeftCorner<3, 3>().trace() / 3.0;
+    const double axes = dimension == 2 ? 1.0 : 3.0;
+    const double variance = cycle.covariance[kRotation].topLeftCorner<3, 3>().trace() / axes;
     return v[kRotation] * variance > kLargestTurnSigma_rad * kLargestTurnSigma_rad;
   });
   return cycles;
 }
 
 // The closures of the cycles that are more likely true than false.
-std::vector<PoseEdge> likely_closures(const std::vector<Cycle>& cycles, const Factors& v,
-                                      double volume) {
-  const std::vector<double> ratios = log_ratios(cycles, log_if_false(cycles, volume), v);
+std::vector<PoseEdge> likely_closures(const Cycles& all, const Factors& v) {
+  const std::vector<Cycle>& cycles = all.cycles;
+  const std::vector<double> ratios = log_ratios(all, v);
   const CycleMixture mixture = fit_cycle_mixture(ratios, weights_of(cycles));
   std::map<ClosureId, PoseEdge> likely;
   for (std::size_t k = 0; k < cycles.size(); ++k) {
@@ -223,21 +225,21 @@ std::vector<PoseEdge> likely_closures(const std::vector<Cycle>& cycles, const Fa
 }  // namespace
 
 OdometryNoise estimate_odometry_noise(std::span<const PoseEdge> steps,
-                                      std::span<const PoseEdge> closures) {
+                                      std::span<const PoseEdge> closures, int dimension) {
   OdometryNoise noise;
-  const OdometryChain chain(steps);
+  const OdometryChain chain(steps, dimension);
   std::vector<Cycle> cycles = cycles_of(chain, closures, noise.places);
   if (cycles.empty()) return noise;
-  const double volume = volume_m3(chain, closures);
-  Fit fit = fit_factors(cycles, volume);
+  const double volume = volume_of(chain, closures, dimension);
+  Fit fit = fit_factors({cycles, volume, dimension});
   if (!(fit.log_odds >= kLeastLogOdds)) return noise;
   const std::vector<Cycle> near = short_cycles(chain, closures);
-  std::vector<Cycle> normal = with_normal_errors(cycles, fit.factors);
+  std::vector<Cycle> normal = with_normal_errors(cycles, fit.factors, dimension);
   // If most cycles of one closure are left out, noise of closures alone may explain the cycles of
   // successive closures. That does not refute the first estimate, which then remains.
   const bool few_are_long = 2 * normal.size() < cycles.size();
   normal.insert(normal.end(), near.begin(), near.end());
-  const Fit refined = fit_factors(normal, volume);
+  const Fit refined = fit_factors({normal, volume, dimension});
   if (refined.log_odds >= kLeastLogOdds)
     fit = refined;
   else if (!few_are_long)
@@ -245,7 +247,7 @@ OdometryNoise estimate_odometry_noise(std::span<const PoseEdge> steps,
   noise.rotation = std::sqrt(fit.factors[kRotation]);
   noise.translation = std::sqrt(fit.factors[kTranslation]);
   cycles.insert(cycles.end(), near.begin(), near.end());
-  noise.likely = likely_closures(cycles, fit.factors, volume);
+  noise.likely = likely_closures({cycles, volume, dimension}, fit.factors);
   return noise;
 }
 
@@ -255,13 +257,13 @@ void OdometryJudgement::correct(std::span<PoseEdge> steps) const {
 }
 
 OdometryJudgement judge_odometry(std::span<const PoseEdge> steps,
-                                 std::span<const PoseEdge> closures,
+                                 std::span<const PoseEdge> closures, int dimension,
                                  std::span<const double> seconds, bool corrects) {
   OdometryJudgement judgement;
-  if (corrects) judgement.breaks = find_odometry_breaks(steps, closures, seconds);
+  if (corrects) judgement.breaks = find_odometry_breaks(steps, closures, dimension, seconds);
   std::vector<PoseEdge> repaired(steps.begin(), steps.end());
   correct_breaks(repaired, judgement.breaks);
-  judgement.noise = estimate_odometry_noise(repaired, closures);
+  judgement.noise = estimate_odometry_noise(repaired, closures, dimension);
   return judgement;
 }
 

@@ -28,6 +28,7 @@ struct OdometryNoise {
 /// cycle with the chain of steps between its ends. If these cycles show noise, cycles of two
 /// successive closures are added, see METHOD.md. `steps[k]` is from keyframe k to keyframe k + 1 of
 /// one robot, and `closures` are between two of its keyframes. Some closures may be false.
+/// `dimension` 2: poses are planar.
 ///
 /// Model: the error e of a cycle (tangent vector) is normal with covariance
 ///     v_R C_R + v_t C_t + v_c S,
@@ -44,7 +45,8 @@ struct OdometryNoise {
 /// similar parts of the environment come in groups. Such closures form a place, which counts as one
 /// cycle. Deterministic. O(steps + closures).
 [[nodiscard]] OdometryNoise estimate_odometry_noise(std::span<const PoseEdge> steps,
-                                                    std::span<const PoseEdge> closures);
+                                                    std::span<const PoseEdge> closures,
+                                                    int dimension);
 
 /// Result of the comparison of the odometry of a robot with the closures inside it. By default,
 /// odometry is as precise as it claims.
@@ -59,7 +61,7 @@ struct OdometryJudgement {
 /// `steps`: odometry from each keyframe to the next, as measured. `seconds`: see
 /// find_odometry_breaks(). `corrects`: wrong steps are looked for.
 [[nodiscard]] OdometryJudgement judge_odometry(std::span<const PoseEdge> steps,
-                                               std::span<const PoseEdge> closures,
+                                               std::span<const PoseEdge> closures, int dimension,
                                                std::span<const double> seconds = {},
                                                bool corrects = true);
 

@@ -207,7 +207,7 @@ void OwnGraph::judge_odometry(bool corrects) {
   const std::vector<PoseEdge>* inside = newest_edges(self_);
   odometry_judgement_ = inside == nullptr
                             ? OdometryJudgement()
-                            : km::judge_odometry(odometry_, *inside, step_s_, corrects);
+                            : km::judge_odometry(odometry_, *inside, dimension_, step_s_, corrects);
 }
 
 std::vector<PoseEdge> OwnGraph::own_edges() const {

@@ -30,7 +30,8 @@ namespace km {
 /// different ids.
 class OwnGraph {
  public:
-  explicit OwnGraph(RobotId self) : self_(self) {}
+  /// `dimension` 2: poses are planar.
+  explicit OwnGraph(RobotId self, int dimension = 3) : self_(self), dimension_(dimension) {}
 
   /// Largest number of closures to one peer.
   static constexpr std::size_t kMaxClosures = 8000;
@@ -54,6 +55,7 @@ class OwnGraph {
   /// Discards everything about a restarted robot: its keyframe indices have a new meaning.
   void forget(RobotId peer);
 
+  [[nodiscard]] int dimension() const { return dimension_; }
   [[nodiscard]] std::uint32_t keyframes() const { return keyframes_; }
   /// Increases with every change of the own keyframes and of the closures inside this robot.
   [[nodiscard]] std::uint32_t revision() const { return revision_; }
@@ -118,6 +120,7 @@ class OwnGraph {
   bool complete(Sets& sets, std::size_t kept) const;
 
   RobotId self_;
+  int dimension_;
   SE3 T_odom_first_ = SE3::Identity();
   std::uint32_t keyframes_ = 0;
   std::uint32_t revision_ = 0;

@@ -111,13 +111,13 @@ bool place_runs(const OwnGraph& graph, RobotId self, std::vector<SE3>& poses) {
 // a closure a few keyframes away.
 std::vector<PoseEdge> likely_closures(const OwnGraph& graph, RobotId self,
                                       const std::vector<SE3>& poses,
-                                      std::span<const PoseEdge> inside, int dimension) {
+                                      std::span<const PoseEdge> inside) {
   const std::vector<PoseEdge>& explained = graph.odometry_noise().likely;
   if (!explained.empty()) return explained;
   const std::map<RobotId, Precision> step{{self, graph.mean_step_precision()}};
   const Corroboration::PoseOf pose = [&](const KeyframeId& id) { return poses[id.index]; };
-  const std::vector<bool> isolated =
-      Corroboration(inside, pose, step, dimension).isolated(default_threshold(dimension));
+  const std::vector<bool> isolated = Corroboration(inside, pose, step, graph.dimension())
+                                         .isolated(default_threshold(graph.dimension()));
   std::vector<PoseEdge> likely;
   for (std::size_t k = 0; k < inside.size(); ++k)
     if (!isolated[k]) likely.push_back(inside[k]);
@@ -126,7 +126,7 @@ std::vector<PoseEdge> likely_closures(const OwnGraph& graph, RobotId self,
 
 }  // namespace
 
-std::vector<SE3> own_start(const OwnGraph& graph, RobotId self, bool trusted, int dimension) {
+std::vector<SE3> own_start(const OwnGraph& graph, RobotId self, bool trusted) {
   std::vector<SE3> poses;
   extend_by_odometry(graph, poses);
   correct(graph.odometry_breaks(), poses);
@@ -137,13 +137,14 @@ std::vector<SE3> own_start(const OwnGraph& graph, RobotId self, bool trusted, in
   if (trusted) return better_of_chordal(std::move(poses), weighed_to_start(all));
   const std::size_t steps = graph.keyframes() - 1;
   std::vector<PoseEdge> likely(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(steps));
-  for (const PoseEdge& closure : likely_closures(graph, self, poses, *inside, dimension))
+  for (const PoseEdge& closure : likely_closures(graph, self, poses, *inside))
     likely.push_back(closure);
   if (likely.size() < steps + kEnoughForChordal) return poses;
   std::vector<SE3> chordal = better_of_chordal(poses, weighed_to_start(std::move(likely)));
-  const bool better =
-      truncated_cost(all, steps, chordal, dimension) < truncated_cost(all, steps, poses, dimension);
-  return better ? std::move(chordal) : poses;
+  const auto cost = [&](const std::vector<SE3>& T_odom_kf) {
+    return truncated_cost(all, steps, T_odom_kf, graph.dimension());
+  };
+  return cost(chordal) < cost(poses) ? std::move(chordal) : poses;
 }
 
 void OwnPoses::extend(const OwnGraph& graph, RobotId self) {

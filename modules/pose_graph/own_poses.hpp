@@ -14,9 +14,8 @@ namespace km {
 /// where most of its closures to the runs before it agree. The chordal initialisation replaces the
 /// poses if its cost is lower. If closures are `trusted`, all of them count. Otherwise, the
 /// initialisation contains closures that are likely true, and the cost of a closure is truncated.
-/// `dimension` 2: poses are planar. Precondition: there is a keyframe.
-[[nodiscard]] std::vector<SE3> own_start(const OwnGraph& graph, RobotId self, bool trusted,
-                                         int dimension);
+/// Precondition: there is a keyframe.
+[[nodiscard]] std::vector<SE3> own_start(const OwnGraph& graph, RobotId self, bool trusted);
 
 /// The poses of the keyframes of one robot between sessions: the poses of the last session, and
 /// odometry for later keyframes. Not thread-safe.

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "modules/outlier_rejection/chi_squared.hpp"
 
@@ -22,19 +21,6 @@ constexpr int kMaxUpdates = 100;        // weights are final afterwards
 constexpr int kHardUpdates = 3;
 constexpr int kMaxReopened = 3;
 
-double chi_squared_3(double x) {
-  return std::erf(std::sqrt(0.5 * x)) - std::sqrt(2.0 * x / std::numbers::pi) * std::exp(-0.5 * x);
-}
-
-double chi_squared_3_quantile(double probability) {
-  double below = 0.0, above = 1000.0;
-  for (int i = 0; i < 64; ++i) {
-    const double middle = 0.5 * (below + above);
-    (chi_squared_3(middle) < probability ? below : above) = middle;
-  }
-  return 0.5 * (below + above);
-}
-
 }  // namespace
 
 double robust_weight(double squared_residual, double squared_barc, double mu) {
@@ -50,8 +36,7 @@ double first_mu(double largest_squared_residual, double squared_barc) {
 }
 
 double default_threshold(int dimension) {
-  return std::sqrt(dimension == 2 ? chi_squared_3_quantile(kInlierProbability)
-                                  : chi_squared_6_quantile(kInlierProbability));
+  return std::sqrt(pose_quantile(kInlierProbability, dimension));
 }
 
 void RobustSchedule::start(float largest_residual, std::uint32_t open_edges, double barc) {

@@ -222,7 +222,6 @@ class TeamAgent {
   PoseGraphConfig config_;
   TeamPeer self_;
   MemberSolverFactory factory_;
-  int dimension_;
   OwnGraph graph_;
   std::uint64_t map_id_ = 0;           // 0: the run does not begin in a finished map
   std::size_t awaited_keyframes_ = 1;  // nothing is optimised before

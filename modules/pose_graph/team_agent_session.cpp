@@ -241,7 +241,7 @@ bool TeamAgent::join(const Session& session) {
 // The start follows from the measurements of this robot alone. Only the place of the first member
 // in a frame that the session continues is that of the last result.
 void TeamAgent::set_start(const Session& session, SessionGraph& graph) {
-  graph.start = own_start(graph_, self_.robot, !expects_false(), dimension_);
+  graph.start = own_start(graph_, self_.robot, !expects_false());
   // Until the fixes determine the absolute frame, keyframe 0 stays, and no fix is an edge.
   if (!graph_.fixes().empty()) {
     placement_ = place_fixes(graph_.fixes(), graph.start, graph_.mean_step_precision(),
@@ -269,8 +269,9 @@ std::vector<SE3> TeamAgent::relaxed_own_start(const Session& session, SessionGra
                      relaxed_->upright == session.upright;
   if (known) return relaxed_->poses;
   for (auto* edges : {&graph.between, &graph.to_absent, &graph.datum_ties}) edges->clear();
-  relaxed_ = {revision, session.upright,
-              relaxed_start(std::move(graph), {.dimension = dimension_, .barc = config_.barc})};
+  relaxed_ = {
+      revision, session.upright,
+      relaxed_start(std::move(graph), {.dimension = graph_.dimension(), .barc = config_.barc})};
   return relaxed_->poses;
 }
 
@@ -312,7 +313,8 @@ void TeamAgent::refine_alone() {
   graph.again = true;
   graph.decided = decisions_.decided();
   graph.noise = part_->noise();
-  poses_.set(relaxed_start(std::move(graph), {.dimension = dimension_, .barc = config_.barc}));
+  poses_.set(
+      relaxed_start(std::move(graph), {.dimension = graph_.dimension(), .barc = config_.barc}));
   publish_due_ = true;
 }
 
