@@ -232,11 +232,14 @@ std::vector<PoseEdge> OwnGraph::closures_across(KeyframeIndex run, KeyframeIndex
 Precision OwnGraph::mean_step_precision() const {
   if (odometry_.empty()) return {};
   Precision sum{0.0, 0.0};
+  double steps = 0.0;
   for (const PoseEdge& step : odometry_) {
+    if (is_unknown_step(step)) continue;
+    steps += 1.0;
     sum.kappa += step.precision.kappa;
     sum.tau += step.precision.tau;
   }
-  const auto steps = static_cast<double>(odometry_.size());
+  if (steps == 0.0) return {};
   return odometry_noise().corrected({sum.kappa / steps, sum.tau / steps});
 }
 

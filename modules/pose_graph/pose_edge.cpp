@@ -23,6 +23,14 @@ bool is_unknown_step(const PoseEdge& step) {
   return step.precision.tau * kThird * kThird < 1.0;
 }
 
+PoseEdge unknown_step(const KeyframeId& from) {
+  constexpr double kTurn_rad = 2.0;  // about that of a uniform rotation
+  return {from,
+          {from.robot, from.index + 1},
+          SE3::Identity(),
+          {0.5 / (kTurn_rad * kTurn_rad), 1.0 / (kUnknownStep_m * kUnknownStep_m)}};
+}
+
 std::optional<PoseEdge> pose_edge(const RelativePose& measured) {
   const double rotation = measured.covariance.topLeftCorner<3, 3>().trace();
   const double translation = measured.covariance.bottomRightCorner<3, 3>().trace();

@@ -39,6 +39,9 @@ struct PoseEdge {
 /// True for the step between two runs of a robot, see kUnknownStep_m.
 [[nodiscard]] bool is_unknown_step(const PoseEdge& step);
 
+/// A step of this kind, from `from` to the next keyframe.
+[[nodiscard]] PoseEdge unknown_step(const KeyframeId& from);
+
 /// nullopt for measurements beyond measurement_limits.hpp: they would corrupt the solution of the
 /// whole team.
 [[nodiscard]] std::optional<PoseEdge> pose_edge(const RelativePose& measured);

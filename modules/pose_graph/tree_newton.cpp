@@ -145,11 +145,15 @@ void TreeNewton::unsettle() {
   }
 }
 
-// The own poses by odometry alone, from the first one.
+// The own poses by odometry alone, from the first one. Unknown steps are those of the start.
 std::vector<SE3> TreeNewton::odometry_poses() const {
-  std::vector<SE3> poses{graph_.start.front()};
-  for (std::size_t k = 0; k < graph_.odometry; ++k)
-    poses.push_back(poses.back() * known_[k].edge.T_from_to);
+  const std::vector<SE3>& start = graph_.start;
+  std::vector<SE3> poses{start.front()};
+  for (std::size_t k = 0; k < graph_.odometry; ++k) {
+    const PoseEdge& step = known_[k].edge;
+    poses.push_back(poses.back() *
+                    (is_unknown_step(step) ? start[k].inverse() * start[k + 1] : step.T_from_to));
+  }
   return poses;
 }
 

@@ -13,7 +13,7 @@
 #include <utility>
 
 #include "modules/outlier_rejection/witnessed_pair.hpp"
-#include "modules/pose_graph/corroboration.hpp"
+#include "modules/pose_graph/odometry_cycles.hpp"
 #include "modules/pose_graph/team_agent.hpp"
 #include "modules/pose_graph/team_message_bytes.hpp"
 #include "modules/rbcd/solver_choice.hpp"
@@ -32,34 +32,8 @@ constexpr std::size_t kMessageHead = 8;
 // change for that long is finished.
 constexpr double kMargin_s = 5.0;
 
-// An edge in the robots' own numbering of poses.
-RelativePose relative_pose(const TeamGraph& graph, const BlockEdge& e, int dimension) {
-  return {graph.keyframe_of(e.i), graph.keyframe_of(e.j), e.T_i_j,
-          covariance_in({e.kappa, e.tau}, dimension)};
-}
-
 bool inside_a_robot(const TeamGraph& graph, const BlockEdge& e) {
   return graph.robot_of(e.i) == graph.robot_of(e.j);
-}
-
-// The steps of odometry of each robot; [k][i] is robot k's step from keyframe i to i + 1. Throws
-// std::invalid_argument if a robot's odometry is interrupted.
-std::vector<std::vector<RelativePose>> team_odometry(const TeamGraph& graph, int dimension) {
-  const std::vector<bool> odometry = odometry_edges(graph);
-  std::vector<std::vector<RelativePose>> steps(graph.robots());
-  for (std::size_t k = 0; k < odometry.size(); ++k)
-    if (odometry[k] && inside_a_robot(graph, graph.edges[k]))
-      steps[graph.robot_of(graph.edges[k].i)].push_back(
-          relative_pose(graph, graph.edges[k], dimension));
-  for (std::size_t robot = 0; robot < graph.robots(); ++robot) {
-    std::ranges::sort(steps[robot], {}, [](const RelativePose& step) { return step.from; });
-    std::size_t chained = 0;
-    while (chained < steps[robot].size() && steps[robot][chained].from.index == chained) ++chained;
-    const auto pose = static_cast<std::size_t>(graph.first[robot]) + chained + 1;
-    if (chained + 1 < static_cast<std::size_t>(graph.poses_of(robot)))
-      throw std::invalid_argument("no odometry leads to pose " + to_string(graph.ids[pose]));
-  }
-  return steps;
 }
 
 using RobotPair = std::pair<RobotId, RobotId>;
@@ -116,9 +90,11 @@ class PlayedPair {
 class AgentTeam {
  public:
   AgentTeam(const TeamGraph& graph, const AgentTeamOptions& options)
-      : graph_(graph), options_(options), odometry_(team_odometry(graph, 3)), rng_(options.seed) {
-    for (std::size_t k = 0; k < graph.robots(); ++k)
+      : graph_(graph), options_(options), rng_(options.seed) {
+    for (std::size_t k = 0; k < graph.robots(); ++k) {
+      odometry_.push_back(odometry_steps(graph, k));
       starts_s_.push_back(random_s(kLatestMeeting_s));
+    }
     for (const VerticalPrior& prior : graph.verticals)
       verticals_[graph.keyframe_of(prior.pose)] = {prior.up, 1.0 / std::sqrt(prior.weight)};
     for (const TeamClosure& measured : team_closures(graph)) {
@@ -208,7 +184,7 @@ class AgentTeam {
         }
         if (i > 0) {
           keyframe.T_previous_kf = odometry_[k][i - 1].T_from_to;
-          keyframe.covariance = odometry_[k][i - 1].covariance;
+          keyframe.covariance = covariance_of(odometry_[k][i - 1].precision);
         }
         (void)member.agent->add(keyframe);
         member.due = any = true;
@@ -358,8 +334,8 @@ class AgentTeam {
 
   const TeamGraph& graph_;
   const AgentTeamOptions& options_;
-  std::vector<std::vector<RelativePose>> odometry_;
-  std::vector<PlayedClosure> closures_;  // ascending by time
+  std::vector<std::vector<PoseEdge>> odometry_;  // steps of each robot
+  std::vector<PlayedClosure> closures_;          // ascending by time
   std::size_t next_closure_ = 0;
   std::map<RobotPair, PlayedPair> pairs_;
   std::vector<Member> members_;
@@ -380,12 +356,15 @@ class AgentTeam {
 }  // namespace
 
 std::vector<TeamClosure> team_closures(const TeamGraph& graph) {
+  const auto covariance = [&](const Precision& precision) {
+    return covariance_in(precision, graph.dimension);
+  };
   std::vector<OdometryPose> poses;
-  const auto odometry = team_odometry(graph, graph.dimension);
   for (std::size_t robot = 0; robot < graph.robots(); ++robot) {
     RecordedGraph chain;
     chain.robot = static_cast<RobotId>(robot);
-    chain.odometry = odometry[robot];
+    for (const PoseEdge& step : odometry_steps(graph, robot))
+      chain.odometry.push_back({step.from, step.to, step.T_from_to, covariance(step.precision)});
     std::ranges::move(odometry_poses(chain), std::back_inserter(poses));
   }
   const std::vector<bool> step = odometry_edges(graph);
@@ -393,11 +372,10 @@ std::vector<TeamClosure> team_closures(const TeamGraph& graph) {
   for (std::size_t k = 0; k < graph.edges.size(); ++k) {
     const BlockEdge& e = graph.edges[k];
     if (step[k] && inside_a_robot(graph, e)) continue;
-    const RelativePose measured = relative_pose(graph, e, graph.dimension);
     closures.push_back({k, Closure{.from = poses[static_cast<std::size_t>(e.i)],
                                    .to = poses[static_cast<std::size_t>(e.j)],
-                                   .T_from_to = measured.T_from_to,
-                                   .covariance = measured.covariance}});
+                                   .T_from_to = e.T_i_j,
+                                   .covariance = covariance({e.kappa, e.tau})}});
   }
   return closures;
 }

@@ -22,8 +22,7 @@ struct TeamClosure {
 };
 
 /// All edges that are no step of a robot's own odometry, in the order of the edges. Odometry
-/// between two robots is included. Throws std::invalid_argument if a robot's odometry is
-/// interrupted.
+/// between two robots is included.
 [[nodiscard]] std::vector<TeamClosure> team_closures(const TeamGraph& graph);
 
 struct AgentTeamOptions {
@@ -70,8 +69,7 @@ struct AgentTeamRun {
 /// perfect links in virtual time. Closures inside a robot count at once. Closures between two
 /// robots count when WitnessedPair has its witnesses, or `pcm.witness_wait_s` after the first one.
 /// If several closures join the same two poses, the robots use one (see OwnGraph), and all of
-/// them have the same value in `kept`. Deterministic. Throws std::invalid_argument if the odometry
-/// of a robot is interrupted.
+/// them have the same value in `kept`. Deterministic.
 [[nodiscard]] AgentTeamRun run_agent_team(const TeamGraph& graph, const AgentTeamOptions& options);
 
 }  // namespace km

@@ -33,7 +33,7 @@ std::vector<bool> odometry_edges(const TeamGraph& graph) {
   for (const BlockEdge& e : graph.edges) {
     const KeyframeId& from = graph.ids[static_cast<std::size_t>(e.i)];
     const KeyframeId& to = graph.ids[static_cast<std::size_t>(e.j)];
-    const bool step = from.robot == to.robot && to.index == from.index + 1 && e.j == e.i + 1;
+    const bool step = from.robot == to.robot && e.j == e.i + 1;
     odometry.push_back(step && has_step.insert(from).second);
   }
   return odometry;
@@ -74,11 +74,26 @@ std::vector<Eigen::Index> part_of_poses(const TeamGraph& graph) {
   return parent;
 }
 
+std::vector<PoseEdge> odometry_steps(const TeamGraph& graph, std::size_t robot) {
+  std::vector<PoseEdge> steps;
+  for (KeyframeIndex k = 0; k + 1 < static_cast<KeyframeIndex>(graph.poses_of(robot)); ++k)
+    steps.push_back(unknown_step({static_cast<RobotId>(robot), k}));
+  const std::vector<bool> odometry = odometry_edges(graph);
+  for (std::size_t k = 0; k < odometry.size(); ++k) {
+    const BlockEdge& e = graph.edges[k];
+    const KeyframeId from = graph.keyframe_of(e.i), to = graph.keyframe_of(e.j);
+    if (odometry[k] && from.robot == robot && to.robot == robot)
+      steps[from.index] = {from, to, e.T_i_j, {e.kappa, e.tau}};
+  }
+  return steps;
+}
+
 SessionGraph part_of(const TeamGraph& graph, std::size_t robot) {
   SessionGraph part{.self = static_cast<RobotId>(robot), .upright = !graph.verticals.empty()};
   const std::vector<bool> odometry = odometry_edges(graph);
   std::map<RobotId, std::size_t> steps;
-  std::vector<PoseEdge> closures;
+  part.own = odometry_steps(graph, robot);
+  part.odometry = part.own.size();
   for (std::size_t k = 0; k < graph.edges.size(); ++k) {
     const BlockEdge& e = graph.edges[k];
     const PoseEdge edge{graph.keyframe_of(e.i), graph.keyframe_of(e.j), e.T_i_j, {e.kappa, e.tau}};
@@ -91,10 +106,8 @@ SessionGraph part_of(const TeamGraph& graph, std::size_t robot) {
       mean.tau += (e.tau - mean.tau) / static_cast<double>(n);
     }
     if (edge.from.robot != part.self && edge.to.robot != part.self) continue;
-    (!inside ? part.between : odometry[k] ? part.own : closures).push_back(edge);
+    if (!inside || !odometry[k]) (inside ? part.own : part.between).push_back(edge);
   }
-  part.odometry = part.own.size();
-  part.own.insert(part.own.end(), closures.begin(), closures.end());
   std::stable_sort(part.between.begin(), part.between.end(),
                    [](const PoseEdge& a, const PoseEdge& b) { return a.id() < b.id(); });
   for (const VerticalPrior& prior : graph.verticals)

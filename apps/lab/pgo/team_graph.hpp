@@ -40,6 +40,10 @@ struct TeamGraph {
 /// robot of the file.
 [[nodiscard]] std::vector<bool> odometry_edges(const TeamGraph& graph);
 
+/// The odometry of `robot` from each of its keyframes to the next; steps that are no edge of the
+/// graph are unknown_step(). Ids are those of TeamGraph::keyframe_of().
+[[nodiscard]] std::vector<PoseEdge> odometry_steps(const TeamGraph& graph, std::size_t robot);
+
 /// The graph with only those edges that are `kept`.
 [[nodiscard]] TeamGraph with_edges(TeamGraph graph, const std::vector<bool>& kept);
 
