@@ -15,8 +15,11 @@ namespace km {
     const std::filesystem::path& place);
 
 /// Poses of a trajectory file, or of the file from find_trajectory() in a folder, with strictly
-/// increasing stamps. The rows determine the format: EuRoC's `t[ns], px, py, pz, qw, qx, qy, qz,
-/// ...` has commas, TUM's `t[s] px py pz qx qy qz qw` has blanks. Comments and one header row are
+/// increasing stamps. A header (OKVIS2, Basalt, MCD, ...) names the columns of stamp and pose and
+/// the order of the quaternion. Without names the rows determine the format: EuRoC's `t[ns], px,
+/// py, pz, qw, qx, qy, qz, ...` has commas, TUM's `t[s] px py pz qx qy qz qw` has blanks. The size
+/// of TUM's stamps shows whether they are s, ms, us or ns (ORB-SLAM3). KITTI's rows of 12
+/// numbers have their stamps in times.txt, beside the file or in ../sequences/NAME. Comments are
 /// skipped. Published truths contain rows with equal stamps, of which the first counts.
 ///
 /// Throws InputFileError for a file that is missing or empty, and for a row with one of these
@@ -24,7 +27,7 @@ namespace km {
 /// - too few fields, or a field that is not a finite number;
 /// - a quaternion whose norm errs by more than 1 %;
 /// - a coordinate beyond 1e9 m;
-/// - a stamp beyond 146 years, or before the last one.
+/// - a stamp beyond 146 years, or before the last one; more than 5000 poses a second.
 [[nodiscard]] std::vector<StampedPose> read_trajectory(const std::filesystem::path& file);
 
 /// Poses with covariances, in the order of their stamps.

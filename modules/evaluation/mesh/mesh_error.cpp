@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "modules/core/config.hpp"
 #include "modules/core/text_table.hpp"
 #include "modules/evaluation/statistics.hpp"
 
@@ -152,6 +153,15 @@ PointMatches match_points(const SampledMesh& from, const SampledMesh& to,
   return matches;
 }
 
+constexpr float kMostLength_m = 1e4F;  // longest edge of a face
+
+// The longest edge of a face.
+float length_of(const LabelledMesh& mesh, const LabelledMesh::Face& face) {
+  const Eigen::Vector3f &a = mesh.vertices[face[0]], &b = mesh.vertices[face[1]],
+                        &c = mesh.vertices[face[2]];
+  return std::max({(a - b).norm(), (b - c).norm(), (c - a).norm()});
+}
+
 constexpr double kRegistrationPerM2 = 250.0;  // planes need no more
 constexpr double kLargeMove_m = 0.5;
 constexpr double kLargeTurn_deg = 3.0;
@@ -168,17 +178,23 @@ class Evaluation {
         progress_(progress) {
     check_comparable(truth, "truth");
     if (inputs_.empty()) throw std::invalid_argument("no estimated mesh");
-    double area = 0.0;
-    for (const MeshInput& input : inputs_) {
-      check_comparable(input.mesh, input.name);
-      area += surface_area(input.mesh);
-    }
-    per_m2_ = std::min(options.samples_per_m2, static_cast<double>(options.max_samples) / area);
+    for (const MeshInput& input : inputs_) check_comparable(input.mesh, input.name);
+    Eigen::AlignedBox3f box;
+    for (const Eigen::Vector3f& vertex : truth.vertices) box.extend(vertex);
+    longest_m_ = 10.0F * box.diagonal().norm();
+    for (const LabelledMesh::Face& face : truth.faces)
+      if (const float length_m = length_of(truth, face); length_m > kMostLength_m)
+        throw std::invalid_argument("truth: a face of " + shortest_text(std::round(length_m)) +
+                                    " m: has it a vertex far away?");
   }
 
   // A report for each state.
   std::vector<MeshReport> run() {
-    place(options_.T_truth_estimate);
+    if (const std::size_t long_faces = place(options_.T_truth_estimate); long_faces > 0)
+      report_.notes.push_back(std::to_string(long_faces) +
+                              " faces are longer than ten times the truth, " +
+                              fixed(static_cast<double>(longest_m_), 1) + " m: left out");
+    choose_density();
     report_.registration.T_truth_estimate = options_.T_truth_estimate;
     if (options_.icp) register_estimates();
     sample();
@@ -199,12 +215,24 @@ class Evaluation {
     if (progress_) progress_(stage, 0.0);
   }
 
-  void place(const SE3& T_truth_estimate) {
+  // Leaves out faces of more than ten times the length of the truth, because one vertex far away
+  // would take all samples. Returns their number.
+  std::size_t place(const SE3& T_truth_estimate) {
     moved_.clear();
+    std::size_t long_faces = 0;
     for (const MeshInput& input : inputs_) {
-      moved_.push_back(input.mesh);
-      moved_.back().transform(T_truth_estimate);
+      LabelledMesh& mesh = moved_.emplace_back(input.mesh);
+      mesh.transform(T_truth_estimate);
+      long_faces += std::erase_if(
+          mesh.faces, [&](const auto& face) { return length_of(mesh, face) > longest_m_; });
     }
+    return long_faces;
+  }
+
+  void choose_density() {
+    double area = 0.0;
+    for (const LabelledMesh& mesh : moved_) area += surface_area(mesh);
+    per_m2_ = std::min(options_.samples_per_m2, static_cast<double>(options_.max_samples) / area);
   }
 
   [[nodiscard]] std::vector<SurfaceSamples> sampled_estimates(double per_m2) const {
@@ -306,8 +334,8 @@ class Evaluation {
       MeshReport& report = reports_[i / robots_];
       MeshError& error = report.robots.emplace_back();
       error.name = inputs_[i].name;
-      error.area_m2 = surface_area(inputs_[i].mesh);
-      error.faces = inputs_[i].mesh.faces.size();
+      error.area_m2 = surface_area(moved_[i]);
+      error.faces = moved_[i].faces.size();
       report.merged.name = "merged";
       report.merged.area_m2 += error.area_m2;
       report.merged.faces += error.faces;
@@ -434,6 +462,7 @@ class Evaluation {
   const MeshErrorOptions& options_;
   const MeshProgress& progress_;
   double per_m2_ = 0.0;
+  float longest_m_ = 0.0F;           // longest edge: ten diagonals of the truth's box
   std::vector<LabelledMesh> moved_;  // the estimates in the truth's frame
   std::vector<SurfaceSamples> estimates_;
   SurfaceSamples true_samples_;

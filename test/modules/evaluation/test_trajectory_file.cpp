@@ -4,6 +4,7 @@
 #include <string>
 
 #include "test/support/shared_data.hpp"
+#include "test/support/temporary_folder.hpp"
 
 namespace km {
 
@@ -44,11 +45,55 @@ TEST_CASE("An impossible trajectory is refused with file and line", "[evaluation
   CAPTURE(c.text);
   CHECK_THROWS_WITH(parse_trajectory(good + c.text, "poses.txt"), Catch::Contains(c.message));
   CHECK_THROWS_WITH(parse_trajectory("1.5,0,0,0,1,0,0,0\n", "p"),
-                    "p line 1: 1.5 is not a stamp in nanoseconds");
+                    Catch::Contains("p line 1: 1.5 is not a stamp in nanoseconds"));
   CHECK_THROWS_WITH(parse_trajectory("9223372036854775807,0,0,0,1,0,0,0\n", "a.csv"),
                     Catch::Contains("line 1: 9223372036854775807 is not a stamp"));
   CHECK_THROWS_WITH(parse_trajectory("# nothing\n", "p"), "p: holds no pose");
   CHECK_THROWS_WITH(read_trajectory("/nowhere.txt"), "/nowhere.txt: no such file");
+}
+
+TEST_CASE("A header names the columns, and sizes of stamps their unit", "[evaluation]") {
+  const std::string text = GENERATE(
+      // OKVIS2, Basalt, MCD, ORB-SLAM3, TUM in milliseconds, a header with seconds and commas
+      "timestamp, p_WS_W_x, p_WS_W_y, p_WS_W_z, q_WS_x, q_WS_y, q_WS_z, q_WS_w, v_WS_W_x\n"
+      "1403636579758000000, 1, 2, 3, 0, 0, 0.6, 0.8, 9\n",
+      "#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m],q_RS_w [],q_RS_x [],q_RS_y [],q_RS_z "
+      "[]\n1403636579758000000,1,2,3,0.8,0,0,0.6\n",
+      "num t x y z qx qy qz qw\n7 1403636579.758 1 2 3 0 0 0.6 0.8\n",
+      "num,t,x,y,z,qx,qy,qz,qw\n7,1403636579.758,1,2,3,0,0,0.6,0.8\n",
+      "1403636579758000000.000000 1 2 3 0 0 0.6 0.8\n", "1403636579758 1 2 3 0 0 0.6 0.8\n",
+      "time,tx,ty,tz,qx,qy,qz,qw\n1403636579.758,1,2,3,0,0,0.6,0.8\n");
+  CAPTURE(text);
+  const auto poses = parse_trajectory(text, "x");
+  REQUIRE(poses.size() == 1);
+  CHECK(poses[0].stamp == 1403636579758000000);
+  CHECK(poses[0].T.translation() == Eigen::Vector3d(1, 2, 3));
+  CHECK(poses[0].T.linear().isApprox(Eigen::Quaterniond(0.8, 0, 0, 0.6).toRotationMatrix(), 1e-12));
+}
+
+TEST_CASE("Stamps in microseconds are refused where nanoseconds are expected", "[evaluation]") {
+  std::string text;
+  for (int k = 0; k < 20; ++k)
+    text += std::to_string(1403636579758555 + 50000 * k) + ",0,0,0,1,0,0,0\n";
+  CHECK_THROWS_WITH(parse_trajectory(text, "a.csv"),
+                    "a.csv: 20000 poses a second: stamps are to be nanoseconds; are they "
+                    "microseconds, milliseconds or seconds?");
+}
+
+TEST_CASE("Poses of KITTI have their stamps in times.txt, and a bag is no trajectory",
+          "[evaluation]") {
+  const TemporaryFolder folder;
+  folder.write("poses/07.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n0 -1 0 4 1 0 0 5 0 0 1 6\n");
+  const auto file = folder.path() / "poses/07.txt";
+  CHECK_THROWS_WITH(read_trajectory(file), Catch::Contains("put times.txt beside it"));
+  folder.write("sequences/07/times.txt", "0.0\n1.036e-01\n");
+  const auto poses = read_trajectory(file);
+  REQUIRE(poses.size() == 2);
+  CHECK(poses[1].stamp == 103600000);
+  CHECK(poses[1].T.translation() == Eigen::Vector3d(4, 5, 6));
+  CHECK(poses[1].T.linear().col(0).isApprox(Eigen::Vector3d::UnitY()));
+  folder.write("a.bag", "#ROSBAG V2.0\n");
+  CHECK_THROWS_WITH(read_trajectory(folder.path() / "a.bag"), Catch::Contains("is a recording"));
 }
 
 }  // namespace km

@@ -215,6 +215,22 @@ TEST_CASE("More samples than allowed lower the density of both sides, with a not
                                   Catch::Contains("instead of 1000, to stay below 5000"));
 }
 
+TEST_CASE("A face with a vertex far away is left out, and such a truth is refused",
+          "[mesh_error]") {
+  LabelledMesh estimate = square(6.0F, 0.02F, 1);
+  estimate.vertices.emplace_back(1e6F, 1e6F, 0.0F);
+  estimate.labels.push_back(1);
+  estimate.faces.push_back({0, 1, static_cast<std::uint32_t>(estimate.vertices.size() - 1)});
+  const MeshReport report = compare(square(6.0F, 0.0F, 1), estimate, in_place());
+  CHECK(report.merged.estimate.surface.mean_m == Approx(0.02).margin(1e-6));
+  CHECK(report.merged.area_m2 == Approx(36.0));
+  REQUIRE(report.notes.size() == 1);
+  CHECK_THAT(report.notes[0],
+             Catch::StartsWith("1 faces are longer than ten times the truth, 84.9 m"));
+  CHECK_THROWS_WITH(compare(estimate, estimate, in_place()),
+                    Catch::Contains("has it a vertex far away?"));
+}
+
 TEST_CASE("Meshes without labels are compared by shape, with a note", "[mesh_error]") {
   LabelledMesh bare = square(1.0F, 0.0F);
   bare.labels.clear();
