@@ -187,6 +187,7 @@ Examination examine_packets(DatasetReader& reader, const RobotConfig& config, do
   const StereoRig& rig = reader.rig().stereo;
   result.add(examine_images(sample));
   result.add(examine_stereo(sample, rig));
+  result.add(examine_depth(sample, rig));
   result.add(examine_inertial(sample, rig));
   result.add(examine_words(sample.descriptors, load_vocabulary(find_shipped_file(
                                                    config.run.vocabulary, "run.vocabulary"))));

@@ -84,15 +84,30 @@ std::string pair_table(const std::vector<TopicPair>& pairs) {
   return align_columns(rows);
 }
 
-// Settings with which a robot uses the fixes of these topics.
+std::string lower(std::string name) {
+  std::ranges::transform(name, name.begin(), [](unsigned char c) { return std::tolower(c); });
+  return name;
+}
+
+bool has_word(const TopicSummary& topic, std::string_view word) {
+  return lower(topic.topic).find(word) != std::string::npos;
+}
+
+// Settings with which a robot uses the fixes of these topics. An estimate is no fix.
 std::string fixes_text(const std::vector<TopicSummary>& topics) {
+  constexpr std::array kEstimates = {"amcl", "slam", "odom", "vio",  "vins",     "ekf",
+                                     "fuse", "goal", "plan", "init", "estimate", "filter"};
   std::string text;
   for (const TopicSummary& topic : topics)
-    for (const auto& [name, source] : kFixSources)
-      if (has_fixes({topic.topic, topic.type, topic.encoding, 0}, source))
-        text += readable(topic.topic) + ": positions; --set absolute_fixes.source=" + name +
-                " absolute_fixes.topic=" + readable(topic.topic) +
-                " if they are those of the robot\n";
+    for (const auto& [name, source] : kFixSources) {
+      const bool is_empty = topic.stamps.empty();
+      if (is_empty || !has_fixes({topic.topic, topic.type, topic.encoding, 0}, source)) continue;
+      if (std::ranges::any_of(kEstimates, [&](const char* w) { return has_word(topic, w); }))
+        continue;
+      text += readable(topic.topic) + ": positions; --set absolute_fixes.source=" + name +
+              " absolute_fixes.topic=" + readable(topic.topic) +
+              " if a receiver or a motion capture measures them, and not an estimator\n";
+    }
   return text;
 }
 
@@ -152,18 +167,39 @@ std::vector<TopicSummary> folder_topics(const fs::path& folder, FolderLayout lay
   return topics;
 }
 
+// The chosen topics, and the others of their kinds.
+std::string rivals_text(const std::vector<TopicSummary>& topics, const RigFile& rig) {
+  std::string text = "\nchosen:";
+  const std::array chosen = {&rig.left.topic, &rig.right.topic,    &rig.depth.topic,
+                             &rig.imu.topic,  &rig.imu.gyro_topic, &rig.imu.accel_topic};
+  for (const std::string* topic : chosen)
+    if (!topic->empty()) text += ' ' + readable(*topic, 80);
+  std::string others;
+  for (const TopicSummary& topic : topics) {
+    const bool is_imu = is_of_type({topic.topic, topic.type, topic.encoding, 0}, RosImu::kType);
+    const bool is_chosen =
+        std::ranges::any_of(chosen, [&](const auto* one) { return *one == topic.topic; });
+    if ((topic.is_image || is_imu) && !is_chosen && !topic.stamps.empty())
+      others += ' ' + readable(topic.topic, 80);
+  }
+  return text + '\n' + (others.empty() ? "" : "not chosen:" + others + '\n');
+}
+
 // Writes the rig file that fits the topics best. Returns text on its content. `source`: the
 // recording, or the live topics.
 std::string write_rig(const std::vector<TopicSummary>& topics, const std::string& source,
                       const fs::path& rig) {
   const RigFile proposal = propose_rig(topics);
+  if (proposal.left.topic.empty())
+    throw InputFileError(rig.string() + ": not written: no camera: no topic of " + source +
+                         " has images");
   write_file(rig, "# The sensors in " + source + ": see that they are the right ones.\n" +
                       rig_file_text(proposal));
   const bool has_infos = !proposal.left.info_topic.empty() &&
                          (proposal.right.topic.empty() || !proposal.right.info_topic.empty());
   const std::string problem = depth_problem(topics, proposal);
-  return (problem.empty() ? "" : "\nwarning: " + problem + '\n') + "\nwritten: " + rig.string() +
-         ": look at its topics, and name the calibration" +
+  return (problem.empty() ? "" : "\nwarning: " + problem + '\n') + rivals_text(topics, proposal) +
+         "\nwritten: " + rig.string() + ": look at its topics, and name the calibration" +
          (has_infos ? "; without it, the calibration comes from topics of CameraInfo and from "
                       "/tf_static\n"
                     : "\n");
@@ -246,12 +282,6 @@ void refuse_existing(const fs::path& rig) {
   if (!is_absent(rig)) throw InputFileError(rig.string() + ": is there already: name another file");
 }
 
-bool has_word(const TopicSummary& topic, std::string_view word) {
-  std::string name = topic.topic;
-  std::ranges::transform(name, name.begin(), [](unsigned char c) { return std::tolower(c); });
-  return name.find(word) != name.npos;
-}
-
 bool is_depth(const TopicSummary& topic) {
   if (!topic.is_image) return false;
   const std::string encoding = topic.image ? topic.image->encoding : "";
@@ -259,10 +289,31 @@ bool is_depth(const TopicSummary& topic) {
 }
 
 // Parts of names that mark the left and the right camera.
-constexpr std::array<std::pair<const char*, const char*>, 4> kSides = {
-    {{"left", "right"}, {"infra1", "infra2"}, {"cam0", "cam1"}, {"cam_0", "cam_1"}}};
+constexpr std::array<std::pair<std::string_view, std::string_view>, 6> kSides = {
+    {{"left", "right"},
+     {"infra1", "infra2"},
+     {"infrared_1", "infrared_2"},
+     {"cam0", "cam1"},
+     {"cam_0", "cam_1"},
+     {"camera0", "camera1"}}};
 
-bool are_sides(const TopicSummary& left, const TopicSummary& right) {
+// True if the names of a left and a right camera are equal except for the side.
+bool are_counterparts(const std::string& left, const std::string& right) {
+  for (const auto& [from, to] : kSides) {
+    std::string all = left;
+    for (std::size_t at = all.find(from); at != all.npos; at = all.find(from, at + to.size()))
+      all.replace(at, from.size(), to);
+    if (all != left && all == right) return true;
+    for (std::size_t at = left.find(from); at != left.npos; at = left.find(from, at + 1))
+      if (std::string(left).replace(at, from.size(), to) == right) return true;
+  }
+  return false;
+}
+
+// 3: counterparts with rectified images; 2: counterparts; 1: a left and a right camera; 0: others.
+int likeness_of_sides(const TopicSummary& left, const TopicSummary& right) {
+  if (are_counterparts(lower(left.topic), lower(right.topic)))
+    return has_word(left, "rect") ? 3 : 2;
   return std::ranges::any_of(kSides, [&](const auto& side) {
     return has_word(left, side.first) && has_word(right, side.second);
   });
@@ -272,16 +323,17 @@ const TopicSummary& named(const std::vector<TopicSummary>& topics, const std::st
   return *std::ranges::find(topics, name, &TopicSummary::topic);
 }
 
-// Prefers two cameras whose names mark them as left and right. Otherwise takes the pair with the
-// most common stamps.
+// Prefers two cameras whose names are equal except for the side, so that they are of one device and
+// one kind. Otherwise takes the pair with the most common stamps, in the order of their names.
 void propose_stereo(const std::vector<TopicSummary>& topics, RigFile& rig) {
-  std::size_t best = 0;
+  std::pair<int, std::size_t> best;
   for (const TopicPair& pair : pairs_of_images(topics)) {
     const TopicSummary* left = &named(topics, pair.first);
     const TopicSummary* right = &named(topics, pair.second);
     if (is_depth(*left) || is_depth(*right)) continue;
-    if (are_sides(*right, *left)) std::swap(left, right);
-    const std::size_t merit = 1 + pair.agreement.pairs + (are_sides(*left, *right) ? 1U << 30U : 0);
+    const int there = likeness_of_sides(*left, *right), back = likeness_of_sides(*right, *left);
+    if (back > there || (back == there && right->topic < left->topic)) std::swap(left, right);
+    const std::pair merit(std::max(there, back), 1 + pair.agreement.pairs);
     if (merit <= best) continue;
     best = merit;
     rig.left.topic = left->topic;
@@ -305,6 +357,7 @@ void propose_depth(const std::vector<TopicSummary>& topics, RigFile& rig) {
         const bool is_camera = camera.is_image && !is_depth(camera) &&
                                (rig.left.topic.empty() || camera.topic == rig.left.topic);
         if (!rig.depth.topic.empty() || !is_depth(depth) || !is_camera) continue;
+        if (depth.stamps.empty() || camera.stamps.empty()) continue;
         if (aligned && !may_be_aligned(camera, depth)) continue;
         rig.left.topic = camera.topic;
         rig.depth.topic = depth.topic;
@@ -312,12 +365,13 @@ void propose_depth(const std::vector<TopicSummary>& topics, RigFile& rig) {
 }
 
 // Among several topics, takes the one that shares the longest prefix with the topic of the left
-// camera: "/Alpha/...".
+// camera ("/Alpha/..."), and of those the one at the highest rate.
 void propose_imu(const std::vector<TopicSummary>& topics, RigFile& rig) {
-  const auto likeness = [&rig](const std::string& topic) {
+  const auto likeness = [&](const std::string& topic) {
     const std::string& left = rig.left.topic;
     const auto end = std::ranges::mismatch(left, topic).in1;
-    return std::ranges::count(left.begin(), end, '/');
+    return std::pair(std::ranges::count(left.begin(), end, '/'),
+                     named(topics, topic).stamps.size());
   };
   for (const TopicSummary& topic : topics) {
     const bool is_imu = is_of_type({topic.topic, topic.type, topic.encoding, 0}, RosImu::kType);

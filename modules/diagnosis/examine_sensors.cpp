@@ -7,6 +7,7 @@
 
 #include "modules/core/lie.hpp"
 #include "modules/core/text_table.hpp"
+#include "modules/diagnosis/acceleration_fit.hpp"
 #include "modules/diagnosis/finding.hpp"
 #include "modules/diagnosis/focal_fit.hpp"
 #include "modules/diagnosis/image_rotation.hpp"
@@ -14,6 +15,7 @@
 #include "modules/diagnosis/stereo_fit.hpp"
 #include "modules/evaluation/statistics.hpp"
 #include "modules/recordings/bag_summary.hpp"
+#include "modules/sensors/usual_numbers.hpp"
 
 namespace km {
 namespace {
@@ -57,12 +59,19 @@ double usable_count(ReaderFault fault, const SensorSample& sample) {
   }
 }
 
+void add_doubt(const Doubt& doubt, Severity severity, Examination& result) {
+  result.add(doubt.is_explained ? kError : severity, doubt.id, doubt.what, doubt.means,
+             doubt.to_do);
+}
+
 void examine_rate(const char* sensor, const std::string& id, const std::vector<Stamp>& stamps,
                   double least_hz, double longest_gap_s, Examination& result) {
   const StampStatistics found = stamp_statistics(stamps);
   result.figure(std::string(sensor) + ", rate", fixed(found.rate_hz, 1) + " Hz, largest gap " +
                                                     fixed(found.largest_gap_s, 3) + " s, jitter " +
                                                     milliseconds(found.jitter_s));
+  const UsualNumber rate = id == "imu" ? UsualNumber::kImuRate_hz : UsualNumber::kImageRate_hz;
+  if (const auto unusual = doubt(rate, found.rate_hz)) add_doubt(*unusual, kError, result);
   if (!(found.rate_hz >= least_hz))
     result.add(kWarning, id + ".rate",
                std::string(sensor) + " at " + fixed(found.rate_hz, 1) + " Hz, less than " +
@@ -115,6 +124,10 @@ const std::map<StereoFault, FaultWords> kFaultWords = {
     {StereoFault::kFocalLength,
      {"stereo.focal", "the focal lengths of the two cameras do not fit each other",
       "calibrate them again at the resolution of the images"}},
+    {StereoFault::kOtherMode,
+     {"stereo.other_mode", "the calibration is that of images of another size",
+      "multiply focal lengths and centres of both cameras by this factor, or use the calibration "
+      "of this mode of the driver"}},
 };
 
 std::string fit_text(const StereoFit& fit) {
@@ -131,23 +144,16 @@ void examine_pair(const StereoAlternative& found, const StereoFit& given, Examin
   if (is_named) what += "; with this fault undone " + percent(found.fit.inlier_ratio);
   if (found.fault == StereoFault::kFocalLength)
     what += ", with the right focal length times " + fixed(found.focal_ratio, 3);
+  if (found.fault == StereoFault::kOtherMode)
+    what += ", with focal lengths and centres times " + fixed(found.focal_ratio, 1);
   result.add(kError, words.id, std::move(what),
              "depth is wrong or missing, so odometry and loop closures fail", words.to_do);
 }
 
 void examine_baseline(const StereoRig& rig, const StereoFit& fit, Examination& result) {
-  constexpr double kLeast_m = 0.02, kMost_m = 1.5;
-  const double baseline_m = rig.baseline_m();
   const std::string depth =
       std::isfinite(fit.depth_m) ? "median depth " + fixed(fit.depth_m, 1) + " m" : "no depth";
-  result.figure("baseline",
-                fixed(baseline_m, 3) + " m, " + depth + " (images do not determine the length)");
-  if (!(baseline_m >= kLeast_m && baseline_m <= kMost_m))
-    result.add(kWarning, "stereo.baseline",
-               "a baseline of " + rounded(baseline_m, 4) + " m, outside of the usual " +
-                   fixed(kLeast_m, 2) + " to " + fixed(kMost_m, 1) + " m; " + depth,
-               "if its unit is wrong, all lengths are wrong by the same factor",
-               "state the translation in metres, not in millimetres or inches");
+  result.figure("baseline", fixed(rig.baseline_m(), 3) + " m, " + depth);
 }
 
 double angle_between(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b) {
@@ -256,32 +262,43 @@ void examine_focal(const SensorSample& sample, const StereoRig& rig, const Visua
              "the gyroscope");
 }
 
-void examine_gravity(const SensorSample& sample, Examination& result) {
-  std::vector<double> norms;
-  norms.reserve(sample.imu.size());
-  for (const ImuSample& measured : sample.imu) norms.push_back(measured.accel.norm());
-  constexpr double kGravity = 9.81;
-  const double found = quantile(std::move(norms), 0.5);
+// False if the norm of the accelerations is not that of gravity.
+bool examine_gravity(const SensorSample& sample, Examination& result) {
+  const double found = median_acceleration(sample.imu);
   result.figure("accelerometer", "median norm " + fixed(found, 2) + " m/s^2");
-  const auto is_about = [found](double value) { return std::abs(found / value - 1.0) < 0.15; };
-  if (is_about(kGravity) || std::isnan(found)) return;
-  Finding finding{.id = "imu.gravity", .severity = kError};
-  finding.what = "the accelerometer measures " + rounded(found, 3) + " in the median, gravity is " +
-                 fixed(kGravity, 2) + " m/s^2";
-  finding.means = "odometry estimates a wrong direction of gravity";
-  finding.to_do = "write specific force in m/s^2, including gravity";
-  if (is_about(1.0) || is_about(1e3)) {
-    finding.id = "imu.accel_in_g";
-    finding.means =
-        is_about(1.0) ? "the accelerometer states g" : "the accelerometer states thousandths of g";
-    finding.to_do =
-        "multiply the samples by " + std::string(is_about(1.0) ? "9.80665" : "0.00980665");
-  } else if (found < 0.3 * kGravity) {
-    finding.id = "imu.no_gravity";
-    finding.means = "the driver has subtracted gravity, or uses another unit";
-    finding.to_do = "set the driver to raw acceleration";
+  const auto unusual = doubt(UsualNumber::kGravity_mps2, found);
+  if (unusual) add_doubt(*unusual, kError, result);
+  return !unusual;
+}
+
+// Compares accelerations by images and depth with those of the accelerometer. Vibration and errors
+// of tracking make the scale smaller, so only a larger one and another sign are faults.
+void examine_acceleration(const SensorSample& sample, const StereoRig& rig,
+                          const VisualRotations& seen, const InertialFit& inertial,
+                          Examination& result) {
+  constexpr double kMost = 1.6, kNegated = -0.5, kSure = 5.0;
+  constexpr const char* kName = "accelerations by images and depth";
+  const auto fit = fit_acceleration(seen.steps, sample.imu, rig.cameras[0].T_body_cam,
+                                    inertial.offset_at_limit ? 0.0 : inertial.offset_s);
+  if (!fit || !(kSure * fit->sigma < std::abs(fit->scale))) {
+    result.figure(kName, "not determined: too little acceleration, or no depth");
+    return;
   }
-  result.findings.push_back(std::move(finding));
+  const std::string factor = rounded(fit->scale, 3) + " +- " + rounded(fit->sigma, 2);
+  result.figure(kName, "times " + factor + " of the accelerometer's");
+  if (fit->scale < kNegated)
+    result.add(kError, "imu.accel_negated",
+               "accelerations by images and depth are " + factor +
+                   " times those of the accelerometer: its sign is inverted",
+               "odometry takes up for down, and drifts or restarts",
+               "multiply accelerations by -1: specific force points up at rest (gravity vectors "
+               "and NED or FRD axes point down)");
+  if (fit->scale > kMost)
+    result.add(
+        kError, "depth.scale",
+        "accelerations by images and depth are " + factor + " times those of the accelerometer",
+        "lengths are wrong by about this factor: the baseline or the scale of depth",
+        "check the unit of the baseline (P[3] of CameraInfo) or of depth (depth: {scale_m})");
 }
 
 }  // namespace
@@ -377,6 +394,7 @@ Examination examine_words(std::span<const std::vector<BinaryDescriptor>> images,
 
 Examination examine_stereo(const SensorSample& sample, const StereoRig& rig) {
   Examination result;
+  for (const Doubt& unusual : rig_doubts(rig)) add_doubt(unusual, kWarning, result);
   if (rig.depth_source != DepthSource::kRightImage) return result;
   const StereoFit given = fit_of(sample.stereo, rig);
   if (given.points < kLeastStereoPoints) {
@@ -390,12 +408,47 @@ Examination examine_stereo(const SensorSample& sample, const StereoRig& rig) {
   return result;
 }
 
+Examination examine_depth(const SensorSample& sample, const StereoRig& rig) {
+  Examination result;
+  const SE3 T_right_left = rig.T_left_right().inverse();
+  std::vector<double> depths_m, ratios;
+  for (const TrackedStep& step : sample.steps)
+    for (const TrackedPoint& point : step.points) {
+      if (!(point.depth_m > 0.0)) continue;
+      depths_m.push_back(point.depth_m);
+      if (!point.right || rig.depth_source != DepthSource::kRightImage) continue;
+      const auto seen = stereo_point(rig, T_right_left, {point.from, *point.right});
+      const bool is_good = seen && seen->error_px < kEpipolarInlier_px && seen->depth_m > 0.0;
+      if (is_good) ratios.push_back(point.depth_m / seen->depth_m);
+    }
+  if (depths_m.size() < kLeastStereoPoints) return result;
+  const double depth_m = quantile(std::move(depths_m), 0.5);
+  result.figure("depth images", "median depth " + fixed(depth_m, 2) + " m at corners");
+  if (const auto unusual = doubt(UsualNumber::kDepth_m, depth_m))
+    add_doubt(*unusual, kWarning, result);
+  if (ratios.size() < kLeastStereoPoints) return result;
+  const double ratio = quantile(std::move(ratios), 0.5);
+  constexpr double kMostOff = 1.25;
+  result.figure("depth images against stereo", "times " + rounded(ratio, 3));
+  if (ratio > kMostOff || ratio < 1.0 / kMostOff)
+    result.add(kError, "depth.stereo",
+               "depth images state " + rounded(ratio, 3) + " times the depth by the two cameras",
+               "map and odometry have different scales",
+               "divide depth: {scale_m} in the rig file by this factor, or correct the baseline");
+  return result;
+}
+
 Examination examine_inertial(const SensorSample& sample, const StereoRig& rig) {
   Examination result;
   if (sample.imu.empty()) return result;
-  examine_gravity(sample, result);
-  const bool use_depth =
-      rig.depth_source == DepthSource::kRightImage && is_sound(fit_of(sample.stereo, rig));
+  const bool has_gravity = examine_gravity(sample, result);
+  const bool has_right = rig.depth_source == DepthSource::kRightImage;
+  if (has_right && best_alternative(sample.stereo, rig).fault == StereoFault::kOtherMode) {
+    result.figure("images against the gyroscope",
+                  "not determined: the calibration is that of images of another size");
+    return result;
+  }
+  const bool use_depth = !has_right || is_sound(fit_of(sample.stereo, rig));
   const VisualRotations seen = visual_rotations(sample.steps, rig, use_depth);
   const auto fit = fit_inertial(seen.steps, sample.imu);
   if (!fit || !(fit->image_rms >= kMinRate_radps)) {
@@ -418,7 +471,9 @@ Examination examine_inertial(const SensorSample& sample, const StereoRig& rig) {
   else
     result.figure("camera to inertial sensor",
                   "not determined: the camera turns about one axis only");
-  if (std::abs(fit->scale - 1.0) < 0.1) examine_focal(sample, rig, seen, *fit, result);
+  if (std::abs(fit->scale - 1.0) > 0.1) return result;
+  examine_focal(sample, rig, seen, *fit, result);
+  if (has_gravity && rig_doubts(rig).empty()) examine_acceleration(sample, rig, seen, *fit, result);
   return result;
 }
 

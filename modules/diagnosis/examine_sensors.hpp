@@ -15,8 +15,8 @@ namespace km {
 // that sound recordings keep by a wide margin. If motion or images do not determine a quantity,
 // there is no finding, and a figure states the reason.
 
-/// Examines rates, gaps and faults of the reader. Ids: frames.rate, frames.gap, imu.rate, imu.gap,
-/// recording.no_frames, `recording.<fault>`.
+/// Examines rates, gaps and faults of the reader. Ids: frames.rate, frames.gap, frames.stamps,
+/// imu.rate, imu.gap, imu.stamps, recording.no_frames, `recording.<fault>`.
 [[nodiscard]] Examination examine_streams(const SensorSample& sample, const ReaderReport& report);
 
 /// Examines exposure, blur and corners. Ids: images.dark, images.bright, images.blurred,
@@ -24,12 +24,18 @@ namespace km {
 [[nodiscard]] Examination examine_images(const SensorSample& sample);
 
 /// Compares points in both images with the calibration of the pair (see StereoFit), and examines
-/// the baseline.
+/// the baseline and the position of the left camera (see rig_doubts()).
 /// Ids: stereo.swapped, stereo.inverted, stereo.inverted_cameras, stereo.inverted_left,
-/// stereo.inverted_right, stereo.exchanged_lenses, stereo.focal, stereo.epipolar, stereo.baseline.
+/// stereo.inverted_right, stereo.exchanged_lenses, stereo.focal, stereo.epipolar,
+/// stereo.other_mode, stereo.baseline, extrinsics.lever.
 [[nodiscard]] Examination examine_stereo(const SensorSample& sample, const StereoRig& rig);
 
-/// Compares rotations of gyroscope and images (see InertialFit), and examines gravity. Ids:
+/// Examines the size of recorded depth, and compares it with that of the right image. Ids:
+/// depth.size, depth.stereo.
+[[nodiscard]] Examination examine_depth(const SensorSample& sample, const StereoRig& rig);
+
+/// Compares rotations of gyroscope and images (see InertialFit) and accelerations (see
+/// AccelerationFit), and examines gravity. Ids: imu.accel_negated, depth.scale,
 /// imu.gyro_in_degrees, imu.gyro_scale, imu.unrelated, imu.mirrored, imu.time_offset,
 /// extrinsics.inverted, extrinsics.rotation, camera.focal, imu.accel_in_g, imu.no_gravity,
 /// imu.gravity.

@@ -140,8 +140,12 @@ std::vector<DepthPair> depths_of(const TrackedStep& step, const StereoRig& rig) 
   std::vector<DepthPair> pairs;
   const SE3 T_right_left = rig.T_left_right().inverse();
   for (const TrackedPoint& point : step.points) {
-    if (!point.right) continue;
     const auto to = rig.cameras[0].unproject(point.to);
+    const auto from = rig.cameras[0].unproject(point.from);
+    if (!point.right) {
+      if (point.depth_m > 0.0 && from && to) pairs.push_back({*from, 1.0 / point.depth_m, *to});
+      continue;
+    }
     const auto seen = stereo_point(rig, T_right_left, {point.from, *point.right});
     if (to && seen && seen->error_px < kEpipolarInlier_px && seen->depth_m > 0.0)
       pairs.push_back({seen->left, 1.0 / seen->depth_m, *to});
@@ -179,7 +183,7 @@ VisualRotations visual_rotations(std::span<const TrackedStep> steps, const Stere
   for (const TrackedStep& step : steps) {
     const auto alone = rotation_between(bearings_of(step, camera), sigma);
     if (!alone) continue;
-    VisualRotation found{step.from, step.to, alone->rotation};
+    VisualRotation found{step.from, step.to, alone->rotation, {}};
     const std::vector<DepthPair> depths =
         use_depth ? depths_of(step, rig) : std::vector<DepthPair>();
     if (depths.size() >= kMinDepths) {
@@ -188,6 +192,7 @@ VisualRotations visual_rotations(std::span<const TrackedStep> steps, const Stere
       const auto motion = estimate_motion(depths, guess, sigma, rng);
       if (!motion) continue;
       found.rotation = so3_log(motion->linear());
+      found.translation = motion->translation();
       ++seen.with_depth;
     }
     seen.steps.push_back(found);

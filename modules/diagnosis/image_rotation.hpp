@@ -38,7 +38,7 @@ struct ImageRotation {
 /// to estimate the focal length.
 struct VisualRotations {
   std::vector<VisualRotation> steps;
-  std::size_t with_depth = 0;  ///< Number of steps with depths from the right image.
+  std::size_t with_depth = 0;  ///< Number of steps with depths.
 };
 
 /// For each step, rotation_between(), refined by estimate_motion() of the tracker if `use_depth`

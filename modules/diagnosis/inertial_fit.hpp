@@ -30,10 +30,11 @@ class GyroIntegral {
   std::vector<Eigen::Vector3d> sums_;  // integral up to each sample
 };
 
-/// Rotation of the left camera between two images.
+/// Rotation of the left camera between two images, and its translation if depths are known.
 struct VisualRotation {
   Stamp from = 0, to = 0;
   Eigen::Vector3d rotation = Eigen::Vector3d::Zero();  ///< R_from_to as rotation vector [rad].
+  std::optional<Eigen::Vector3d> translation = {};     ///< t_from_to [m].
 };
 
 /// Fit of the camera's rotations to those of the gyroscope: image = scale * Q * gyro + constant. It

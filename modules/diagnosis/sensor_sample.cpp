@@ -188,7 +188,8 @@ void SensorSampler::add_step(const StereoFrame& frame, const cv::Mat& left) {
     const std::vector<ForwardBackward> tracks = forward_backward(last_, image, corners_);
     for (std::size_t i = 0; i < tracks.size(); ++i)
       if (tracks[i].error_px < kReturns_px)
-        step.points.push_back({vector_of(corners_[i]), vector_of(tracks[i].to), right_[i]});
+        step.points.push_back(
+            {vector_of(corners_[i]), vector_of(tracks[i].to), right_[i], depths_m_[i]});
     sample_.steps.push_back(std::move(step));
   }
   begin_step(frame, std::move(image));
@@ -200,6 +201,12 @@ void SensorSampler::begin_step(const StereoFrame& frame, KltImage image) {
   corners_ = corners_of(last_.image);  // strongest first
   corners_.resize(std::min(corners_.size(), kCorners));
   right_.assign(corners_.size(), std::nullopt);
+  depths_m_.assign(corners_.size(), 0.0);
+  for (std::size_t i = 0; i < corners_.size() && frame.depth != nullptr; ++i)
+    depths_m_[i] =
+        1e-3 * frame.depth->millimetres[static_cast<std::size_t>(std::lround(corners_[i].y)) *
+                                            static_cast<std::size_t>(frame.depth->width) +
+                                        static_cast<std::size_t>(std::lround(corners_[i].x))];
   if (sample_.stereo.empty() || sample_.stereo.back().pairs.empty()) return;
   std::vector<cv::Point2f> starts;
   for (const cv::Point2f& corner : corners_)

@@ -27,6 +27,7 @@ struct StereoMatches {
 struct TrackedPoint {
   Eigen::Vector2d from = Eigen::Vector2d::Zero(), to = Eigen::Vector2d::Zero();
   std::optional<Eigen::Vector2d> right;
+  double depth_m = 0.0;  ///< Depth at the first position; 0: unknown.
 };
 
 struct TrackedStep {
@@ -90,6 +91,7 @@ class SensorSampler {
   std::vector<cv::Point2f> corners_;
   // Positions of the corners in the right image [px].
   std::vector<std::optional<Eigen::Vector2d>> right_;
+  std::vector<double> depths_m_;  // depths of the corners, 0: unknown
   Stamp last_stereo_ = 0;
 };
 

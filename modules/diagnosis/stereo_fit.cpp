@@ -27,6 +27,16 @@ StereoRig with_focal_ratio(StereoRig rig, double ratio) {
   return rig;
 }
 
+// K of images of another size: of a mode with another binning.
+StereoRig with_scaled_images(StereoRig rig, double ratio) {
+  for (Camera& camera : rig.cameras) {
+    camera.fx *= ratio, camera.fy *= ratio;
+    camera.cx = ratio * (camera.cx + 0.5) - 0.5;
+    camera.cy = ratio * (camera.cy + 0.5) - 0.5;
+  }
+  return rig;
+}
+
 std::vector<StereoMatches> swapped(std::span<const StereoMatches> images) {
   std::vector<StereoMatches> result(images.begin(), images.end());
   for (StereoMatches& matches : result)
@@ -117,6 +127,7 @@ StereoRig undone(const StereoRig& rig, StereoFault fault) {
     case StereoFault::kNone:
     case StereoFault::kSwappedImages:
     case StereoFault::kFocalLength:
+    case StereoFault::kOtherMode:
       break;
   }
   return result;
@@ -133,6 +144,8 @@ StereoAlternative best_alternative(std::span<const StereoMatches> images, const 
        {StereoFault::kInvertedPair, StereoFault::kInvertedCameras, StereoFault::kInvertedLeft,
         StereoFault::kInvertedRight, StereoFault::kExchangedLenses})
     consider({.fault = fault, .fit = fit_of(images, undone(rig, fault))});
+  for (const double ratio : {0.5, 2.0})
+    consider({StereoFault::kOtherMode, ratio, fit_of(images, with_scaled_images(rig, ratio))});
   // Only without such a fault, because another focal length compensates some errors of a fault.
   if (best.fit.inlier_ratio < given.fit.inlier_ratio + kClearGain)
     consider(best_focal_ratio(images, rig));

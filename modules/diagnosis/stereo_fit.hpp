@@ -58,17 +58,19 @@ enum class StereoFault {
   kInvertedRight,    ///< Only the right T_body_cam is inverted.
   kExchangedLenses,  ///< Focal lengths, centres and lenses are exchanged.
   kFocalLength,      ///< The right focal length is wrong, relative to the left focal length.
+  kOtherMode,        ///< Both cameras are those of images of half or twice the size.
 };
 
 /// The calibration that fits the images.
 struct StereoAlternative {
   StereoFault fault = StereoFault::kNone;
-  double focal_ratio = 1.0;  ///< kFocalLength: ratio of the right focal length to the given one.
+  /// kFocalLength: ratio of the right focal length to the given one. kOtherMode: that of both.
+  double focal_ratio = 1.0;
   StereoFit fit;
 };
 
-/// `rig` after removal of the fault; unchanged for kNone, kSwappedImages and kFocalLength. The
-/// operation is its own inverse.
+/// `rig` after removal of the fault; unchanged for kNone, kSwappedImages, kFocalLength and
+/// kOtherMode. The operation is its own inverse.
 [[nodiscard]] StereoRig undone(const StereoRig& rig, StereoFault fault);
 
 /// The fault whose removal fits the images best, if the fit is clearly better than that of `rig`.

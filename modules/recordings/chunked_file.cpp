@@ -159,6 +159,14 @@ Decoded<Bytes> decompress(std::string_view compression, Packed bytes, std::uint6
   return Output::accept(std::move(result));
 }
 
+Decoded<Bytes> decompress_message(Packed bytes) {
+  const unsigned long long size = ZSTD_getFrameContentSize(bytes.data(), bytes.size());
+  const bool is_known = size != ZSTD_CONTENTSIZE_UNKNOWN && size != ZSTD_CONTENTSIZE_ERROR;
+  if (!is_known || size > kExpected_bytes + kExpectedRatio * bytes.size())
+    return Decoded<Bytes>::refuse("compressed bytes of an unknown or impossible size");
+  return decompress("zstd", bytes, size);
+}
+
 RandomAccessFile::RandomAccessFile(const std::filesystem::path& path) : path_(path) {
   if (const std::string problem = problem_of_file(path); !problem.empty())
     throw InputFileError(path.string() + ": " + problem);

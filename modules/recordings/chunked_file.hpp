@@ -89,6 +89,13 @@ Decoded<std::vector<std::uint8_t>> decompress(std::string_view compression,
                                               std::span<const std::uint8_t> bytes,
                                               std::uint64_t size);
 
+/// Compressed bytes that state more than kExpected_bytes and kExpectedRatio times their own size
+/// are refused, because kilobytes can decompress to gigabytes.
+inline constexpr std::uint64_t kExpected_bytes = std::uint64_t{64} << 20U, kExpectedRatio = 250;
+
+/// Decompresses the zstd frame of a message that a recorder has compressed by itself.
+Decoded<std::vector<std::uint8_t>> decompress_message(std::span<const std::uint8_t> bytes);
+
 /// A file that is read at any position. Not thread-safe.
 class RandomAccessFile {
  public:
@@ -163,7 +170,7 @@ class ChunkedFile {
   BagReport faults_;
   std::set<std::uint64_t> read_, unpacked_;  // positions of chunks
   bool is_known_ = false;                    // the chunk is read again
-  std::uint64_t left_bytes_ = (std::uint64_t{64} << 20U) + 250 * file.size();
+  std::uint64_t left_bytes_ = kExpected_bytes + kExpectedRatio * file.size();
   std::optional<ChunkMerge> merge_;
 };
 

@@ -16,14 +16,58 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr std::string_view kZstdMagic = "\x28\xB5\x2F\xFD";
+
+// Decompresses the messages of rosbag2's --compression-mode message. An uncompressed message in CDR
+// begins with zero.
+class UnpackedReader final : public BagReader {
+ public:
+  UnpackedReader(const fs::path& path, std::unique_ptr<BagReader> reader)
+      : name_(path.string()), reader_(std::move(reader)) {}
+
+  [[nodiscard]] const std::vector<BagChannel>& channels() const override {
+    return reader_->channels();
+  }
+
+  [[nodiscard]] std::optional<BagMessage> next() override {
+    while (auto message = reader_->next()) {
+      const BagChannel& channel = channels()[message->channel];
+      if (channel.encoding != "cdr" || magic_of(message->bytes) != kZstdMagic) return message;
+      auto bytes = decompress_message(message->bytes);
+      if (!bytes.value) report_.add(BagFault::kCompression, name_ + ": " + channel.topic);
+      if (!bytes.value) continue;
+      message->bytes = *std::move(bytes.value);
+      return message;
+    }
+    return std::nullopt;
+  }
+
+  [[nodiscard]] BagReport report() const override {
+    BagReport report = reader_->report();
+    report.add(report_);
+    return report;
+  }
+
+ private:
+  static std::string_view magic_of(const std::vector<std::uint8_t>& bytes) {
+    return {reinterpret_cast<const char*>(bytes.data()), std::min(bytes.size(), kZstdMagic.size())};
+  }
+
+  std::string name_;
+  std::unique_ptr<BagReader> reader_;
+  BagReport report_;
+};
+
 std::unique_ptr<BagReader> open_file(const fs::path& path) {
   constexpr std::uint64_t kMagic_bytes = 8;
   const RandomAccessFile file(path);
   if (file.size() == 0) throw InputFileError(path.string() + ": is empty");
   const std::string magic = file.beginning(kMagic_bytes);
   if (magic == "#ROSBAG ") return open_ros1_bag(path);
-  if (magic == kMcapMagic) return open_mcap(path);
-  if (magic == "SQLite f") return open_db3(path);
+  if (magic == kMcapMagic) return std::make_unique<UnpackedReader>(path, open_mcap(path));
+  if (magic == "SQLite f") return std::make_unique<UnpackedReader>(path, open_db3(path));
+  if (magic.starts_with(kZstdMagic))
+    throw InputFileError(path.string() + ": is compressed as a whole: zstd -d " + path.string());
   throw InputFileError(file.place(0) + ": does not begin like a .bag, .mcap or .db3 file");
 }
 
@@ -41,14 +85,21 @@ std::vector<fs::path> files_of(const fs::path& folder, std::string_view extensio
   return files;
 }
 
+// Files that are compressed as a whole: rosbag2's .zstd, or .zst of the program zstd.
+bool has_compressed(const fs::path& folder) {
+  return !files_of(folder, ".zstd").empty() || !files_of(folder, ".zst").empty();
+}
+
 std::unique_ptr<BagReader> open_folder(const fs::path& folder) {
   std::vector<fs::path> files = files_of(folder, ".db3");
   const std::vector<fs::path> others = files_of(folder, ".mcap");
   if (!files.empty() && !others.empty())
     throw InputFileError(folder.string() + ": both .db3 and .mcap files: name the one to read");
   files.insert(files.end(), others.begin(), others.end());
-  if (files.empty() && !files_of(folder, ".zstd").empty())
-    throw InputFileError(folder.string() + ": its files are compressed as a whole: zstd -d them");
+  if (files.empty() && has_compressed(folder))
+    throw InputFileError(folder.string() +
+                         ": its files are compressed as a whole: zstd -d them (zstd -d " +
+                         (folder / "*.zst*").string() + ')');
   if (files.empty()) throw InputFileError(folder.string() + ": no .db3 or .mcap file in it");
   std::vector<std::unique_ptr<BagReader>> readers;
   for (const fs::path& file : files) readers.push_back(open_file(file));
@@ -111,7 +162,8 @@ class MergedReader final : public BagReader {
 
 bool may_be_bag(const fs::path& path) {
   if (!is_folder(path)) return true;
-  return !files_of(path, ".db3").empty() || !files_of(path, ".mcap").empty();
+  return !files_of(path, ".db3").empty() || !files_of(path, ".mcap").empty() ||
+         has_compressed(path);
 }
 
 std::unique_ptr<BagReader> open_bag(const fs::path& path) {

@@ -59,19 +59,25 @@ void refuse_parts(const RosCameraInfo& info) {
 }  // namespace
 
 Camera camera_of(const RosCameraInfo& info, RosImages images) {
-  if (std::all_of(info.k.begin(), info.k.end(), [](double k) { return k == 0.0; }))
-    refuse(info, "K is 0: the camera is not calibrated");
+  const bool raw = images == RosImages::kRaw;
+  const std::string matrix = raw ? "K" : "P";
+  const auto is_zero = [](const auto& numbers) {
+    return std::ranges::all_of(numbers, [](double number) { return number == 0.0; });
+  };
+  if (raw ? is_zero(info.k) : is_zero(info.p))
+    refuse(info, matrix + " is 0: the camera is not calibrated" +
+                     (raw && !is_zero(info.p)
+                          ? "; P is not, so its images are rectified (rectified: true)"
+                          : ""));
   refuse_parts(info);
   if (const auto problem = resolution_problem(info.width, info.height))
     refuse(info, "width and height: " + *problem);
   Camera camera;
   camera.width = static_cast<int>(info.width);
   camera.height = static_cast<int>(info.height);
-  const bool raw = images == RosImages::kRaw;
   const double* row0 = raw ? info.k.data() : info.p.data();
   const double* row1 = row0 + (raw ? 3 : 4);
   camera.fx = row0[0], camera.cx = row0[2], camera.fy = row1[1], camera.cy = row1[2];
-  const std::string matrix = raw ? "K" : "P";
   if (const auto problem = intrinsics_problem(camera)) refuse(info, matrix + ": " + *problem);
   if (row0[1] != 0.0)
     refuse(info, matrix + ": a skew of " + shortest_text(row0[1]) + " is not supported");

@@ -17,9 +17,9 @@ enum class RosImages {
 /// The camera of a sensor_msgs/CameraInfo (its documentation defines K, D, R and P), with the
 /// identity as T_body_cam. Distortion: plumb_bob (4 or 5 coefficients), rational_polynomial (8;
 /// further ones, of thin prisms and tilted sensors, must be 0), equidistant or fisheye (4), or
-/// none. Throws std::invalid_argument with frame, field and value for K = 0 (an uncalibrated
-/// camera), other models, binned or cropped images, and calibrations that calibration_limits.hpp
-/// refuses.
+/// none. Throws std::invalid_argument with frame, field and value for K = 0 (P = 0 of
+/// rectified images: an uncalibrated camera), other models, binned or cropped images, and
+/// calibrations that calibration_limits.hpp refuses.
 [[nodiscard]] Camera camera_of(const RosCameraInfo& info, RosImages images);
 
 /// Pose of the camera of camera_of() in the frame of the message. The frame of the message is that

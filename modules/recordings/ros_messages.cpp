@@ -106,7 +106,7 @@ void RosWriter::put(Stamp value) {
 
 bool is_of_type(const BagChannel& channel, std::string_view type) {
   if (type == RosTFMessage::kType && channel.type == "tf/tfMessage") return true;  // former name
-  return channel.type == type || channel.type == ros2_name(type);
+  return channel.type == type || ros1_name(channel.type) == type;
 }
 
 std::string ros2_name(std::string_view type) {
@@ -115,6 +115,12 @@ std::string ros2_name(std::string_view type) {
 }
 
 std::string ros1_name(std::string_view type) {
+  constexpr std::string_view kDds = "::dds_::";
+  if (const std::size_t dds = type.find(kDds); dds != type.npos && type.ends_with('_')) {
+    const std::string package(type.substr(0, type.find("::")));
+    type.remove_suffix(1);
+    return package + '/' + std::string(type.substr(dds + kDds.size()));
+  }
   const std::size_t slash = type.find("/msg/");
   if (slash == type.npos) return std::string(type);
   return std::string(type.substr(0, slash)) + std::string(type.substr(slash + 4));

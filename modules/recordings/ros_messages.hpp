@@ -153,14 +153,15 @@ struct RosMarkerAction {  ///< RosMarker::action.
 inline constexpr std::uint8_t kRosFloat32 = 7;            ///< RosPointField::datatype.
 inline constexpr std::uint8_t kRosUnknownCovariance = 0;  ///< position_covariance_type.
 
-/// True if the messages of the channel have `type`, a name of ROS 1. The name in ROS 2, which
-/// contains "/msg/", also matches.
+/// True if the messages of the channel have `type`, a name of ROS 1. Other forms of the name also
+/// match, see ros1_name().
 [[nodiscard]] bool is_of_type(const BagChannel& channel, std::string_view type);
 
 /// "sensor_msgs/msg/Image" of "sensor_msgs/Image".
 [[nodiscard]] std::string ros2_name(std::string_view type);
 
-/// "sensor_msgs/Image" of "sensor_msgs/msg/Image".
+/// "sensor_msgs/Image" of "sensor_msgs/msg/Image", and of "sensor_msgs::msg::dds_::Image_", the
+/// name that recorders of DDS write.
 [[nodiscard]] std::string ros1_name(std::string_view type);
 
 /// A valid name for topics and frames: underscores replace all characters except for letters,

@@ -238,12 +238,18 @@ void BagDataset::take(SensorRole role, BagMessage message) {
     report_.add(ReaderFault::kMalformedMessage, place_of(message) + ": " + header.refusal);
     return;
   }
-  Stamp stamp = header.value->stamp;
+  const Stamp stated = header.value->stamp;
+  Stamp stamp = time_.of(index_of(role), stated);
+  if (time_.step_s() > 0.0)
+    report_.add(ReaderFault::kClockSetBack,
+                place_of(message) + ": the clock went back " + fixed(time_.step_s(), 1) + " s to " +
+                    std::to_string(stated) + ": later stamps continue the time before");
   const StampVerdict verdict = order_[index_of(role)].judge(stamp);
   if (verdict != StampVerdict::kGood) {
-    report_.add(fault_of(verdict), place_of(message) + ": stamp " + std::to_string(stamp));
+    report_.add(fault_of(verdict), place_of(message) + ": stamp " + std::to_string(stated));
     return;
   }
+  time_.accept(index_of(role), stamp);
   if (role == SensorRole::kImu || role == SensorRole::kGyro || role == SensorRole::kAccel) {
     take_imu(role, stamp, message);
     return;

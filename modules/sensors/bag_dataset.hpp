@@ -134,6 +134,7 @@ class BagDataset final : public DatasetReader {
   Rig rig_;
   RecordingPart window_;
   std::vector<const SensorKind*> kind_of_;  // by channel; null: not read
+  ContinuousTime time_{kSensorKinds.size()};
   std::array<StampOrder, kSensorKinds.size()> order_;
   std::array<MissingImages, kSensorKinds.size()> missing_;
   std::array<std::size_t, kSensorKinds.size()> taken_ = {};  // number of messages

@@ -14,7 +14,7 @@ void RecordingPart::check(const std::string& recording) const {
 
 const char* to_string(ReaderFault fault) {
   // In the order of ReaderFault.
-  static constexpr std::array<const char*, 24> kNames = {
+  static constexpr std::array<const char*, 25> kNames = {
       "malformed rows",
       "inertial samples with NaN or infinity",
       "inertial samples beyond what sensors measure",
@@ -39,6 +39,7 @@ const char* to_string(ReaderFault fault) {
       "messages lost on the way",
       "images missing between others",
       "pauses of a camera",
+      "clocks set back",
   };
   return kNames.at(static_cast<std::size_t>(fault));
 }

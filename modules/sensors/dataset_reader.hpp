@@ -17,7 +17,7 @@ namespace km {
 
 /// Faults in a part of a recording that leave the rest usable. In general the row, sample or frame
 /// is skipped. If a depth or label image is unusable, only this image is omitted. After kImuGap,
-/// kUnknownColor, kMissingBetween and kPause nothing is skipped.
+/// kUnknownColor, kMissingBetween, kPause and kClockSetBack nothing is skipped.
 enum class ReaderFault {
   kMalformedRow,       ///< Too few fields, or a stamp or value that is not a number.
   kNotFinite,          ///< NaN or infinity in an inertial sample.
@@ -43,6 +43,7 @@ enum class ReaderFault {
   kLostMessage,        ///< A live message dropped because the reader was too slow.
   kMissingBetween,     ///< An image that is missing, judged by the stamps around it.
   kPause,              ///< No image for more than MissingImages::kPause_s.
+  kClockSetBack,       ///< The clock was set back: later stamps are moved, see ContinuousTime.
 };
 
 /// A short plural for tables and log lines: "malformed rows".

@@ -38,6 +38,7 @@ Eigen::Vector4d intrinsics(const RosCameraInfo& info, RosImages images) {
 }
 
 constexpr const char* kStaticTransforms = "/tf_static";
+constexpr const char* kTransforms = "/tf";
 constexpr const char* kSide[] = {"left", "right"};
 
 void append(std::string& list, const std::string& item) {
@@ -228,8 +229,14 @@ bool RigCompletion::add(const BagChannel& channel, const BagMessage& message) {
   return (alignment_ && alignment_->add(channel, message)) || is_new;
 }
 
-void RigCompletion::end_depth() {
+void RigCompletion::end() {
   if (alignment_) alignment_->end();
+  uses_moving_ = true;
+}
+
+std::optional<SE3> RigCompletion::find(const std::string& a, const std::string& b) const {
+  const auto T = transforms_.find(a, b);
+  return T || !uses_moving_ ? T : moving_.find(a, b);
 }
 
 bool RigCompletion::take_part(const BagChannel& channel, const BagMessage& message) {
@@ -244,10 +251,12 @@ bool RigCompletion::take_part(const BagChannel& channel, const BagMessage& messa
     if (header.value) frame = std::move(header.value->frame_id);
     return frame.has_value();
   };
-  if (channel.topic == kStaticTransforms && is_of_type(channel, RosTFMessage::kType)) {
+  const bool is_static = channel.topic == kStaticTransforms;
+  if ((is_static || channel.topic == kTransforms) && is_of_type(channel, RosTFMessage::kType)) {
     const auto transforms = decode_ros<RosTFMessage>(channel.encoding, message.bytes);
-    if (transforms.value) transforms_.add(*transforms.value);
-    return transforms.value.has_value();
+    if (transforms.value && is_static) transforms_.add(*transforms.value);
+    if (transforms.value) moving_.add(*transforms.value);
+    return transforms.value && (is_static || uses_moving_);
   }
   if (!partial_.has_cameras && is_of_type(channel, RosCameraInfo::kType)) {
     bool is_new = false;
@@ -272,7 +281,7 @@ std::optional<std::string> RigCompletion::body_frame() const {
 std::optional<SE3> RigCompletion::T_body_left() const {
   const auto body = body_frame(), left = camera_frame(0);
   if (!body || !left) return std::nullopt;
-  const auto T_body_frame = transforms_.find(*body, *left);
+  const auto T_body_frame = find(*body, *left);
   if (!T_body_frame || !infos_[0]) return T_body_frame;
   return *T_body_frame * T_frame_camera(*infos_[0], partial_.images[0]);
 }
@@ -286,7 +295,7 @@ std::optional<SE3> RigCompletion::T_left_right() const {
   if (const auto baseline = baseline_m(*infos_[1]))
     T_frames = make_pose(Eigen::Matrix3d::Identity(), {*baseline, 0.0, 0.0});
   else
-    T_frames = transforms_.find(*camera_frame(0), *camera_frame(1));
+    T_frames = find(*camera_frame(0), *camera_frame(1));
   if (!T_frames) return std::nullopt;
   return T_frame_camera(*infos_[0], partial_.images[0]).inverse() * *T_frames *
          T_frame_camera(*infos_[1], partial_.images[1]);
@@ -317,13 +326,19 @@ std::optional<Rig> RigCompletion::rig() const {
   if (partial_.has_extrinsics) return rig;
   const auto T = T_body_left();
   if (!T) return std::nullopt;
+  if (!transforms_.find(*body_frame(), *camera_frame(0)))
+    rig.notes.push_back(
+        "the pose of the left camera on the body is that on /tf, because "
+        "/tf_static does not have it: it may not move");
   for (Camera& camera : stereo.cameras) camera.T_body_cam = *T * camera.T_body_cam;
   return rig;
 }
 
 std::string RigCompletion::missing_chain(const std::string& a, const std::string& b) const {
+  const std::string frames = transforms_.frames(), with_moving = moving_.frames();
   return std::string(kStaticTransforms) + " does not join " + readable(a, 80) + " and " +
-         readable(b, 80) + ", its frames are: " + transforms_.frames();
+         readable(b, 80) + ", its frames are: " + frames +
+         (with_moving == frames ? "" : "; with " + std::string(kTransforms) + ": " + with_moving);
 }
 
 std::string RigCompletion::missing() const {
@@ -362,17 +377,29 @@ Rig complete_rig(const std::string& name, BagReader& bag, PartialRig rig) {
     rig.is_depth_aligned = true;
   RigCompletion completion(std::move(rig));
   const auto fail = [&] {
-    throw DatasetError(name +
-                       ": the calibration is not complete; missing: " + completion.missing());
+    std::string others;
+    for (const auto& source : completion.sources())
+      for (const BagChannel& channel : bag.channels())
+        if (channel.topic == source.topic && !source.type.empty() &&
+            !is_of_type(channel, source.type) && !has_images(channel))
+          others += "; " + readable(channel.topic, 80) + " has messages of " +
+                    readable(channel.type, 80) + ", not of " + std::string(source.type) +
+                    ": state its calibration in the rig file";
+    throw DatasetError(
+        name + ": the calibration is not complete; missing: " + completion.missing() + others);
   };
+  const bool uses_moving = is_absent(kStaticTransforms) && !is_absent(kTransforms);
+  if (uses_moving) completion.use_moving_transforms();
   // A recorded bag without a needed topic cannot complete the rig, so no message is read.
   for (const auto& source : completion.sources())
-    if (source.is_needed && is_absent(source.topic)) fail();
+    if (source.is_needed && is_absent(source.topic) &&
+        !(uses_moving && source.topic == kStaticTransforms))
+      fail();
   auto complete = completion.rig();
   while (!complete) {
     const auto message = bag.next();
     if (!message) {
-      completion.end_depth();
+      completion.end();
       complete = completion.rig();
       if (!complete) fail();
     } else if (completion.add(bag.channels()[message->channel], *message)) {

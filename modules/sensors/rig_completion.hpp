@@ -130,8 +130,11 @@ class RigCompletion {
   /// CameraInfo that is not a calibration.
   bool add(const BagChannel& channel, const BagMessage& message);
 
-  /// No further message of depth will arrive.
-  void end_depth();
+  /// No further message will arrive. Poses that /tf_static lacks are then taken from /tf.
+  void end();
+
+  /// Takes poses from /tf at once, because the recording has no /tf_static.
+  void use_moving_transforms() { uses_moving_ = true; }
 
   /// The complete rig; nullopt while a part is missing(). Throws DatasetError for cameras that are
   /// not a pair, and for depth that is not aligned.
@@ -148,6 +151,7 @@ class RigCompletion {
   /// Frame of the left or the right camera; nullopt until a message has supplied it.
   [[nodiscard]] std::optional<std::string> camera_frame(std::size_t camera) const;
   [[nodiscard]] std::optional<std::string> body_frame() const;
+  [[nodiscard]] std::optional<SE3> find(const std::string& a, const std::string& b) const;
   [[nodiscard]] std::optional<SE3> T_body_left() const;
   [[nodiscard]] std::optional<SE3> T_left_right() const;
   [[nodiscard]] std::string missing_chain(const std::string& a, const std::string& b) const;
@@ -155,7 +159,8 @@ class RigCompletion {
   PartialRig partial_;
   std::array<std::optional<RosCameraInfo>, 2> infos_;
   std::optional<std::string> image_frame_, body_frame_;
-  StaticTransforms transforms_;
+  StaticTransforms transforms_, moving_;  // those of /tf_static; those of both topics
+  bool uses_moving_ = false;
   std::optional<DepthAlignment> alignment_;
 };
 

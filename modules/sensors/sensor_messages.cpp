@@ -1,13 +1,17 @@
 #include "modules/sensors/sensor_messages.hpp"
 
 #include <algorithm>
+#include <array>
 #include <bit>
+#include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 #include <string_view>
 #include <utility>
 
+#include "modules/core/image_size.hpp"
 #include "modules/core/text_rows.hpp"
 #include "modules/recordings/ros_messages.hpp"
 
@@ -97,13 +101,69 @@ RawImage raw_image(const BagChannel& channel, const BagMessage& message, const s
   return {pixels_of(*image.value, *encoding, place, size), encoding->to_gray};
 }
 
-// The bytes without the header of image_transport: 12 bytes with the quantisation before the PNG
-// file of a compressed depth image. The header has no meaning for depths of 16 bits.
-std::string_view without_depth_header(std::string_view bytes) {
-  constexpr std::size_t kHeader_bytes = 12;
-  const bool has_header =
-      bytes.size() > kHeader_bytes && bytes.substr(kHeader_bytes).starts_with("\x89PNG");
-  return has_header ? bytes.substr(kHeader_bytes) : bytes;
+// Header of image_transport's compressedDepth before the compressed image: a number of the format,
+// and two numbers of the quantisation. Metres are stored as A / depth + B.
+struct DepthHeader {
+  std::uint32_t format = 0;
+  float A = 0.0F, B = 0.0F;
+};
+constexpr std::size_t kDepthHeader_bytes = 12;
+
+// Depths of 16 bits from run lengths and differences in groups of 3 bits (Wilson, "Fast Lossless
+// Depth Image Compression", 2017); nullopt for other bytes.
+std::optional<cv::Mat> decode_rvl(std::string_view bytes, const cv::Size& size) {
+  cv::Mat image(size, CV_16UC1, cv::Scalar(0));
+  std::size_t nibble = 0;
+  bool is_good = true;
+  const auto number = [&] {
+    std::uint32_t value = 0;
+    for (unsigned shift = 0; is_good; shift += 3) {
+      // Words are little-endian, their highest nibble is the first.
+      const std::size_t byte = nibble / 8 * 4 + 3 - nibble % 8 / 2;
+      if (byte >= bytes.size() || shift > 30) {
+        is_good = false;
+        return 0U;
+      }
+      const auto pair = static_cast<std::uint8_t>(bytes[byte]);
+      const unsigned bits = nibble++ % 2 == 0 ? pair >> 4U : pair & 0xFU;
+      value |= (bits & 7U) << shift;
+      if ((bits & 8U) == 0) break;
+    }
+    return value;
+  };
+  std::uint16_t depth = 0;
+  auto* const pixels = image.ptr<std::uint16_t>();
+  for (std::size_t at = 0; at < image.total();) {
+    at += number();  // zeros
+    const std::size_t end = at + number();
+    if (!is_good || end > image.total()) return std::nullopt;
+    for (; at < end; ++at) {
+      const std::uint32_t change = number();
+      depth = static_cast<std::uint16_t>(depth + ((change >> 1U) ^ (0U - (change & 1U))));
+      pixels[at] = depth;
+    }
+  }
+  return is_good ? std::optional(std::move(image)) : std::nullopt;
+}
+
+LoadedImage<cv::Mat> rvl_image(std::string_view bytes, const std::string& place,
+                               const cv::Size& size) {
+  std::array<std::uint32_t, 2> sides{};
+  if (bytes.size() < sizeof(sides))
+    return image_failure(ImageStatus::kUnreadable, place, "truncated RVL");
+  std::memcpy(sides.data(), bytes.data(), sizeof(sides));
+  if (std::cmp_not_equal(sides[0], size.width) || std::cmp_not_equal(sides[1], size.height))
+    return wrong_size(place, {static_cast<int>(sides[0]), static_cast<int>(sides[1])}, size);
+  auto image = decode_rvl(bytes.substr(sizeof(sides)), size);
+  if (!image) return image_failure(ImageStatus::kUnreadable, place, "damaged RVL");
+  return {ImageStatus::kOk, {}, *std::move(image)};
+}
+
+// Names the format of an image that is neither PNG nor JPEG nor RVL.
+std::string format_text(const std::string& format) {
+  return "; the message states the format '" + readable(format, 60) +
+         "', PNG, JPEG and RVL are read: publish raw or JPEG images (videos such as h264 and other "
+         "transports: ros2 run image_transport republish ... raw)";
 }
 
 LoadedImage<cv::Mat> compressed_image(const BagChannel& channel, const BagMessage& message,
@@ -112,8 +172,32 @@ LoadedImage<cv::Mat> compressed_image(const BagChannel& channel, const BagMessag
   const auto image = decode_ros<RosCompressedImage>(channel.encoding, message.bytes);
   if (!image.value) return image_failure(ImageStatus::kUnreadable, place, image.refusal);
   const auto& data = image.value->data;
-  const std::string_view bytes(reinterpret_cast<const char*>(data.data()), data.size());
-  return decode_image(without_depth_header(bytes), place, pixels, size);
+  std::string_view bytes(reinterpret_cast<const char*>(data.data()), data.size());
+  const std::string& format = image.value->format;
+  const auto names = [&format](const char* word) { return format.find(word) != format.npos; };
+  const bool has_header =
+      bytes.size() > kDepthHeader_bytes &&
+      (names("compressedDepth") || bytes.substr(kDepthHeader_bytes).starts_with("\x89PNG")) &&
+      !bytes.starts_with("\x89PNG");
+  DepthHeader header;
+  if (has_header) std::memcpy(&header, bytes.data(), sizeof(header));
+  if (has_header) bytes.remove_prefix(kDepthHeader_bytes);
+  LoadedImage<cv::Mat> loaded = has_header && names("rvl")
+                                    ? rvl_image(bytes, place, size)
+                                    : decode_image(bytes, place, pixels, size);
+  if (loaded.status == ImageStatus::kUnreadable && !stated_image_size(bytes))
+    loaded.problem += format_text(format);
+  if (loaded.status != ImageStatus::kOk || !has_header || !format.starts_with("32FC1"))
+    return loaded;
+  if (!(header.A > 0.0F) || !std::isfinite(header.B) || loaded.image.type() != CV_16UC1)
+    return image_failure(ImageStatus::kWrongFormat, place,
+                         "32FC1; compressedDepth without its two numbers of quantisation");
+  cv::Mat metres(loaded.image.size(), CV_32FC1);
+  std::transform(loaded.image.begin<std::uint16_t>(), loaded.image.end<std::uint16_t>(),
+                 metres.begin<float>(), [&header](std::uint16_t stored) {
+                   return stored == 0 ? 0.0F : header.A / (static_cast<float>(stored) - header.B);
+                 });
+  return {ImageStatus::kOk, {}, std::move(metres)};
 }
 
 bool is_raw(const BagChannel& channel) {

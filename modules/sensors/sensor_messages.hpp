@@ -25,8 +25,8 @@ namespace km {
 [[nodiscard]] ImageResult gray_of_message(const BagChannel& channel, const BagMessage& message,
                                           const std::string& place, const cv::Size& size);
 
-/// Depth from a message: 16UC1 or mono16 in units of `scale_m` [m], 32FC1 in metres, or a PNG image
-/// of 16 bits, with or without image_transport's header of compressedDepth.
+/// Depth from a message: 16UC1, mono16 or a PNG image of 16 bits in units of `scale_m` [m], or
+/// 32FC1 in metres. image_transport's compressedDepth of 16UC1 or 32FC1 is read as PNG or RVL.
 [[nodiscard]] DepthResult depth_of_message(const BagChannel& channel, const BagMessage& message,
                                            const std::string& place, const cv::Size& size,
                                            double scale_m, const DepthRange& range);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <iterator>
 #include <optional>
 #include <utility>
@@ -100,6 +101,41 @@ StampVerdict StampOrder::judge(Stamp stamp) {
   good_ = 1;
   jumps_ = 0;
   return StampVerdict::kGood;
+}
+
+Stamp ContinuousTime::of(std::size_t stream, Stamp stamp) {
+  Stream& own = streams_.at(stream);
+  step_s_ = 0.0;
+  // Arbitrary numbers: sums may overflow a Stamp.
+  const auto moved = [stamp](Stamp by) {
+    return static_cast<Stamp>(static_cast<std::uint64_t>(stamp) + static_cast<std::uint64_t>(by));
+  };
+  const auto distance = [this](Stamp time) {
+    return std::abs(static_cast<double>(time) - static_cast<double>(newest_));
+  };
+  const Stamp here = moved(offset_), before = moved(former_);
+  const Stamp time = distance(before) < distance(here) ? before : here;
+  const bool is_back =
+      own.good == kNewTimes && stamp > 0 &&
+      static_cast<double>(time) < static_cast<double>(*own.last) - 1e9 * kLeastStep_s;
+  const bool continues =
+      own.back > 0 && stamp > own.last_back && stamp - own.last_back <= kLongestPause;
+  own.back = is_back ? (continues ? own.back + 1 : 1) : 0;
+  if (own.back == 1) own.first_back = stamp;
+  own.last_back = stamp;
+  if (own.back < kNewTimes) return time;
+  step_s_ = seconds_between(time, newest_);
+  former_ = offset_;
+  offset_ = newest_ - own.first_back + (stamp - own.first_back) / (kNewTimes - 1);
+  own.back = 0;
+  return moved(offset_);
+}
+
+void ContinuousTime::accept(std::size_t stream, Stamp continuous) {
+  Stream& own = streams_.at(stream);
+  own.last = continuous;
+  own.good = std::min(own.good + 1, kNewTimes);
+  newest_ = std::max(newest_, continuous);
 }
 
 ImageGap MissingImages::before(Stamp stamp) {

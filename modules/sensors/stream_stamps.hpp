@@ -45,6 +45,41 @@ class StampOrder {
   int jumps_ = 0;              // number of jumps in a row to one other time
 };
 
+/// Continues the stamps of several streams after their clock was set back, or after a recording has
+/// begun again. The clock was set back if kNewTimes stamps of a stream in a row are more than
+/// kLeastStep_s before its last good stamp, and ascend. Later stamps of all streams are then moved,
+/// so that time continues. Streams of another clock, and late messages from before the step, are
+/// not moved.
+class ContinuousTime {
+ public:
+  static constexpr int kNewTimes = StampOrder::kNewTimes;
+  static constexpr double kLeastStep_s = 0.5;
+
+  explicit ContinuousTime(std::size_t streams) : streams_(streams) {}
+
+  /// The stamp in continuous time, of a clock that `stream` uses.
+  [[nodiscard]] Stamp of(std::size_t stream, Stamp stamp);
+
+  /// Notes that a stamp of of() is good.
+  void accept(std::size_t stream, Stamp continuous);
+
+  /// The time [s] by which the clock was set back at the last call of of(); 0: it was not.
+  [[nodiscard]] double step_s() const { return step_s_; }
+
+ private:
+  struct Stream {
+    std::optional<Stamp> last;  // continuous, of the last good stamp
+    int good = 0;               // good stamps, at most kNewTimes
+    int back = 0;               // stamps in a row before the last good stamp
+    Stamp first_back = 0, last_back = 0;
+  };
+
+  std::vector<Stream> streams_;
+  Stamp offset_ = 0, former_ = 0;  // added to stamps; before the last step
+  Stamp newest_ = 0;               // continuous
+  double step_s_ = 0.0;
+};
+
 /// Result for an interval between two images of a camera.
 struct ImageGap {
   std::size_t missing = 0;  ///< Number of images lost in the interval.

@@ -132,6 +132,17 @@ TEST_CASE("A rig is proposed by types, rates and names", "[robot]") {
   CHECK(rig.imu.gyro_topic == "/camera/gyro/sample");
   CHECK(rig.imu.accel_topic == "/camera/accel/sample");
 
+  // As the RealSense SDK and a ZED's driver name them, in another order.
+  rig = propose_rig({topic("/sensor_0/Infrared_2/image/data", image, 30.0, "8UC1"),
+                     topic("/sensor_0/Infrared_1/image/data", image, 30.0, "8UC1")});
+  CHECK(rig.left.topic == "/sensor_0/Infrared_1/image/data");
+  rig = propose_rig({topic("/zed/left/rect/image", image, 15.0, "bgra8"),
+                     topic("/zed/left/raw/image", image, 15.0, "bgra8"),
+                     topic("/zed/right/raw/image", image, 15.0, "bgra8"),
+                     topic("/zed/right/rect/image", image, 15.0, "bgra8")});
+  CHECK(rig.left.topic == "/zed/left/rect/image");
+  CHECK(rig.right.topic == "/zed/right/rect/image");
+
   rig = propose_rig({topic("/camera/rgb/image_color", image, 30.0, "rgb8"),
                      topic("/camera/depth/image", image, 30.0, "32FC1"), topic("/imu", imu, 100)});
   CHECK(rig.left.topic == "/camera/rgb/image_color");

@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <stdexcept>
 #include <utility>
 
 #include "modules/core/calibration_limits.hpp"
 #include "modules/core/input_file.hpp"
+#include "modules/recordings/ros_camera.hpp"
 #include "modules/sensors/dataset_reader.hpp"
 #include "modules/sensors/node/calibration_map.hpp"
 #include "modules/sensors/node/open_folder.hpp"
@@ -279,10 +282,63 @@ void note_biases(const CalibrationMap& root, RigCalibration& calibration) {
 
 constexpr const char* kExpected =
     "expected a folder with sensor.yaml of cam0, cam1 and imu0 (EuRoC), one or two YAML files of "
-    "Kalibr with cam0, cam1 and imu0, or a JSON file of Basalt with value0";
+    "Kalibr with cam0, cam1 and imu0, a JSON file of Basalt with value0, or a file of ROS' "
+    "camera_calibration with camera_matrix for each camera";
+
+// A file of ROS' camera_calibration as the message that drivers make of it.
+RosCameraInfo read_camera_info(const CalibrationMap& map) {
+  constexpr Bounds<double> kSide_px{1.0, 65536.0};
+  RosCameraInfo info;
+  info.header.frame_id = map.file().filename().string();
+  info.width = static_cast<std::uint32_t>(map.number("image_width", kSide_px));
+  info.height = static_cast<std::uint32_t>(map.number("image_height", kSide_px));
+  info.distortion_model = map.word("distortion_model");
+  info.d = map.map("distortion_coefficients").numbers("data");
+  const auto read = [&map](const char* key, auto& matrix) {
+    if (map.has(key))
+      std::ranges::copy(map.map(key).numbers("data", matrix.size(), key), matrix.begin());
+  };
+  read("camera_matrix", info.k);
+  read("rectification_matrix", info.r);
+  read("projection_matrix", info.p);
+  return info;
+}
+
+RigCalibration read_camera_infos(const std::vector<CalibrationMap>& maps, const RigChoice& choice) {
+  const std::string name = maps.front().file().string();
+  if (maps.size() != (choice.right ? 2U : 1U))
+    throw DatasetError(name + ": name one file of ROS' camera_calibration for each camera");
+  if (!choice.may_be_partial)
+    throw DatasetError(name + ": has no pose on the body: name it in a rig file");
+  RigCalibration calibration;
+  calibration.has_extrinsics = false;
+  calibration.notes.push_back(name + ": noise figures are those of EuRoC's inertial sensor");
+  const RosImages images = choice.rectified ? RosImages::kRectified : RosImages::kRaw;
+  try {
+    const RosCameraInfo left = read_camera_info(maps.front());
+    std::optional<Camera> right;
+    if (choice.right) {
+      const RosCameraInfo info = read_camera_info(maps.back());
+      const auto distance_m = baseline_m(info);
+      if (!distance_m)
+        maps.back().fail("projection_matrix",
+                         "projection_matrix: no baseline: fourth number is to be -fx B");
+      right = camera_of(info, images);
+      right->T_body_cam = T_frame_camera(left, images).inverse() *
+                          make_pose(Eigen::Matrix3d::Identity(), {*distance_m, 0.0, 0.0}) *
+                          T_frame_camera(info, images);
+    }
+    if (const auto problem = join_cameras(camera_of(left, images), right, choice, calibration.rig))
+      throw DatasetError(maps.back().file().string() + ": " + *problem);
+  } catch (const std::invalid_argument& error) {
+    throw DatasetError(name + ": " + error.what());
+  }
+  return calibration;
+}
 
 RigCalibration read_maps(const std::vector<CalibrationMap>& maps, const RigChoice& choice) {
   const CalibrationMap& first = maps.front();
+  if (first.has("camera_matrix")) return read_camera_infos(maps, choice);
   if (first.has("T_BS"))
     throw DatasetError(first.file().string() +
                        ": one sensor.yaml of several; give the folder that holds cam0, cam1 and "

@@ -44,6 +44,7 @@ struct RigChoice {
   std::optional<DepthChoice> depth = std::nullopt;
   /// Topics may supply the cameras or their poses, so either or both may be missing.
   bool may_be_partial = false;
+  bool rectified = false;  ///< Images are rectified: files of ROS contain both kinds of cameras.
 };
 
 /// Reads a calibration: a folder of EuRoC's sensor.yaml, Kalibr's files or Basalt's; the format is
@@ -65,6 +66,9 @@ struct RigChoice {
 /// the inertial sensor are not used either, with a note if they are not 0.
 ///
 /// EuRoC: see read_euroc_rig(); depth0 is not used.
+///
+/// ROS: one file of camera_calibration (camera_info) for each camera, left first, without the pose
+/// on the body.
 [[nodiscard]] RigCalibration read_rig(const std::vector<std::filesystem::path>& files,
                                       const RigChoice& choice = {});
 

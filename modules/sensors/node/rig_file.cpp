@@ -27,7 +27,9 @@ RosImages images_of(const RigFile::Camera& camera) {
 }
 
 RigChoice choice_of(const RigFile& file) {
-  RigChoice choice{.left = static_cast<std::size_t>(file.left.camera), .may_be_partial = true};
+  RigChoice choice{.left = static_cast<std::size_t>(file.left.camera),
+                   .may_be_partial = true,
+                   .rectified = images_of(file.left) == RosImages::kRectified};
   choice.right.reset();
   if (!file.right.topic.empty()) choice.right = static_cast<std::size_t>(file.right.camera);
   if (!file.depth.topic.empty())

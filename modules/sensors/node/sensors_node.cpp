@@ -62,6 +62,7 @@ void SensorsNode::decode() {
     }();
     if (!std::exchange(has_remarked, true))
       for (const std::string& remark : reader_->remarks()) log::info(name()) << remark;
+    if (packet) log_doubts(*packet);
     count_faults();
     if (!packet) {
       post(reader_->report());
@@ -69,6 +70,16 @@ void SensorsNode::decode() {
     }
     if (!post(std::make_shared<const SensorPacket>(std::move(*packet)))) return;
   }
+}
+
+void SensorsNode::log_doubts(const SensorPacket& packet) {
+  std::vector<Doubt> doubts = first_.add(packet);
+  if (!std::exchange(has_looked_, true)) {
+    const std::vector<Doubt> of_rig = rig_doubts(reader_->rig().stereo);
+    doubts.insert(doubts.end(), of_rig.begin(), of_rig.end());
+  }
+  for (const Doubt& doubt : doubts)
+    log::warn(name()) << doubt.what << ": " << doubt.means << "; " << doubt.to_do;
 }
 
 void SensorsNode::count_faults() {

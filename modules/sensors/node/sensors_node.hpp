@@ -14,6 +14,7 @@
 #include "modules/core/frame.hpp"
 #include "modules/sensors/dataset_reader.hpp"
 #include "modules/sensors/sensors_config.hpp"
+#include "modules/sensors/usual_numbers.hpp"
 #include "runtime/clock.hpp"
 #include "runtime/guarded_thread.hpp"
 #include "runtime/metrics.hpp"
@@ -85,6 +86,7 @@ class SensorsNode final : public WorkerNode<SensorsInput> {
   /// Packets that are decoded but not yet due are dropped.
   void stop_sources() noexcept override;
   void decode();
+  void log_doubts(const SensorPacket& packet);
   void count_faults();
   void take_faults();
   [[nodiscard]] FrameUse choose_use(Stamp stamp, Stamp arrival);
@@ -111,6 +113,8 @@ class SensorsNode final : public WorkerNode<SensorsInput> {
   ReaderReport faults_;
   std::string logged_faults_;  // last logged faults of a live source
   double counted_s_ = 0.0;
+  FirstPackets first_;       // used by the decoder, like has_looked_
+  bool has_looked_ = false;  // at the rig
   Timing reading_;
   Heartbeat decoding_;  // heartbeat of the decoder thread, one step per packet
   GuardedThread decoder_;

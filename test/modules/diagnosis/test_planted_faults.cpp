@@ -89,6 +89,13 @@ TEST_CASE("MH_01 gives no findings, and an inserted fault is the only one", "[di
       rig.cameras[1].T_body_cam = rig.cameras[0].T_body_cam * T_left_right;
     };
   };
+  const auto stretch = [](double factor) {  // the baseline alone
+    return [factor](StereoRig& rig, auto&) {
+      SE3 T_left_right = rig.T_left_right();
+      T_left_right.translation() *= factor;
+      rig.cameras[1].T_body_cam = rig.cameras[0].T_body_cam * T_left_right;
+    };
+  };
   const auto change_gyro = [](const std::function<void(Eigen::Vector3d&)>& change) {
     return [change](auto&, SensorSample& sample) { rotate_gyro(sample, change); };
   };
@@ -112,9 +119,19 @@ TEST_CASE("MH_01 gives no findings, and an inserted fault is the only one", "[di
       Case{{"camera.focal"}, [](auto& rig, auto&) { scale_focal(rig, 1.03); }},
       Case{{"stereo.focal"},
            [](auto& rig, auto&) { rig.cameras[1].fx *= 1.03, rig.cameras[1].fy *= 1.03; }},
-      Case{{"stereo.baseline"},
+      Case{{"stereo.baseline", "extrinsics.lever"},
            [](auto& rig, auto&) {
              for (Camera& camera : rig.cameras) camera.T_body_cam.translation() *= 1000.0;
+           }},
+      Case{{"depth.scale"}, stretch(4.0)}, Case{{"stereo.baseline"}, stretch(100.0)},
+      Case{{"imu.accel_negated"},
+           [](auto&, auto& sample) {
+             for (ImuSample& measured : sample.imu) measured.accel *= -1.0;
+           }},
+      Case{{"stereo.other_mode"},
+           [](auto& rig, auto&) {
+             for (Camera& camera : rig.cameras)
+               camera.fx *= 0.5, camera.fy *= 0.5, camera.cx *= 0.5, camera.cy *= 0.5;
            }},
       Case{{"imu.gyro_in_degrees"}, change_gyro([](auto& gyro) { gyro *= kDegrees; })},
       Case{{"imu.mirrored"}, change_gyro([](auto& gyro) { gyro.y() *= -1.0; })},

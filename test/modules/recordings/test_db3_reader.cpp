@@ -177,6 +177,9 @@ TEST_CASE("A file that is no recording is refused by name", "[recordings]") {
   CHECK_THROWS_WITH(open_bag(folder.path() / "empty"), Catch::Contains("no .db3 or .mcap file"));
   folder.write("packed/a_0.db3.zstd", "");
   CHECK_THROWS_WITH(open_bag(folder.path() / "packed"), Catch::Contains("zstd -d"));
+  CHECK(may_be_bag(folder.path() / "packed"));
+  CHECK_THROWS_WITH(open_bag(folder.write("a.mcap.zst", "\x28\xB5\x2F\xFD____")),
+                    Catch::Contains("is compressed as a whole: zstd -d "));
   folder.write("two/a.db3", "");
   folder.write("two/a.mcap", "");
   CHECK_THROWS_WITH(open_bag(folder.path() / "two"), Catch::Contains("both .db3 and .mcap"));
@@ -194,6 +197,23 @@ TEST_CASE("Corrupted databases are refused or read in order", "[recordings]") {
       read_input_file(good), folder.path().string(), [&](const std::string& bytes) {
         check_order(messages_of(*open_db3(folder.write("a.db3", bytes))));
       });
+}
+
+TEST_CASE("Messages that a recorder compressed one by one are read", "[recordings]") {
+  const TemporaryFolder folder;
+  // "zstd" of 00 01 00 00 and ten times 07, and the first bytes of it.
+  const fs::path path = database_of(
+      folder, "a.db3",
+      std::string(kTables) +
+          "INSERT INTO topics VALUES (3, '/imu', 'sensor_msgs/msg/Imu', 'cdr', '');" +
+          "INSERT INTO messages VALUES (1, 3, 10, x'28b52ffd200e5d0000280001000007010005d002'), "
+          "(2, 3, 20, x'28b52ffd2004'), (3, 3, 30, x'00010000');");
+  const auto reader = open_bag(path);
+  const auto messages = messages_of(*reader);
+  REQUIRE(messages.size() == 2);
+  CHECK(messages[0].bytes == std::vector<std::uint8_t>{0, 1, 0, 0, 7, 7, 7, 7, 7, 7, 7, 7, 7, 7});
+  CHECK(messages[1].bytes == std::vector<std::uint8_t>{0, 1, 0, 0});
+  CHECK(reader->report().count(BagFault::kCompression) == 1);
 }
 
 }  // namespace km

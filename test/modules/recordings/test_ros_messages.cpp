@@ -317,6 +317,8 @@ TEST_CASE("Types are known by their names in ROS 1 and 2", "[recordings]") {
   };
   CHECK(is_image("sensor_msgs/Image"));
   CHECK(is_image("sensor_msgs/msg/Image"));
+  CHECK(is_image("sensor_msgs::msg::dds_::Image_"));
+  CHECK_FALSE(is_image("sensor_msgs::msg::dds_::CompressedImage_"));
   CHECK_FALSE(is_image("sensor_msgs/srv/Image"));
   CHECK_FALSE(is_image("sensor_msgs/CompressedImage"));
   CHECK_FALSE(is_image("sensor_msgs/msg/Images"));
@@ -418,6 +420,17 @@ TEST_CASE("A CameraInfo that is no calibration is refused by frame and field", "
   c.spoil(info);
   CHECK_THROWS_WITH(camera_of(info, RosImages::kRaw),
                     Catch::Contains("frame 'left_optical': ") && Catch::Contains(c.why));
+}
+
+TEST_CASE("A rectified camera needs no K, and a raw one no P", "[recordings]") {
+  RosCameraInfo info = camera_info("left_optical");
+  info.k.fill(0.0);
+  CHECK(camera_of(info, RosImages::kRectified).fx == 430.0);
+  CHECK_THROWS_WITH(camera_of(info, RosImages::kRaw), Catch::Contains("rectified: true"));
+  info = camera_info("left_optical");
+  info.p.fill(0.0);
+  CHECK(camera_of(info, RosImages::kRaw).fx == 458.0);
+  CHECK_THROWS_WITH(camera_of(info, RosImages::kRectified), Catch::Contains("P is 0"));
 }
 
 }  // namespace

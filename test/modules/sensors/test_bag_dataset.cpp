@@ -381,5 +381,70 @@ TEST_CASE("The name of a Bayer pattern determines the place of its colours", "[s
   CHECK(inner_gray("bayer_bggr8") == Approx(0.114 * 200).margin(1.0));
 }
 
+TEST_CASE("Compressed depth is decoded by the format that its message states", "[sensors][bag]") {
+  struct Case {
+    std::string format;
+    std::vector<std::uint8_t> bytes;  // after the header
+    float A, B;                       // numbers of the quantisation
+    std::vector<std::uint16_t> expected_mm;
+  };
+  cv::Mat stored(1, 4, CV_16UC1, cv::Scalar(0));
+  stored.at<std::uint16_t>(0, 1) = 2000;
+  stored.at<std::uint16_t>(0, 3) = 4040;
+  const std::vector<std::uint8_t> png = encode_png(stored);
+  // Width, height, and the nibbles 1 1 8CE7 1 1 8EF7 of two runs of one zero and one difference.
+  const std::vector<std::uint8_t> rvl = {4,    0,    0,    0,    1, 0, 0,    0,
+                                         0x11, 0xE7, 0x8C, 0x11, 0, 0, 0xF7, 0x8E};
+  const Case c = GENERATE_COPY(
+      Case{"16UC1; compressedDepth png", png, 0, 0, {0, 2000, 0, 4040}},
+      Case{"16UC1; compressedDepth", png, 0, 0, {0, 2000, 0, 4040}},
+      Case{"16UC1; compressedDepth rvl", rvl, 0, 0, {0, 2000, 0, 4040}},
+      Case{"32FC1; compressedDepth rvl", rvl, 8080, 1980, {0, 0, 0, 3922}},  // 404 m is too far
+      Case{"32FC1; compressedDepth png", png, 8080, 1980, {0, 0, 0, 3922}});
+  CAPTURE(c.format);
+  const auto depth_of = [&](std::size_t lost_bytes, const std::string& format) {
+    RosCompressedImage image{{kFirst, "depth"}, format, std::vector<std::uint8_t>(12, 0)};
+    std::memcpy(image.data.data() + 4, &c.A, 4);
+    std::memcpy(image.data.data() + 8, &c.B, 4);
+    image.data.insert(image.data.end(), c.bytes.begin(), c.bytes.end());
+    image.data.resize(image.data.size() - lost_bytes);
+    return depth_of_message({"/depth", "sensor_msgs/CompressedImage", "cdr", 1},
+                            {0, kFirst, encode_ros(image)}, "here", {4, 1}, 1e-3, {0.0, 60.0});
+  };
+  CHECK(depth_of(0, c.format).image.millimetres == c.expected_mm);
+  CHECK(depth_of(8, c.format).status == ImageStatus::kUnreadable);
+  CHECK_THAT(depth_of(c.bytes.size(), "h264").problem, Catch::Contains("states the format 'h264'"));
+}
+
+TEST_CASE("A recording continues after its clock was set back", "[sensors][bag]") {
+  constexpr Stamp kStep = 10'000'000'000;  // longer than the recording before it
+  auto whole = recording({.frames = 80});
+  auto bag = std::make_unique<ListedBag>();
+  while (const auto message = whole->next()) {
+    const BagChannel& channel = whole->channels()[message->channel];
+    const Stamp by = message->log_time > kFirst + 40 * kFramePeriod ? kStep : 0;
+    if (channel.topic == "/imu") {
+      RosImu sample = imu(message->log_time);
+      sample.header.stamp -= by;
+      bag->add(channel.topic, sample, 1e-9 * static_cast<double>(by));
+    } else {
+      RosImage picture = image(message->log_time - by, 0);
+      bag->add(channel.topic, picture, 1e-9 * static_cast<double>(by));
+    }
+  }
+  BagDataset dataset("test.bag", std::move(bag), small_rig());
+  const auto packets = packets_of(dataset);
+  CHECK(packets.size() >= 79);
+  for (std::size_t k = 1; k < packets.size(); ++k) {
+    const double step_s = seconds_between(packets[k - 1].frame->stamp, packets[k].frame->stamp);
+    CHECK(step_s == Approx(0.05).margin(0.051));
+    CHECK(packets[k].imu.back().stamp == packets[k].frame->stamp);
+  }
+  const ReaderReport report = dataset.report();
+  CHECK(report.count(ReaderFault::kClockSetBack) == 1);
+  CHECK(report.count(ReaderFault::kUnorderedStamp) == 2);
+  CHECK_THAT(to_string(report), Catch::Contains("the clock went back 10.0 s"));
+}
+
 }  // namespace
 }  // namespace km

@@ -300,6 +300,30 @@ TEST_CASE("A pair is chosen among more cameras, or one with depth", "[sensors][c
   }
 }
 
+TEST_CASE("Files of ROS' camera_calibration give the pair without its pose on the body",
+          "[sensors][calibration]") {
+  const TemporaryFolder folder;
+  const auto write = [&folder](const std::string& name, const std::string& Tx) {
+    return folder.write(
+        name,
+        "image_width: 640\nimage_height: 480\ncamera_name: narrow\ncamera_matrix:\n  rows: 3\n"
+        "  cols: 3\n  data: [458, 0, 320, 0, 457, 240, 0, 0, 1]\ndistortion_model: plumb_bob\n"
+        "distortion_coefficients: {rows: 1, cols: 5, data: [-0.28, 0.07, 0, 0, 0]}\n"
+        "rectification_matrix: {rows: 3, cols: 3, data: [1, 0, 0, 0, 1, 0, 0, 0, 1]}\n"
+        "projection_matrix: {rows: 3, cols: 4, data: [430, 0, 318, " +
+            Tx + ", 0, 430, 239, 0, 0, 0, 1, 0]}\n");
+  };
+  const auto left = write("left.yaml", "0"), right = write("right.yaml", "-43");
+  RigChoice choice{.may_be_partial = true, .rectified = GENERATE(false, true)};
+  CAPTURE(choice.rectified);
+  const RigCalibration found = read_rig({left, right}, choice);
+  CHECK_FALSE(found.has_extrinsics);
+  CHECK(found.rig.stereo.cameras[0].fx == (choice.rectified ? 430.0 : 458.0));
+  CHECK(found.rig.stereo.baseline_m() == Approx(0.1));
+  CHECK_THROWS_WITH(read_rig({left}, choice), Catch::Contains("for each camera"));
+  CHECK_THROWS_WITH(read_rig({right, left}, choice), Catch::Contains("no baseline"));
+}
+
 TEST_CASE("A file that is no calibration is refused with a list of the expected formats",
           "[sensors][calibration]") {
   const Files files;

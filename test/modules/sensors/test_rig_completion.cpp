@@ -263,5 +263,32 @@ TEST_CASE("A chain of static transforms is followed in both directions", "[senso
   CHECK(!transforms.find("imu", "z"));
 }
 
+TEST_CASE("Poses come from /tf if /tf_static does not have them", "[sensors][calibration]") {
+  const bool has_static = GENERATE(false, true);  // it has other frames
+  CAPTURE(has_static);
+  ListedBag bag;
+  if (has_static) add_transforms(bag, {transform("map", "odom", {1, 2, 3}, kQuarter)});
+  bag.add("/left_info", camera_info("left_optical", 0.0));
+  bag.add("/right_info", camera_info("left_optical", -43.0));
+  bag.add("/imu", imu("imu"));
+  bag.add_bytes("/tf", RosTFMessage::kType, 0, encode_ros(RosTFMessage{{kLeftOnBase, kImuOnBase}}));
+  const Rig rig = complete_rig("a.bag", bag, nothing_known());
+  CHECK(rig.sensors.stereo.cameras[0].T_body_cam.translation().isApprox(
+      Eigen::Vector3d(0, -0.2, -1)));
+  REQUIRE(rig.notes.size() == 1);
+  CHECK_THAT(rig.notes[0], Contains("that on /tf"));
+}
+
+TEST_CASE("A calibration that is a text is named with its topic", "[sensors][calibration]") {
+  ListedBag bag;
+  add_transforms(bag, {kLeftOnBase});
+  bag.describe("/left_info", "std_msgs/String");
+  bag.describe("/right_info", RosCameraInfo::kType);
+  bag.describe("/imu", RosImu::kType);
+  CHECK_THROWS_WITH(complete_rig("a.bag", bag, nothing_known()),
+                    Contains("/left_info has messages of std_msgs/String, not of "
+                             "sensor_msgs/CameraInfo: state its calibration in the rig file"));
+}
+
 }  // namespace
 }  // namespace km

@@ -1,5 +1,7 @@
 #include <catch2/catch.hpp>
 
+#include <cmath>
+
 #include <algorithm>
 #include <limits>
 #include <random>
@@ -8,6 +10,7 @@
 #include "modules/core/stamp.hpp"
 #include "modules/sensors/sample_streams.hpp"
 #include "modules/sensors/stream_stamps.hpp"
+#include "modules/sensors/usual_numbers.hpp"
 #include "test/modules/sensors/euroc_folder.hpp"
 
 namespace km {
@@ -265,6 +268,49 @@ TEST_CASE("Packets get the poses of a file and frames without one are counted",
   CHECK(x[0] == Approx(0.5));
   CHECK(x[3] == Approx(3.5));
   CHECK(reader.report().count(ReaderFault::kFrameWithoutPose) == 4);
+}
+
+TEST_CASE("Numbers of sensors outside the usual range are named by their confusions", "[sensors]") {
+  struct Case {
+    UsualNumber number;
+    double value;
+    const char *id, *words;
+  };
+  const Case c = GENERATE(
+      Case{UsualNumber::kBaseline_m, 11.0, "stereo.baseline", "0.11 m if in centimetres"},
+      Case{UsualNumber::kBaseline_m, 110.0, "stereo.baseline", "0.11 m if in millimetres"},
+      Case{UsualNumber::kBaseline_m, 1e-4, "stereo.baseline", "usually 0.01 to 1 m"},
+      Case{UsualNumber::kLever_m, 65.0, "extrinsics.lever", "0.065 m if in millimetres"},
+      Case{UsualNumber::kImageRate_hz, 2e4, "frames.stamps", "20 Hz if of stamps in microseconds"},
+      Case{UsualNumber::kImuRate_hz, 2e5, "imu.stamps", "200 Hz if of stamps in microseconds"},
+      Case{UsualNumber::kGravity_mps2, 0.99, "imu.accel_in_g", "9.709 m/s^2 if in g"},
+      Case{UsualNumber::kGravity_mps2, 1001.0, "imu.accel_in_g", "if in thousandths of g"},
+      Case{UsualNumber::kGravity_mps2, 0.3, "imu.no_gravity", "subtracts gravity"},
+      Case{UsualNumber::kGravity_mps2, 20.0, "imu.gravity", "usually 8.3 to 11.3"},
+      Case{UsualNumber::kDepth_m, 1800.0, "depth.size", "1.8 m if in millimetres"});
+  CAPTURE(c.id, c.value);
+  const auto found = doubt(c.number, c.value);
+  REQUIRE(found);
+  CHECK(found->id == c.id);
+  CHECK_THAT(found->what, Catch::Contains(c.words));
+  CHECK_FALSE(doubt(UsualNumber::kBaseline_m, 0.54));  // KITTI
+  CHECK_FALSE(doubt(UsualNumber::kImageRate_hz, std::nan("")));
+}
+
+TEST_CASE("The first packets of a source show its rates and units once", "[sensors]") {
+  FirstPackets first;
+  std::vector<Doubt> found;
+  for (Stamp k = 0; k < 40; ++k) {
+    auto frame = std::make_shared<StereoFrame>();
+    frame->stamp = 50'000 * k;  // 20 Hz in microseconds
+    SensorPacket packet{frame, {}};
+    for (Stamp i = 0; i < 10; ++i)
+      packet.imu.push_back({50'000 * k + 5'000 * i, Eigen::Vector3d::Zero(), {0, 0, 9.81}});
+    for (const Doubt& doubt : first.add(packet)) found.push_back(doubt);
+  }
+  REQUIRE(found.size() == 2);
+  CHECK(found[0].id == "frames.stamps");
+  CHECK(found[1].id == "imu.stamps");
 }
 
 }  // namespace

@@ -1,0 +1,159 @@
+#include "modules/sensors/usual_numbers.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <string_view>
+
+#include "modules/core/config.hpp"
+#include "modules/core/text_table.hpp"
+
+namespace km {
+namespace {
+
+// A usual mistake multiplies the number by this factor.
+struct Confusion {
+  double factor;
+  std::string_view words;
+  std::string_view id = {};  // of the finding, if it is not that of the number
+};
+
+struct Row {
+  std::string_view id, name, unit;
+  Bounds<double> usual;
+  std::array<Confusion, 4> confusions;  // a factor of 0 is none
+  std::string_view means, to_do;
+};
+
+constexpr double kG_mps2 = 9.80665;
+constexpr std::string_view kStamps =
+    "check the unit of the stamps: the reader takes a whole number as nanoseconds";
+
+// In the order of UsualNumber.
+constexpr std::array<Row, 6> kRows = {{
+    {"stereo.baseline",
+     "a baseline",
+     "m",
+     {0.01, 1.0},
+     {{{100.0, "in centimetres"}, {1000.0, "in millimetres"}, {39.37, "in inches"}}},
+     "if its unit is wrong, all lengths are wrong by the same factor",
+     "state translations in metres; in CameraInfo, P[3] of the right camera is -fx times the "
+     "baseline in metres"},
+    {"extrinsics.lever",
+     "the left camera at a distance from the body's origin",
+     "m",
+     {0.0, 3.0},
+     {{{1000.0, "in millimetres"}, {100.0, "in centimetres"}}},
+     "odometry expects motion of the camera that does not occur, and drifts or restarts",
+     "state the translation of T_body_cam (T_cam_imu) in metres"},
+    {"frames.stamps",
+     "images at a rate",
+     "Hz",
+     {0.0, 1000.0},
+     {{{1e3, "of stamps in microseconds"},
+       {1e6, "of stamps in milliseconds"},
+       {1e9, "of stamps in seconds"}}},
+     "odometry does not start on such stamps",
+     kStamps},
+    {"imu.stamps",
+     "inertial samples at a rate",
+     "Hz",
+     {0.0, 2e4},
+     {{{1e3, "of stamps in microseconds"},
+       {1e6, "of stamps in milliseconds"},
+       {1e9, "of stamps in seconds"}}},
+     "odometry does not start on such stamps",
+     kStamps},
+    {"imu.gravity",
+     "an accelerometer with a median norm",
+     "m/s^2",
+     {8.3, 11.3},
+     {{{1.0 / kG_mps2, "in g", "imu.accel_in_g"},
+       {1e3 / kG_mps2, "in thousandths of g", "imu.accel_in_g"},
+       {kG_mps2, "multiplied by 9.80665 twice"},
+       {100.0, "in cm/s^2"}}},
+     "odometry estimates a wrong direction of gravity, or does not start",
+     "write specific force in m/s^2, including gravity"},
+    {"depth.size",
+     "depth with a median",
+     "m",
+     {0.1, 50.0},
+     {{{1e3, "in millimetres"}, {1e-3, "multiplied by 0.001 twice"}, {10.0, "in units of 0.1 mm"}}},
+     "if its unit is wrong, all lengths are wrong by the same factor",
+     "state depth: {scale_m: ...} in the rig file, the depth of one unit of a 16-bit image"},
+}};
+
+}  // namespace
+
+std::optional<Doubt> doubt(UsualNumber number, double value) {
+  const Row& row = kRows.at(static_cast<std::size_t>(number));
+  if (std::isnan(value) || row.usual.contains(value)) return std::nullopt;
+  const auto text = [&row](double shown) {
+    return rounded(shown, 4) + ' ' + std::string(row.unit);
+  };
+  Doubt doubt{.id = std::string(row.id),
+              .what = std::string(row.name) + " of " + text(value) + ", usually " +
+                      rounded(row.usual.min, 4) + " to " + text(row.usual.max),
+              .means = std::string(row.means),
+              .to_do = std::string(row.to_do)};
+  for (const Confusion& confusion : row.confusions) {
+    if (confusion.factor <= 0.0 || !row.usual.contains(value / confusion.factor)) continue;
+    doubt.what += (doubt.is_explained ? ", or " : ": ") + text(value / confusion.factor) + " if " +
+                  std::string(confusion.words);
+    if (!confusion.id.empty() && !doubt.is_explained) doubt.id = confusion.id;
+    doubt.is_explained = true;
+  }
+  if (number == UsualNumber::kGravity_mps2 && !doubt.is_explained && value < row.usual.min / 3.0) {
+    doubt.id = "imu.no_gravity";
+    doubt.what += ": the driver subtracts gravity, or uses another unit";
+    doubt.to_do = "set the driver to raw acceleration";
+  }
+  return doubt;
+}
+
+std::vector<Doubt> rig_doubts(const StereoRig& rig) {
+  std::vector<Doubt> doubts;
+  const bool has_pair = rig.depth_source == DepthSource::kRightImage;
+  const double baseline_m = rig.baseline_m();  // 0 without a calibration
+  if (const auto found = doubt(UsualNumber::kBaseline_m, baseline_m);
+      found && has_pair && baseline_m > 0.0)
+    doubts.push_back(*found);
+  const double lever_m = rig.cameras[0].T_body_cam.translation().norm();
+  if (const auto found = doubt(UsualNumber::kLever_m, lever_m)) doubts.push_back(*found);
+  return doubts;
+}
+
+double median_acceleration(const std::vector<ImuSample>& samples) {
+  if (samples.empty()) return std::numeric_limits<double>::quiet_NaN();
+  std::vector<double> norms;
+  for (const ImuSample& sample : samples) norms.push_back(sample.accel.norm());
+  const auto middle = norms.begin() + static_cast<std::ptrdiff_t>(norms.size() / 2);
+  std::ranges::nth_element(norms, middle);
+  return *middle;
+}
+
+std::vector<Doubt> FirstPackets::add(const SensorPacket& packet) {
+  if (frames_.size() >= kFrames) return {};
+  frames_.push_back(packet.frame->stamp);
+  samples_.insert(samples_.end(), packet.imu.begin(), packet.imu.end());
+  if (frames_.size() < kFrames) return {};
+  const auto rate_hz = [](Stamp first, Stamp last, std::size_t count) {
+    const double seconds = seconds_between(first, last);
+    return seconds > 0.0 ? static_cast<double>(count - 1) / seconds
+                         : std::numeric_limits<double>::quiet_NaN();
+  };
+  std::vector<Doubt> doubts;
+  const auto judge = [&doubts](UsualNumber number, double value) {
+    if (const auto found = doubt(number, value)) doubts.push_back(*found);
+  };
+  judge(UsualNumber::kImageRate_hz, rate_hz(frames_.front(), frames_.back(), frames_.size()));
+  if (!samples_.empty())
+    judge(UsualNumber::kImuRate_hz,
+          rate_hz(samples_.front().stamp, samples_.back().stamp, samples_.size()));
+  judge(UsualNumber::kGravity_mps2, median_acceleration(samples_));
+  samples_ = {};
+  return doubts;
+}
+
+}  // namespace km

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "modules/core/camera.hpp"
+#include "modules/core/frame.hpp"
+
+namespace km {
+
+/// Numbers of sensors and calibrations that drivers are known to confuse.
+enum class UsualNumber {
+  kBaseline_m,
+  kLever_m,
+  kImageRate_hz,
+  kImuRate_hz,
+  kGravity_mps2,
+  kDepth_m
+};
+
+/// A value outside the range that robots have.
+struct Doubt {
+  std::string id;    ///< Stable, for programs: "stereo.baseline".
+  std::string what;  ///< "a baseline of 11.01 m, usually 0.01 to 1 m: 0.1101 m if in centimetres".
+  std::string means;
+  std::string to_do;
+  bool is_explained = false;  ///< A known confusion gives a usual value.
+};
+
+/// The doubt about a value, from a table with the usual range and the usual confusions of each
+/// number; nullopt for usual values and NaN.
+[[nodiscard]] std::optional<Doubt> doubt(UsualNumber number, double value);
+
+/// Doubts about the baseline and the position of the left camera on the body.
+[[nodiscard]] std::vector<Doubt> rig_doubts(const StereoRig& rig);
+
+/// Median norm of the accelerations [m/s^2]; NaN without samples.
+[[nodiscard]] double median_acceleration(const std::vector<ImuSample>& samples);
+
+/// Judges rates and accelerations of the first packets of a source.
+class FirstPackets {
+ public:
+  /// The doubts when kFrames frames have been added, once; empty before and afterwards.
+  [[nodiscard]] std::vector<Doubt> add(const SensorPacket& packet);
+
+  static constexpr std::size_t kFrames = 30;
+
+ private:
+  std::vector<Stamp> frames_;
+  std::vector<ImuSample> samples_;
+};
+
+}  // namespace km
