@@ -38,12 +38,11 @@ namespace {
 namespace fs = std::filesystem;
 
 bool is_fault_of_disk(const std::error_code& error) {
-  return error == std::errc::no_space_on_device || error == std::errc::read_only_file_system ||
-         error == std::errc::io_error;
+  return error == std::errc::no_space_on_device || error == std::errc::io_error;
 }
 
-// Changes the results folder. If the disk fails, the loss is noted and the robot runs without it.
-// Throws std::runtime_error for a folder that cannot be used.
+// Changes the results folder before the run. If the disk fails, the loss is noted and the robot
+// runs without it. Throws std::runtime_error for a folder that cannot be used or is read-only.
 void change_output(const RobotOptions& options, ResultWriter& results,
                    const std::function<void(const fs::path&)>& change) try {
   change(options.output);

@@ -157,6 +157,8 @@ bool replaces_a_run(const km::TeamPlan& plan) {
   });
 }
 
+constexpr int kNoRobot = 126;  // as a shell's for a program that cannot be run
+
 std::vector<km::RobotRun> run_robots(const TeamOptions& options, const km::TeamPlan& plan,
                                      km::ResultWriter& results) {
   if (access(options.robot_binary.c_str(), X_OK) != 0)
@@ -174,6 +176,14 @@ std::vector<km::RobotRun> run_robots(const TeamOptions& options, const km::TeamP
   km::TeamDisplay display(names);
   std::vector<km::RobotRun> runs =
       km::run_team(options.robot_binary, plan, signals, display, links ? &*links : nullptr);
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    if (!runs[i].exit.ok() || !runs[i].last_log_lines.empty()) continue;
+    if (km::is_file(plan.output / names[i] / km::kSummary)) continue;
+    runs[i].exit.code = kNoRobot;
+    runs[i].last_log_lines = {"no output and no " + std::string(km::kSummary) + ": is " +
+                              options.robot_binary.string() + " kimera_multi_robot?"};
+    display.update(i, "FAILED: " + runs[i].last_log_lines.front());
+  }
   out << '\n';
   if (links) write_links(plan, *links, results);
   return runs;

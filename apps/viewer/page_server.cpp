@@ -4,6 +4,7 @@
 #include <civetweb.h>
 #include <sodium.h>
 
+#include <algorithm>
 #include <array>
 #include <limits>
 #include <nlohmann/json.hpp>
@@ -11,6 +12,7 @@
 #include <sstream>
 #include <stdexcept>
 #include <thread>
+#include <utility>
 
 #include "modules/core/json.hpp"
 #include "runtime/dds/participant.hpp"
@@ -23,8 +25,12 @@ constexpr double kWait_s = 0.2;
 // Each open connection occupies one thread of the server. A connection is closed if no request
 // arrives, or a page does not read, for kIdle_ms. Otherwise idle connections would
 // keep pages waiting for the default of 30 s.
-constexpr const char* kConnections = "64";
+constexpr const char* kConnections = "192";
 constexpr const char* kIdle_ms = "10000";
+// Open pages in all and of one address: the other threads serve files.
+constexpr std::size_t kMaxPages = 96, kMaxPagesOfAddress = 48;
+constexpr std::size_t kMaxRequest_bytes = 1024;  // a longer request closes the connection
+constexpr std::size_t kMaxImages = 64;           // robots whose images a page requests
 
 // False for names that only begin like an address, as 127.example.com.
 bool is_loopback(const std::string& address) {
@@ -122,6 +128,7 @@ bool send_batch(mg_connection* connection, const ViewStore::Batch& batch) {
 
 // An open page; its thread sends the messages that the page lacks.
 struct PageServer::Page {
+  std::string address;
   std::atomic<bool> closed = false;
   std::set<RobotId> images;  // robots whose images the page requests
   std::thread sender;
@@ -197,12 +204,13 @@ void PageServer::start() {
   mg_set_websocket_handler(
       context_, (prefix() + "updates").c_str(),
       [](const mg_connection* connection, void* self) {
-        return static_cast<PageServer*>(self)->is_allowed(connection) ? 0 : 1;
+        return static_cast<PageServer*>(self)->has_room_for(connection) ? 0 : 1;
       },
       [](mg_connection* connection, void* self) {
         static_cast<PageServer*>(self)->open(connection);
       },
       [](mg_connection* connection, int bits, char* data, size_t size, void* self) {
+        if (size > kMaxRequest_bytes) return 0;
         static_cast<PageServer*>(self)->receive(connection, bits, {data, size});
         return (bits & 0xf) == MG_WEBSOCKET_OPCODE_CONNECTION_CLOSE ? 0 : 1;
       },
@@ -221,6 +229,15 @@ bool PageServer::is_allowed(const mg_connection* connection) const {
   return !token_.empty() || name == "[::1]" || is_loopback(name);
 }
 
+bool PageServer::has_room_for(const mg_connection* connection) {
+  const std::string address = mg_get_request_info(connection)->remote_addr;
+  const std::lock_guard lock(mutex_);
+  const auto of_address = std::ranges::count_if(
+      pages_, [&](const auto& entry) { return entry.second->address == address; });
+  return is_allowed(connection) && pages_.size() < kMaxPages &&
+         std::cmp_less(of_address, kMaxPagesOfAddress);
+}
+
 int PageServer::serve(mg_connection* connection) const {
   const std::string uri = mg_get_request_info(connection)->local_uri;
   if (!is_allowed(connection) || !uri.starts_with(prefix())) return refuse(connection);
@@ -235,6 +252,7 @@ int PageServer::serve(mg_connection* connection) const {
 void PageServer::open(mg_connection* connection) {
   const std::lock_guard lock(mutex_);
   const auto page = std::make_shared<Page>();
+  page->address = mg_get_request_info(connection)->remote_addr;
   pages_[connection] = page;
   page->sender = std::thread([this, connection, page] { send_messages(connection, *page); });
 }
@@ -263,10 +281,10 @@ void PageServer::receive(mg_connection* connection, int bits, std::string_view t
   if (page == pages_.end()) return;
   std::set<RobotId>& images = page->second->images;
   change_requests([&] {
-    if (request->on)
-      images.insert(request->robot);
-    else
+    if (!request->on)
       images.erase(request->robot);
+    else if (images.size() < kMaxImages)
+      images.insert(request->robot);
   });
 }
 

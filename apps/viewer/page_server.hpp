@@ -53,6 +53,7 @@ class PageServer {
   [[nodiscard]] std::string prefix() const { return token_.empty() ? "/" : '/' + token_ + '/'; }
   void start();
   bool is_allowed(const mg_connection* connection) const;
+  bool has_room_for(const mg_connection* connection);
   int serve(mg_connection* connection) const;
   void open(mg_connection* connection);
   void send_messages(mg_connection* connection, const Page& page);

@@ -143,6 +143,17 @@ TEST_CASE("On a full or read-only disk a robot continues, names lost results, an
   }
 }
 
+TEST_CASE("A robot whose results folder is read-only does not start", "[system][endings]") {
+  RobotOnSmallDisk run;
+  if (!run.disk.mounted()) return;
+  fs::create_directory(run.output);
+  REQUIRE(run.disk.make_read_only());
+  Process robot(robot_on_walk(long_walk(run.folder.path(), 0), run.output), 0, run.log);
+  CHECK(robot.wait() == 1);
+  CHECK_THAT(run.folder.read("log"),
+             Catch::Contains("cannot be written to: Read-only file system"));
+}
+
 TEST_CASE("Results that a disk cannot take go to the fallback folder", "[system][endings]") {
   RobotOnSmallDisk run;
   if (!run.disk.mounted()) return;

@@ -95,6 +95,16 @@ TEST_CASE("A robot that fails fails the team, with its last words", "[team]") {
                                 Catch::Contains("  out of luck"));
 }
 
+TEST_CASE("A program that is no robot fails the team", "[team]") {
+  const ScriptedTeam team("exit 0");
+  const std::string before = team.command.substr(0, team.command.find(" --robot-binary"));
+  const auto result = run_command(before + " --robot-binary /bin/true --output " +
+                                  (team.folder.path() / "out").string());
+  CAPTURE(result.output);
+  CHECK(result.exit_code == 3);
+  CHECK_THAT(result.output, Catch::Contains("is /bin/true kimera_multi_robot?"));
+}
+
 TEST_CASE("Results of an earlier run are not shown for a robot that fails", "[team]") {
   const ScriptedTeam team("[ $name = bob ] && { rm \"$out/summary.json\"; exit 1; }; exit 0");
   for (const char* file : {"summary.json", "optimized.tum", "exit_code"})

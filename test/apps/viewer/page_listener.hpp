@@ -24,7 +24,7 @@ class PageListener {
           static_cast<PageListener*>(self)->receive({data, size});
           return 1;
         },
-        [](const mg_connection*, void*) {}, this);
+        [](const mg_connection*, void* self) { static_cast<PageListener*>(self)->close(); }, this);
     INFO(error.data());
     REQUIRE(connection_ != nullptr);
   }
@@ -40,7 +40,18 @@ class PageListener {
     return changed_.wait_for(lock, kPatience, [&] { return all_.find(text) != std::string::npos; });
   }
 
+  /// Waits until the server has closed the connection.
+  bool is_closed() {
+    std::unique_lock lock(mutex_);
+    return changed_.wait_for(lock, kPatience, [&] { return closed_; });
+  }
+
  private:
+  void close() {
+    const std::lock_guard lock(mutex_);
+    closed_ = true;
+    changed_.notify_all();
+  }
   void receive(std::string_view frame) {
     const std::lock_guard lock(mutex_);
     all_.append(frame);
@@ -48,9 +59,10 @@ class PageListener {
   }
 
   mg_connection* connection_ = nullptr;
-  std::mutex mutex_;  // guards all_
+  std::mutex mutex_;  // guards the members below
   std::condition_variable changed_;
   std::string all_;
+  bool closed_ = false;
 };
 
 }  // namespace km

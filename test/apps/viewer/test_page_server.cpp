@@ -127,6 +127,23 @@ TEST_CASE("A page does not wait until idle connections are closed", "[page_serve
   CHECK(std::ranges::all_of(idle, [](const auto& connection) { return connection->is_open(); }));
 }
 
+TEST_CASE("Pages beyond the limit are refused, and files are served still", "[page_server]") {
+  ViewStore store(1'000'000);
+  const PageServer server(store, any_port());
+  const int port = port_of(server);
+  std::vector<std::unique_ptr<PageListener>> pages;
+  for (int i = 0; i < 48; ++i) {
+    pages.push_back(std::make_unique<PageListener>(port, "/updates"));
+    REQUIRE(pages.back()->receives("hello"));
+  }
+  std::array<char, 256> error{};
+  CHECK(mg_connect_websocket_client("127.0.0.1", port, 0, error.data(), error.size(), "/updates",
+                                    nullptr, nullptr, nullptr, nullptr) == nullptr);
+  CHECK(get(port, "/").status == 200);
+  pages[0]->send(std::string(20'000'000, '['));
+  CHECK(pages[0]->is_closed());
+}
+
 TEST_CASE("Other hosts need the token", "[page_server]") {
   ViewStore store(1'000'000);
   PageServerOptions options = any_port();
