@@ -8,9 +8,15 @@
 #include <cstdlib>
 #include <map>
 #include <optional>
+#include <set>
+#include <span>
 #include <sstream>
 #include <stdexcept>
+#include <string>
 #include <system_error>
+#include <utility>
+#include <variant>
+#include <vector>
 
 #include "apps/output_file.hpp"
 #include "apps/program_version.hpp"
@@ -88,10 +94,11 @@ void log_network(const RobotConfig& config, const NetworkInterface& interface) {
 class Watch {
  public:
   /// `continues`: continues the run whose results are in the folder.
-  Watch(const RobotOptions& options, const RobotConfig& config, bool continues, Robot& robot,
-        ResultWriter& results)
+  Watch(const RobotOptions& options, const RobotConfig& config, bool continues,
+        std::set<RobotId> partners, Robot& robot, ResultWriter& results)
       : robot_(robot),
         is_past_(!options.session.empty()),
+        partners_(std::move(partners)),
         serve_limit_s_(options.serve_limit_s),
         departure_(config.run.settle_s, options.serve_limit_s),
         start_s_(steady_now_s()),
@@ -107,7 +114,7 @@ class Watch {
   bool poll() {
     const double now_s = steady_now_s() - start_s_;
     const TrafficSnapshot traffic = robot_.bridge().traffic();
-    const bool ended = robot_.input_ended() && !waits_for_peers(now_s);
+    const bool ended = robot_.input_ended();
     // If the recorder is at work, the next call reads the record: this thread does not wait.
     (void)robot_.recorder().try_with_record([&](const RunRecord& record) {
       log_progress(now_s, record, traffic);
@@ -128,7 +135,8 @@ class Watch {
                                     .graph_settled = settled,
                                     .activity = record.activity(),
                                     .present_peers = present,
-                                    .not_received = static_cast<std::size_t>(not_received)});
+                                    .not_received = static_cast<std::size_t>(not_received),
+                                    .awaits_peers = ended && awaits_peers(team)});
       robot_.set_settled(reported);
       absentees_.update(now_s, known_peers(), team);
       const auto running = [](const auto& peer) { return peer.phase == RobotPhase::kRunning; };
@@ -164,9 +172,19 @@ class Watch {
   // receives a notice.
   static constexpr double kSecondHand_s = 2.0 * kLeaveNotice_s;
 
-  // The robot of a finished run stays until another robot has come, or until the limit.
-  bool waits_for_peers(double now_s) const {
-    return is_past_ && now_s < serve_limit_s_ && robot_.bridge().peers().list().empty();
+  // The robot of a finished run awaits any other robot. A recorded graph has closures to robots
+  // that may start later.
+  bool awaits_peers(std::span<const RobotId> team) {
+    const std::vector<Peer> met = robot_.bridge().peers().list();
+    for (const Peer& peer : met) partners_.erase(peer.identity.robot);
+    for (const RobotId robot : team) partners_.erase(robot);  // that other robots receive
+    if (!partners_.empty() && !std::exchange(told_, true)) {
+      std::string names;
+      for (const RobotId robot : partners_) names += ' ' + std::to_string(robot);
+      log::info("robot") << "closures of the graph lead to robots that have not come:" << names
+                         << "; waits for them, up to --serve-limit " << serve_limit_s_ << " s";
+    }
+    return !partners_.empty() || (is_past_ && met.empty());
   }
 
   // Publishes that the robot leaves, and freezes the record, so that all robots end with the same
@@ -247,6 +265,8 @@ class Watch {
 
   Robot& robot_;
   const bool is_past_;
+  std::set<RobotId> partners_;  // robots of the recorded graph that have not come yet
+  bool told_ = false;           // of the partners
   const double serve_limit_s_;
   Departure departure_;
   Absentees absentees_;
@@ -544,6 +564,15 @@ void write_estimated_rig(const RobotOptions& options, const RigInput& rig, const
   });
 }
 
+// The other robots of a recorded graph.
+std::set<RobotId> partners_in(const RobotInput& input, RobotId self) {
+  std::set<RobotId> partners;
+  if (const auto* graph = std::get_if<RecordedGraph>(&input.source))
+    for (const RelativePose& closure : graph->inter_closures)
+      partners.insert(closure.from.robot == self ? closure.to.robot : closure.from.robot);
+  return partners;
+}
+
 // Path of the MCAP record, if one is requested; a resumed run writes a new file. Throws
 // std::runtime_error if the folder of the requested file does not exist.
 std::optional<fs::path> record_file(const RobotOptions& options, bool continues) {
@@ -585,6 +614,7 @@ int run_robot(const RobotOptions& asked, SignalWatch& signals,
   const bool continues =
       options.resume && input->restored_from == RestoredFrom::kFormerProcess && input->restored;
   options.record = record_file(options, continues);
+  std::set<RobotId> partners = partners_in(*input, options.robot);
   Robot robot(options, config, *std::move(input), mapping, results, signals);
   if (listen) listen(robot.topics());
   log_network(config, robot.interface());
@@ -608,7 +638,7 @@ int run_robot(const RobotOptions& asked, SignalWatch& signals,
   FinalRoom room(options.output, robot.sensors() != nullptr ? robot.sensors()->listed() : 0);
 
   std::optional<Watch> watch;
-  watch.emplace(options, config, continues, robot, results);
+  watch.emplace(options, config, continues, std::move(partners), robot, results);
   const RunResult result = robot.run([&] {
     (void)robot.recorder().try_with_record([&](const RunRecord& record) {
       room.grow(record.odometry().size(), record.keyframes().size());

@@ -43,7 +43,8 @@ Departure::Present Departure::update(double now_s, const Inputs& inputs) {
 
   // The robot reports itself as settled after half of the settling time. Its peers answer in the
   // other half.
-  const bool settled = inputs.graph_settled && now_s - active_s_ >= 0.5 * settle_s_;
+  const bool settled =
+      inputs.graph_settled && !inputs.awaits_peers && now_s - active_s_ >= 0.5 * settle_s_;
   const std::uint8_t links = settled ? settled_links(inputs.present_peers) : 0;
   const bool peers_settled = links > 1;
   // The distance in links to a robot that is not received is at most the number of such robots plus

@@ -19,7 +19,7 @@ namespace km {
 ///
 /// A robot whose input has ended continues to serve its team. It leaves when it and every robot of
 /// the team, received or not, have been settled for `settle_s`, or `serve_limit_s` after its input
-/// ended. Pure: time is an argument [s], with any origin.
+/// ended. It is not settled while it awaits peers. Pure: time is an argument [s], with any origin.
 class Departure {
  public:
   Departure(double settle_s, double serve_limit_s)
@@ -36,6 +36,7 @@ class Departure {
     std::uint64_t activity = 0;  ///< Changes whenever a module has done new work.
     std::span<const Present> present_peers = {};
     std::size_t not_received = 0;  ///< Number of members that only other robots receive.
+    bool awaits_peers = false;     ///< The robot has measurements of robots that it has never met.
   };
 
   /// Takes the state at `now_s` and returns the progress to publish.

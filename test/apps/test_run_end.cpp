@@ -47,6 +47,14 @@ TEST_CASE("A robot serves a peer that is still running, up to the limit", "[depa
   CHECK(robot.leaves_at(5.0 + kLimit_s));
 }
 
+TEST_CASE("A robot awaits the robots of its closures, up to the limit", "[departure]") {
+  Done robot;
+  robot.inputs.awaits_peers = true;
+  CHECK(robot.phase_at(50.0) == RobotPhase::kFinished);
+  CHECK_FALSE(robot.leaves_at(50.0 + kLimit_s - 0.1));
+  CHECK(robot.leaves_at(50.0 + kLimit_s));
+}
+
 TEST_CASE("New work after all had settled starts the wait again", "[departure]") {
   Done robot{.peers = {kSettled}};
   robot.phase_at(4.0);
