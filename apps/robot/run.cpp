@@ -266,7 +266,7 @@ class Watch {
   Robot& robot_;
   const bool is_past_;
   std::set<RobotId> partners_;  // robots of the recorded graph that have not come yet
-  bool told_ = false;           // of the partners
+  bool told_ = false;           // the log names them
   const double serve_limit_s_;
   Departure departure_;
   Absentees absentees_;
