@@ -84,7 +84,12 @@ class GlbMesh {
                   TINYGLTF_TYPE_VEC3, TINYGLTF_TARGET_ARRAY_BUFFER);
     model_.accessors[0].minValues.assign(low.begin(), low.end());
     model_.accessors[0].maxValues.assign(high.begin(), high.end());
-    if (!mesh_.labels.empty() || mesh_.colors.empty()) return;
+    std::vector<float> normals;
+    for (const Eigen::Vector3f& normal : mesh_.normals())
+      normals.insert(normals.end(), normal.begin(), normal.end());
+    attributes_["NORMAL"] = add_array(normals, mesh_.vertices.size(), TINYGLTF_COMPONENT_TYPE_FLOAT,
+                                      TINYGLTF_TYPE_VEC3, TINYGLTF_TARGET_ARRAY_BUFFER);
+    if (mesh_.colors.empty()) return;
     std::vector<float> colors;
     for (const auto& color : mesh_.colors)
       for (const std::uint8_t channel : color)
@@ -106,7 +111,7 @@ class GlbMesh {
     material.name = known != nullptr       ? known->name
                     : mesh_.labels.empty() ? "mesh"
                                            : "label " + std::to_string(label);
-    if (known != nullptr) {
+    if (known != nullptr && mesh_.colors.empty()) {
       const auto& [red, green, blue] = known->color;
       material.pbrMetallicRoughness.baseColorFactor = {linear(red), linear(green), linear(blue),
                                                        1.0};

@@ -117,8 +117,10 @@ struct Writer {
     json["vertices"] = chunk.offsets.size();
     json["faces"] = chunk.faces.size();
     json["labelled"] = !chunk.labels.empty();
+    json["coloured"] = !chunk.colors.empty();
     append(chunk.offsets);
     append(chunk.faces);
+    append(chunk.colors);
     append(chunk.labels);
   }
 

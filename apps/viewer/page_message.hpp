@@ -20,10 +20,9 @@ struct PageMessage {
 /// "state", "pose", "keyframes", "closures", "mesh", "image", "objects", "raster". Poses are [x, y,
 /// z, qx, qy, qz, qw] to 0.1 mm and 1e-5. Meshes, images and rasters are binary, little-endian:
 /// length of the object [u32], the object, blanks up to a multiple of 4, then the data. A mesh has
-/// offsets (u16), faces (u16) and labels (u8); an image has features (f32) and JPEG; a raster has
-/// its runs.
-/// The chunks of the fused mesh of the team have `team`: their key has another robot than the
-/// update (see read_run).
+/// offsets (u16), faces (u16), colours (u16) and labels (u8); an image has features (f32) and JPEG;
+/// a raster has its runs. The chunks of the fused mesh of the team have `team`: their key has
+/// another robot than the update (see read_run).
 [[nodiscard]] PageMessage page_message(const ViewUpdate& update, std::uint64_t number);
 
 /// Source of the messages that a page shows.

@@ -81,9 +81,38 @@ void take_differences(std::span<const std::uint8_t>& plain, auto byte_of,
   plain = plain.subspan(counts.vertices);
 }
 
+// Channels of a colour. Red and blue less half of green are near zero for grey.
+std::uint8_t green_of(std::uint16_t color) {
+  return static_cast<std::uint8_t>(color >> 5U & 63U);
+}
+std::uint8_t red_over_green(std::uint16_t color) {
+  return static_cast<std::uint8_t>((color >> 11U) - green_of(color) / 2U);
+}
+std::uint8_t blue_over_green(std::uint16_t color) {
+  return static_cast<std::uint8_t>((color & 31U) - green_of(color) / 2U);
+}
+
+// Takes the colours of the vertices from the front of `plain`.
+void take_colors(std::span<const std::uint8_t>& plain, const ChunkCounts& counts,
+                 std::vector<std::uint16_t>& colors) {
+  std::array<Bytes, 3> channels;
+  for (Bytes& channel : channels) {
+    channel.resize(counts.vertices);
+    take_differences(
+        plain, [&](std::size_t v) -> auto& { return channel[v]; }, counts);
+  }
+  for (std::size_t v = 0; v < counts.vertices; ++v) {
+    const unsigned green = channels[0][v] & 63U;
+    const unsigned red = (channels[1][v] + green / 2U) & 31U;
+    const unsigned blue = (channels[2][v] + green / 2U) & 31U;
+    colors.push_back(static_cast<std::uint16_t>(red << 11U | green << 5U | blue));
+  }
+}
+
 // The bytes before compression.
 std::size_t plain_size(const ChunkCounts& counts) {
-  return (6 + (counts.labelled ? 1 : 0) + (counts.seen ? 2 : 0)) * counts.vertices +
+  return (6 + (counts.labelled ? 1 : 0) + (counts.coloured ? 3 : 0) + (counts.seen ? 2 : 0)) *
+             counts.vertices +
          6 * counts.faces;
 }
 
@@ -111,6 +140,7 @@ MeshChunk sorted_in_space(const MeshChunk& chunk) {
   for (std::size_t i = 0; i < order.size(); ++i) place[order[i]] = static_cast<std::uint16_t>(i);
   reorder(sorted.offsets, order);
   reorder(sorted.labels, order);
+  reorder(sorted.colors, order);
   reorder(sorted.views, order);
   for (ChunkTriple& face : sorted.faces) {
     for (std::uint16_t& corner : face) corner = place[corner];
@@ -127,6 +157,9 @@ std::vector<std::uint8_t> packed(const MeshChunk& chunk) {
   append(chunk.offsets, Triples::kOffsets, plain);
   append(chunk.faces, Triples::kFaces, plain);
   plain.insert(plain.end(), chunk.labels.begin(), chunk.labels.end());
+  append_differences(chunk.colors, green_of, plain);
+  append_differences(chunk.colors, red_over_green, plain);
+  append_differences(chunk.colors, blue_over_green, plain);
   for (std::size_t i = 0; i < 2; ++i)
     append_differences(
         chunk.views, [i](const auto& views) { return views[i]; }, plain);
@@ -152,6 +185,7 @@ bool unpack(std::span<const std::uint8_t> bytes, const ChunkCounts& counts, Mesh
                         plain.begin() + static_cast<std::ptrdiff_t>(counts.vertices));
     plain = plain.subspan(counts.vertices);
   }
+  if (counts.coloured) take_colors(plain, counts, chunk.colors);
   if (!counts.seen) return true;
   chunk.views.resize(counts.vertices);
   for (std::size_t i = 0; i < 2; ++i)

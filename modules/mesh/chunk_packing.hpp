@@ -19,14 +19,15 @@ struct ChunkCounts {
   std::size_t vertices = 0;
   std::size_t faces = 0;
   bool labelled = false;  ///< With MeshChunk::labels.
+  bool coloured = false;  ///< With MeshChunk::colors.
   bool seen = false;      ///< With MeshChunk::views.
 };
 
-/// Offsets, faces, labels and views of a chunk, compressed by Zstandard. Numbers are
+/// Offsets, faces, labels, colours and views of a chunk, compressed by Zstandard. Numbers are
 /// stated as differences from the ones before them, all low bytes before all high bytes.
 [[nodiscard]] std::vector<std::uint8_t> packed(const MeshChunk& chunk);
 
-/// Sets offsets, faces, labels and views of `chunk` to those of packed(). False if the
+/// Sets offsets, faces, labels, colours and views of `chunk` to those of packed(). False if the
 /// bytes are not those of a chunk with these numbers of elements, or if it has more than
 /// kMaxChunkBytes. Memory and time are bounded by kMaxChunkBytes.
 [[nodiscard]] bool unpack(std::span<const std::uint8_t> bytes, const ChunkCounts& counts,

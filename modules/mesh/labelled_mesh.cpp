@@ -1,5 +1,7 @@
 #include "modules/mesh/labelled_mesh.hpp"
 
+#include <Eigen/Geometry>
+
 namespace km {
 LabelId LabelledMesh::face_label(std::size_t face) const {
   if (labels.empty()) return 0;
@@ -30,6 +32,16 @@ void LabelledMesh::keep_vertices(const std::vector<std::uint32_t>& kept) {
 void LabelledMesh::transform(const SE3& T_a_b) {
   const Eigen::Isometry3f T = T_a_b.cast<float>();
   for (auto& vertex : vertices) vertex = T * vertex;
+}
+
+std::vector<Eigen::Vector3f> LabelledMesh::normals() const {
+  std::vector<Eigen::Vector3f> result(vertices.size(), Eigen::Vector3f::Zero());
+  for (const auto& [a, b, c] : faces) {
+    const Eigen::Vector3f across = (vertices[b] - vertices[a]).cross(vertices[c] - vertices[a]);
+    for (const std::uint32_t v : {a, b, c}) result[v] += across;
+  }
+  for (Eigen::Vector3f& normal : result) normal.normalize();
+  return result;
 }
 
 void LabelledMesh::colour_by(const LabelPalette& palette) {

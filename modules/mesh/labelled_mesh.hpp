@@ -37,6 +37,9 @@ struct LabelledMesh {
   /// Moves every vertex: p_a = T_a_b * p_b.
   void transform(const SE3& T_a_b);
 
+  /// Unit normals of the vertices: means of those of their faces, by area.
+  [[nodiscard]] std::vector<Eigen::Vector3f> normals() const;
+
   /// Colours every vertex by its label's class; labels outside the palette become black.
   void colour_by(const LabelPalette& palette);
 };

@@ -212,7 +212,8 @@ class Splitter {
     for (; end < faces.size(); ++end) {
       std::size_t fresh = 0;
       for (const std::uint32_t v : faces[end]) fresh += part_of_vertex_[v] != part_ ? 1 : 0;
-      if (plain_bytes(vertices.size() + fresh, end + 1 - begin, !mesh_.labels.empty()) +
+      if (plain_bytes(vertices.size() + fresh, end + 1 - begin, !mesh_.labels.empty(),
+                      !mesh_.colors.empty()) +
               views_.largest_bytes(vertices.size() + fresh) >
           kMaxChunkBytes)
         break;
@@ -241,6 +242,7 @@ class Splitter {
         offset[axis] = static_cast<std::uint16_t>(points_[v][axis] - chunk.origin[axis]);
       chunk.offsets.push_back(offset);
       if (!mesh_.labels.empty()) chunk.labels.push_back(mesh_.labels[v]);
+      if (!mesh_.colors.empty()) chunk.colors.push_back(packed_color(mesh_.colors[v]));
     }
     for (const auto& [a, b, c] : faces)
       chunk.faces.push_back({local_index_[a], local_index_[b], local_index_[c]});
@@ -280,6 +282,10 @@ void check(const LabelledMesh& mesh, const ChunkGrid& grid) {
       !(grid.cell_m / grid.step_m <= static_cast<double>(kThirdOfMaxOffset)))
     throw std::invalid_argument("mesh chunks: cells of " + std::to_string(grid.cell_m) +
                                 " m in steps of " + std::to_string(grid.step_m) + " m");
+  if (!mesh.colors.empty() && mesh.colors.size() != mesh.vertices.size())
+    throw std::invalid_argument("mesh chunks: " + std::to_string(mesh.colors.size()) +
+                                " colours for " + std::to_string(mesh.vertices.size()) +
+                                " vertices");
   if (!mesh.labels.empty() && mesh.labels.size() != mesh.vertices.size())
     throw std::invalid_argument("mesh chunks: " + std::to_string(mesh.labels.size()) +
                                 " labels for " + std::to_string(mesh.vertices.size()) +
@@ -319,14 +325,30 @@ const char* fault_of(const MeshChunk& chunk) {
   const std::size_t vertices = chunk.offsets.size();
   if (!chunk.labels.empty() && chunk.labels.size() != vertices)
     return "labels do not fit the vertices";
+  if (!chunk.colors.empty() && chunk.colors.size() != vertices)
+    return "colours do not fit the vertices";
   if (plain_bytes(chunk) > kMaxChunkBytes) return "a chunk that is too large";
   for (const MeshChunk::Triple& face : chunk.faces)
     if (std::ranges::max(face) >= vertices) return "a face names a vertex which does not exist";
   if (chunk.faces.empty() != chunk.offsets.empty()) return "vertices without faces";
   if (const char* fault = fault_of(chunk.keyframes)) return fault;
   if (const char* fault = fault_of_views(chunk)) return fault;
+  if (!(chunk.voxel_m == 0.0F || (chunk.voxel_m >= 0.005F && chunk.voxel_m <= 1.0F)))
+    return "voxels of an unusual size";
   if (!are_positions_usable(chunk)) return "positions are not finite or too far away";
   return nullptr;
+}
+
+std::uint16_t packed_color(const LabelledMesh::Color& color) {
+  const auto& [red, green, blue] = color;
+  return static_cast<std::uint16_t>((red >> 3U) << 11U | (green >> 2U) << 5U | blue >> 3U);
+}
+
+LabelledMesh::Color unpacked_color(std::uint16_t packed) {
+  const unsigned red = packed >> 11U, green = packed >> 5U & 63U, blue = packed & 31U;
+  return {static_cast<std::uint8_t>(red << 3U | red >> 2U),
+          static_cast<std::uint8_t>(green << 2U | green >> 4U),
+          static_cast<std::uint8_t>(blue << 3U | blue >> 2U)};
 }
 
 SplitMesh split_mesh(const LabelledMesh& mesh, RobotId robot, RobotId anchor, const ChunkGrid& grid,
@@ -337,6 +359,7 @@ SplitMesh split_mesh(const LabelledMesh& mesh, RobotId robot, RobotId anchor, co
   blank.key.robot = robot;
   blank.anchor = anchor;
   blank.step_m = static_cast<float>(grid.step_m);
+  if (origin != nullptr) blank.voxel_m = static_cast<float>(origin->voxel_m);
   return Splitter(mesh, blank, grid, origin).split();
 }
 

@@ -43,11 +43,14 @@ struct MeshChunk {
   std::uint64_t boot = 0;  ///< Boot id of the sender; only set in received chunks.
   RobotId anchor = 0;      ///< Robot whose odometry frame is `world`.
   float step_m = 0.001F;
+  float voxel_m = 0.0F;  ///< Side of the voxels of the sender's map; 0: unknown.
   std::array<std::int32_t, 3> origin = {0, 0, 0};  ///< [step_m] in `world`.
   std::vector<Triple> offsets = {};                ///< Offset of each vertex [step_m].
   std::vector<LabelId> labels = {};                ///< Label of each vertex, or empty.
-  std::vector<Triple> faces = {};                  ///< Counter-clockwise seen from free space.
-  std::vector<MeshKeyframe> keyframes = {};        ///< Ascending; empty: the chunk never moves.
+  /// Colour of each vertex, or empty: 5 bits of red, 6 of green, 5 of blue, from the highest on.
+  std::vector<std::uint16_t> colors = {};
+  std::vector<Triple> faces = {};            ///< Counter-clockwise seen from free space.
+  std::vector<MeshKeyframe> keyframes = {};  ///< Ascending; empty: the chunk never moves.
   /// First and last view of each vertex; empty without `keyframes`.
   std::vector<std::array<View, 2>> views = {};
 
@@ -70,17 +73,22 @@ inline constexpr std::size_t kChunkFixedBytes = 116;
 
 /// Bytes of a chunk that is not packed, without keyframes.
 [[nodiscard]] constexpr std::size_t plain_bytes(std::size_t vertices, std::size_t faces,
-                                                bool labelled) {
-  return kChunkFixedBytes + (labelled ? 7 : 6) * vertices + 6 * faces;
+                                                bool labelled, bool coloured) {
+  return kChunkFixedBytes + (6 + (labelled ? 1 : 0) + (coloured ? 3 : 0)) * vertices + 6 * faces;
 }
 [[nodiscard]] inline std::size_t plain_bytes(const MeshChunk& chunk) {
-  return plain_bytes(chunk.offsets.size(), chunk.faces.size(), !chunk.labels.empty()) +
+  return plain_bytes(chunk.offsets.size(), chunk.faces.size(), !chunk.labels.empty(),
+                     !chunk.colors.empty()) +
          kMeshKeyframeBytes * chunk.keyframes.size() + 2 * chunk.views.size();
 }
 
 /// The reason why `chunk` cannot be from split_mesh() (a string literal), or null. Received chunks
 /// are used only after this check.
 [[nodiscard]] const char* fault_of(const MeshChunk& chunk);
+
+/// A colour as in MeshChunk::colors, and the colour that it states.
+[[nodiscard]] std::uint16_t packed_color(const LabelledMesh::Color& color);
+[[nodiscard]] LabelledMesh::Color unpacked_color(std::uint16_t packed);
 
 /// The grid of cells by which a mesh is split, and the grid to which positions are rounded.
 struct ChunkGrid {
@@ -96,7 +104,7 @@ struct SplitMesh {
 };
 
 /// Splits a mesh in `world` into chunks of at most kMaxChunkBytes. Positions
-/// err by up to half a step per axis. Colours, and vertices without faces, are dropped. A face
+/// err by up to half a step per axis. Vertices without faces are dropped. A face
 /// belongs to the cell of its centroid. An unchanged part of the mesh gives the same chunk if its
 /// vertices are in the same order; the order of faces does not matter.
 ///

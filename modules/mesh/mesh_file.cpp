@@ -313,7 +313,9 @@ void put(std::string& bytes, const T& value) {
 std::string header(const LabelledMesh& mesh) {
   std::string text = "ply\nformat binary_little_endian 1.0\nelement vertex ";
   text += std::to_string(mesh.vertices.size());
-  text += "\nproperty float x\nproperty float y\nproperty float z\n";
+  for (const char* name : {"x", "y", "z", "nx", "ny", "nz"})
+    text += std::string("\nproperty float ") + name;
+  text += '\n';
   if (!mesh.colors.empty())
     text += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
   if (!mesh.labels.empty()) text += "property uchar label\n";
@@ -324,8 +326,10 @@ std::string header(const LabelledMesh& mesh) {
 
 std::string encode(const LabelledMesh& mesh) {
   std::string bytes = header(mesh);
+  const std::vector<Eigen::Vector3f> normals = mesh.normals();
   for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
-    for (int axis = 0; axis < 3; ++axis) put(bytes, mesh.vertices[i][axis]);
+    for (const Eigen::Vector3f& vector : {mesh.vertices[i], normals[i]})
+      for (int axis = 0; axis < 3; ++axis) put(bytes, vector[axis]);
     if (!mesh.colors.empty()) put(bytes, mesh.colors[i]);
     if (!mesh.labels.empty()) put(bytes, mesh.labels[i]);
   }

@@ -9,13 +9,14 @@
 
 namespace km {
 
-/// Smooths noise of a surface and keeps its edges: a bilateral filter of the normals of faces, then
-/// vertices that follow these normals (Sun, Rosin, Martin and Langbein, "Fast and Effective
-/// Feature-Preserving Mesh Denoising", 2007, eqs. (5), (9)). Weights also contain the areas.
+/// Rounds of a filter that smooths a surface and keeps its edges (Sun, Rosin, Martin and Langbein,
+/// "Fast and Effective Feature-Preserving Mesh Denoising", 2007). A bilateral filter smooths the
+/// normals of faces; unlike there, its weights also contain the areas. Vertices then follow the
+/// normals.
 ///
 /// A vertex depends on the faces within kFilterRings rings around it only. Equal surroundings give
 /// equal results.
-inline constexpr int kNormalRounds = 8, kVertexRounds = 12;
+inline constexpr int kNormalRounds = 10, kVertexRounds = 12;
 inline constexpr int kFilterRings = kNormalRounds + kVertexRounds;
 
 /// The filtered positions of all vertices. Time proportional to the faces.

@@ -123,7 +123,7 @@ void SurfaceFusion::observe(const RobotSurface::Triangle& triangle,
         const float cosine = distance > same_m ? std::abs(height) / distance : 1.0F;
         const bool nearer = now.cosine < 0.0F || distance < before - same_m;
         if (!nearer && !(distance <= before + same_m && cosine > now.cosine)) continue;
-        now = {std::copysign(distance, height), cosine, normal, triangle.label};
+        now = {std::copysign(distance, height), cosine, normal, triangle.label, triangle.color};
       }
 }
 
@@ -143,12 +143,14 @@ void SurfaceFusion::blend(std::span<const std::vector<Observation>> robots) {
     };
     float sum = 0.0F;
     int count = 0, most = 0;
+    std::array<int, 3> color = {};
     LabelId label = nearest->label;
     for (const auto& robot : robots) {
       const Observation& seen = robot[v];
       if (!counts(seen)) continue;
       sum += seen.distance_m;
       ++count;
+      for (std::size_t c = 0; c < 3; ++c) color[c] += seen.color[c];
       // Unknown has no vote; of labels with as many votes the nearest surface's counts.
       const auto votes = static_cast<int>(std::ranges::count_if(robots, [&](const auto& other) {
         return counts(other[v]) && other[v].label == seen.label;
@@ -158,7 +160,9 @@ void SurfaceFusion::blend(std::span<const std::vector<Observation>> robots) {
         label = seen.label;
       }
     }
-    fused_[v] = {sum / static_cast<float>(count), label, true};
+    fused_[v] = {sum / static_cast<float>(count), label, {}, true};
+    for (std::size_t c = 0; c < 3; ++c)
+      fused_[v].color[c] = static_cast<std::uint8_t>(color[c] / count);
   }
 }
 
@@ -182,6 +186,11 @@ FusedBox SurfaceFusion::extract() const {
         {{first_[0] + x, first_[1] + y, first_[2] + z}, static_cast<std::uint8_t>(axis)});
     box.vertices.push_back(position(x, y, z) + share * voxel_m_ * Eigen::Vector3f::Unit(axis));
     box.labels.push_back(share < 0.5F ? near.label : far.label);
+    LabelledMesh::Color& color = box.colors.emplace_back();
+    for (std::size_t c = 0; c < 3; ++c)
+      color[c] = static_cast<std::uint8_t>(
+          static_cast<float>(near.color[c]) +
+          share * (static_cast<float>(far.color[c]) - static_cast<float>(near.color[c])));
     return index;
   };
   for (int z = 0; z < kSide; ++z)

@@ -18,6 +18,7 @@ struct RobotSurface {
   struct Triangle {
     std::array<Eigen::Vector3f, 3> corners;  ///< [m], counter-clockwise seen from free space.
     LabelId label = 0;
+    LabelledMesh::Color color = {0, 0, 0};
   };
   RobotId robot = 0;
   std::vector<Triangle> triangles;
@@ -36,6 +37,7 @@ struct FusedBox {
   std::vector<GridEdge> edges;            ///< Edge of each vertex.
   std::vector<Eigen::Vector3f> vertices;  ///< [m]
   std::vector<LabelId> labels;            ///< Label of each vertex.
+  std::vector<LabelledMesh::Color> colors;
   std::vector<LabelledMesh::Face> faces;
 };
 
@@ -83,10 +85,12 @@ class SurfaceFusion {
     float cosine = -1.0F;     // between the normal and the direction to the voxel; below 0: none
     Eigen::Vector3f normal = Eigen::Vector3f::Zero();
     LabelId label = 0;
+    LabelledMesh::Color color = {0, 0, 0};
   };
   struct Fused {
     float distance_m = 0.0F;
     LabelId label = 0;
+    LabelledMesh::Color color = {0, 0, 0};
     bool known = false;
   };
 

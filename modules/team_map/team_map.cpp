@@ -6,7 +6,9 @@
 #include <cmath>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <utility>
+#include <vector>
 
 #include "modules/team_map/surface_fusion.hpp"
 
@@ -25,6 +27,19 @@ LabelId label_of(const MeshChunk& chunk, const MeshChunk::Triple& face) {
   if (chunk.labels.empty()) return 0;
   const LabelId a = chunk.labels[face[0]], b = chunk.labels[face[1]], c = chunk.labels[face[2]];
   return b == c ? b : a;
+}
+
+// The mean of the corners; black without colours.
+LabelledMesh::Color color_of(const MeshChunk& chunk, const MeshChunk::Triple& face) {
+  LabelledMesh::Color mean = {0, 0, 0};
+  if (chunk.colors.empty()) return mean;
+  std::array<unsigned, 3> sum = {};
+  for (const std::uint16_t corner : face) {
+    const LabelledMesh::Color color = unpacked_color(chunk.colors[corner]);
+    for (std::size_t c = 0; c < 3; ++c) sum[c] += color[c];
+  }
+  for (std::size_t c = 0; c < 3; ++c) mean[c] = static_cast<std::uint8_t>(sum[c] / 3);
+  return mean;
 }
 
 Eigen::AlignedBox3f bounds_of(const std::array<Eigen::Vector3f, 3>& corners, float margin_m) {
@@ -80,7 +95,8 @@ std::vector<RobotSurface> surfaces_near(const Box& box,
       const auto corners = corners_of(*placed, face);
       const Eigen::AlignedBox3f bounds = bounds_of(corners, fusion.reach_m());
       if (space.intersects(bounds) && !is_left_out(bounds, fusion))
-        surfaces.back().triangles.push_back({corners, label_of(chunk, face)});
+        surfaces.back().triangles.push_back(
+            {corners, label_of(chunk, face), color_of(chunk, face)});
     }
   }
   return surfaces;
@@ -103,6 +119,7 @@ class BoxJoiner {
       if (place != next) continue;
       mesh_.vertices.push_back(box.vertices[v]);
       mesh_.labels.push_back(box.labels[v]);
+      mesh_.colors.push_back(box.colors[v]);
     }
     for (const auto& [a, b, c] : box.faces) mesh_.faces.push_back({index[a], index[b], index[c]});
   }
@@ -111,6 +128,21 @@ class BoxJoiner {
   LabelledMesh& mesh_;
   std::map<GridEdge, std::uint32_t> shared_;
 };
+
+// The voxels that the chunks state, see fuse_chunks().
+std::optional<double> stated_voxel_m(const std::vector<PlacedChunk>& chunks) {
+  std::map<RobotId, float> of_robot;
+  for (const PlacedChunk& chunk : chunks)
+    if (chunk.chunk->voxel_m > 0.0F) {
+      float& largest = of_robot[chunk.chunk->key.robot];
+      largest = std::max(largest, chunk.chunk->voxel_m);
+    }
+  if (of_robot.empty()) return std::nullopt;
+  std::vector<float> sizes;
+  for (const auto& [robot, size] : of_robot) sizes.push_back(size);
+  std::ranges::sort(sizes);
+  return static_cast<double>(sizes[(sizes.size() - 1) / 2]);
+}
 
 // The anchor of most chunks; the lowest of several.
 RobotId anchor_of(const std::vector<PlacedChunk>& chunks) {
@@ -124,10 +156,10 @@ RobotId anchor_of(const std::vector<PlacedChunk>& chunks) {
 }  // namespace
 
 TeamMap fuse_chunks(const std::vector<PlacedChunk>& chunks, double voxel_m) {
-  SurfaceFusion fusion(voxel_m);
+  SurfaceFusion fusion(stated_voxel_m(chunks).value_or(voxel_m));
   TeamMap map{.anchor = anchor_of(chunks), .mesh = {}};
   ChunksOfBoxes boxes;
-  bool is_labelled = false;
+  bool is_labelled = false, is_coloured = false;
   for (const PlacedChunk& chunk : chunks) {
     if (chunk.anchor != map.anchor) {
       ++map.other_frames;
@@ -135,6 +167,7 @@ TeamMap fuse_chunks(const std::vector<PlacedChunk>& chunks, double voxel_m) {
     }
     enter(chunk, fusion, boxes);
     is_labelled = is_labelled || !chunk.chunk->labels.empty();
+    is_coloured = is_coloured || !chunk.chunk->colors.empty();
   }
   BoxJoiner joiner(map.mesh);
   std::size_t fused = 0;
@@ -144,6 +177,7 @@ TeamMap fuse_chunks(const std::vector<PlacedChunk>& chunks, double voxel_m) {
   }
   map.left_out = boxes.size() - std::min(boxes.size(), kMaxMapBoxes);
   if (!is_labelled) map.mesh.labels.clear();
+  if (!is_coloured) map.mesh.colors.clear();
   return map;
 }
 

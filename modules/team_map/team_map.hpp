@@ -12,7 +12,7 @@ namespace km {
 /// The fused mesh of a team.
 struct TeamMap {
   RobotId anchor = 0;  ///< Robot whose odometry frame is `world`.
-  LabelledMesh mesh;   ///< In `world`, without colours; with labels if any chunk has some.
+  LabelledMesh mesh;   ///< In `world`; with labels and colours if any chunk has some.
   std::size_t other_frames =
       0;                     ///< Chunks that were left out, because their anchor is another one.
   std::size_t left_out = 0;  ///< Boxes with surface that were left out (kMaxMapBoxes).
@@ -28,7 +28,9 @@ inline constexpr std::size_t kMaxMapBoxes = std::size_t{1} << 17U;
 /// The result depends on the placed chunks and the voxels alone, bit by bit (on processors with the
 /// same arithmetic). Two robots with the same chunks and poses therefore have the same map.
 ///
-/// Throws std::invalid_argument for a size of voxels that is not positive.
+/// The voxels are those of the robots' maps: for each robot the largest that its chunks state, and
+/// of these the median, the lower one of two. Without statements they have `voxel_m`. Throws
+/// std::invalid_argument if this is not positive.
 [[nodiscard]] TeamMap fuse_chunks(const std::vector<PlacedChunk>& chunks, double voxel_m);
 
 /// A mesh on its own in voxels of another size. Throws under the conditions of split_mesh() and

@@ -58,6 +58,7 @@ void describe(auto& archive, As<MeshChunk> auto& chunk) {
   for (auto& c : chunk.origin) archive.fixed(c);
   triples(chunk.offsets);
   archive.list(chunk.labels, kMaxViewBytes, 1, [&](auto& label) { archive(label); });
+  archive.list(chunk.colors, kMaxViewBytes, 2, [&](auto& color) { archive.fixed(color); });
   triples(chunk.faces);
   archive.require(fault_of(chunk) == nullptr);
 }

@@ -7,9 +7,11 @@ function parseBinary(buffer) {
   const begin = 4 + length;
   message.bytes = buffer.byteLength;
   if (message.kind === 'mesh') {
-    const faces = begin + 6 * message.vertices, labels = faces + 6 * message.faces;
+    const faces = begin + 6 * message.vertices, tints = faces + 6 * message.faces;
+    const labels = tints + (message.coloured ? 2 * message.vertices : 0);
     message.positions = new Uint16Array(buffer, begin, 3 * message.vertices);
     message.triangles = new Uint16Array(buffer, faces, 3 * message.faces);
+    if (message.coloured) message.tints = new Uint16Array(buffer, tints, message.vertices);
     if (message.labelled) message.labels = new Uint8Array(buffer, labels, message.vertices);
   } else if (message.kind === 'raster') {
     message.runs = new Uint8Array(buffer, begin);

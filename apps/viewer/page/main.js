@@ -236,6 +236,7 @@ $('measure').onclick = () => {
 
 const meshModes = {
   labels: 'Labels',
+  colors: 'Colours',
   robots: 'Robots',
   team: 'Team',
   normals: 'Normals',

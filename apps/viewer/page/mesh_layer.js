@@ -82,7 +82,7 @@ export class MeshLayer {
 
   material(of, labelled) {
     if (this.mode === 'normals') return this.materials.normals;
-    if (['labels', 'team'].includes(this.mode) && labelled) return this.materials.labels;
+    if (['labels', 'colors', 'team'].includes(this.mode) && labelled) return this.materials.labels;
     const {robots} = this.materials;
     if (!robots.has(of)) {
       const color = new THREE.Color(robotColor(of)).lerp(new THREE.Color('#c8ccd2'), 0.35);
@@ -102,7 +102,11 @@ export class MeshLayer {
 
   dress(object, {of, team}) {
     object.visible = this.mode !== 'off' && team === (this.mode === 'team');
-    if (object.visible) object.material = this.material(of, !!object.geometry.attributes.color);
+    if (!object.visible) return;
+    const {geometry} = object, {tints, labels} = object.userData;
+    const colors = (this.mode === 'colors' ? tints : labels) ?? tints ?? labels;
+    if (colors) geometry.setAttribute('color', colors);
+    object.material = this.material(of, !!colors);
   }
 
   // One object for chunks with at most MAX_INDEX + 1 vertices together.
@@ -114,6 +118,7 @@ export class MeshLayer {
     const positions = new (fits ? Uint16Array : Float32Array)(3 * vertices);
     const normals = new Int8Array(4 * vertices);
     const colors = labelled ? new Uint8Array(4 * vertices) : null;
+    const tints = messages.some((m) => m.tints) ? new Uint8Array(4 * vertices) : null;
     const triangles = new Uint16Array(3 * sum((m) => m.faces));
     let first = 0, at = 0;
     for (const message of messages) {
@@ -129,16 +134,20 @@ export class MeshLayer {
         colors.set(this.colors[label], 4 * (first + i));
         this.labels.add(label);
       });
+      message.tints?.forEach((c, i) => {
+        tints.set([(c >> 11) * 8.2, ((c >> 5) & 63) * 4.05, (c & 31) * 8.2], 4 * (first + i));
+      });
       for (const index of message.triangles) triangles[at++] = first + index;
       first += message.vertices;
     }
     const geometry = new THREE.BufferGeometry();
     geometry.setAttribute('position', new THREE.BufferAttribute(positions, 3));
     geometry.setAttribute('normal', new THREE.BufferAttribute(normals, 4, true));
-    if (colors) geometry.setAttribute('color', new THREE.BufferAttribute(colors, 4, true));
     geometry.setIndex(new THREE.BufferAttribute(triangles, 1));
     const object = new THREE.Mesh(geometry);
     object.matrixAutoUpdate = false;
+    const attribute = (values) => values && new THREE.BufferAttribute(values, 4, true);
+    object.userData = {labels: attribute(colors), tints: attribute(tints)};
     const s = messages[0].step_m;
     object.userData.own =
         new THREE.Matrix4().makeScale(s, s, s).setPosition(...base.map((x) => s * x));

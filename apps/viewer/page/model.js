@@ -178,7 +178,7 @@ export class Model {
       this.byNumber.delete(n);
       this.bytes -= message.bytes ?? 0;
       for (const bulk
-               of ['positions', 'triangles', 'labels', 'jpeg', 'pixels', 'T_world_kf',
+               of ['positions', 'triangles', 'labels', 'tints', 'jpeg', 'pixels', 'T_world_kf',
                    'T_odom_body', 'runs'])
         delete message[bulk];
       message.gone = true;

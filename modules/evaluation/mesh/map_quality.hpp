@@ -26,15 +26,14 @@ struct MappedShare {
   double within_5cm = 0.0, within_20cm = 0.0;  ///< 0 to 1.
 };
 
-/// What a planner or a viewer needs of a map: how much of the seen surface it has, and how smooth
-/// its walls are.
+/// How much of the seen surface a map has, and how smooth its walls are.
 struct MapQuality {
   static constexpr std::array<float, 3> kDepths_m = {10.0F, 20.0F, 40.0F};
 
   std::array<MappedShare, 3> by_depth;     ///< Up to each of kDepths_m, from the one before on.
   std::array<MappedShare, 256> by_class;   ///< By true label, of the points seen below 20 m.
   double within_5cm = 0.0;                 ///< Share of the map within this distance of the truth.
-  double within_10cm = 0.0;                ///< The same for 10 cm.
+  double within_10cm = 0.0;                ///< Share within 10 cm.
   double median_mm = 0.0;                  ///< Median distance from the map to the truth.
   double wall_deg = 0.0, floor_deg = 0.0;  ///< Median angle between a face and the true plane.
   double wall_rms_mm = 0.0;                ///< Rms distance to the local plane (cells of 0.5 m).

@@ -41,10 +41,12 @@ Codec<MeshChunk>::Encoded Codec<MeshChunk>::encode(const MeshChunk& chunk) {
   wire.part = chunk.key.part;
   wire.anchor = chunk.anchor;
   wire.step_m = chunk.step_m;
+  wire.voxel_m = chunk.voxel_m;
   wire.origin = {.x = chunk.origin[0], .y = chunk.origin[1], .z = chunk.origin[2]};
   wire.vertices = static_cast<std::uint16_t>(chunk.offsets.size());
   wire.faces = static_cast<std::uint16_t>(chunk.faces.size());
   wire.is_labelled = !chunk.labels.empty();
+  wire.is_coloured = !chunk.colors.empty();
   encoded.keyframes = to_wire(chunk.keyframes);
   borrow(wire.keyframes, encoded.keyframes);
   borrow(wire.content, encoded.content);
@@ -60,11 +62,13 @@ Decoded<MeshChunk> Codec<MeshChunk>::decode(const Wire& wire, const TeamPeer& wr
                   .boot = writer.boot,
                   .anchor = wire.anchor,
                   .step_m = wire.step_m,
+                  .voxel_m = wire.voxel_m,
                   .origin = {wire.origin.x, wire.origin.y, wire.origin.z},
                   .keyframes = from_wire(*keyframes)};
   const ChunkCounts counts{.vertices = wire.vertices,
                            .faces = wire.faces,
                            .labelled = wire.is_labelled,
+                           .coloured = wire.is_coloured,
                            .seen = !chunk.keyframes.empty()};
   if (!unpack(*content, counts, chunk)) return Result::refuse("a chunk that cannot be unpacked");
   if (const char* fault = fault_of(chunk)) return Result::refuse(fault);

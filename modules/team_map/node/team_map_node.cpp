@@ -36,7 +36,8 @@ void TeamMapNode::handle(const Input& input) {
 TeamMap TeamMapNode::fuse() const {
   const std::lock_guard lock(mutex_);
   TeamMap map = fuse_chunks(chunks_.placed(), voxel_m_);
-  if (!palette_.classes().empty() && !map.mesh.labels.empty()) map.mesh.colour_by(palette_);
+  if (map.mesh.colors.empty() && !palette_.classes().empty() && !map.mesh.labels.empty())
+    map.mesh.colour_by(palette_);
   return map;
 }
 

@@ -35,7 +35,6 @@ TEST_CASE("A mesh is read back from glTF with its classes as materials", "[expor
   const TemporaryFolder folder;
   const auto file = folder.path() / "room.glb";
   LabelledMesh mesh = room();
-  mesh.colors.assign(mesh.vertices.size(), {9, 9, 9});
   const LabelPalette palette({{1, "floor", {255, 0, 128}}, {2, "west", {0, 10, 0}}});
   write_glb(file, mesh, palette);
   const tinygltf::Model model = read_glb(file);
@@ -47,6 +46,8 @@ TEST_CASE("A mesh is read back from glTF with its classes as materials", "[expor
   CHECK(std::memcmp(positions.data(), mesh.vertices.data(), positions.size() * sizeof(float)) == 0);
   CHECK(model.accessors[0].maxValues == std::vector<double>{4, 3, 2});
   CHECK_FALSE(primitives[0].attributes.contains("COLOR_0"));  // in the materials
+  const auto normals = values_of<float>(model, primitives[0].attributes.at("NORMAL"), 3);
+  CHECK(std::vector(normals.begin(), normals.begin() + 3) == std::vector{0.0F, 0.0F, 1.0F});
   std::size_t faces = 0;
   for (std::size_t i = 0; i < 5; ++i) {
     const auto indices = values_of<std::uint32_t>(model, primitives[i].indices, 1);
@@ -68,6 +69,13 @@ TEST_CASE("A mesh is read back from glTF with its classes as materials", "[expor
   const auto q = model.nodes.at(0).rotation;
   const Eigen::Quaterniond rotation(q.at(3), q.at(0), q.at(1), q.at(2));
   CHECK((rotation * Eigen::Vector3d::UnitZ()).isApprox(Eigen::Vector3d::UnitY()));
+
+  mesh.colors.assign(mesh.vertices.size(), {9, 9, 9});  // colours of a camera
+  write_glb(file, mesh, palette);
+  const tinygltf::Model coloured = read_glb(file);
+  CHECK(coloured.meshes.at(0).primitives[0].attributes.contains("COLOR_0"));
+  CHECK(coloured.materials.at(0).pbrMetallicRoughness.baseColorFactor ==
+        std::vector{1.0, 1.0, 1.0, 1.0});
 }
 
 TEST_CASE("A mesh without labels has one material and the colours of its vertices", "[exports]") {

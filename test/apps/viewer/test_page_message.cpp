@@ -55,16 +55,18 @@ TEST_CASE("A mesh is sent as its arrays, one after the other", "[page_message]")
   MeshChunk chunk{.key = {3, {-1, 0, 7}, 2}, .anchor = 1};
   chunk.offsets = {{1, 2, 3}, {4, 5, 6}, {7, 8, 65535}};
   chunk.labels = {9, 8, 7};
+  chunk.colors = {0xF800, 0x07E0, 0x001F};
   chunk.faces = {{0, 1, 2}};
   const auto [object, data] = parts_of(page_message({3, 1, 0, chunk}, 1));
   CHECK(object["cell"] == json::parse("[-1, 0, 7]"));
   CHECK(object["vertices"] == 3);
   CHECK(object["faces"] == 1);
   CHECK(object["anchor"] == 1);
-  std::array<std::uint16_t, 12> numbers{};
+  std::array<std::uint16_t, 15> numbers{};
   REQUIRE(data.size() == sizeof(numbers) + 3);
   std::memcpy(numbers.data(), data.data(), sizeof(numbers));
-  CHECK(numbers == std::array<std::uint16_t, 12>{1, 2, 3, 4, 5, 6, 7, 8, 65535, 0, 1, 2});
+  CHECK(numbers == std::array<std::uint16_t, 15>{1, 2, 3, 4, 5, 6, 7, 8, 65535, 0, 1, 2, 0xF800,
+                                                 0x07E0, 0x001F});
   CHECK(data.substr(sizeof(numbers)) == "\x09\x08\x07");
   CHECK_FALSE(object.contains("team"));  // a chunk of another robot is of the mesh of the team
   CHECK(parts_of(page_message({2, 1, 0, chunk}, 1)).first["team"] == true);

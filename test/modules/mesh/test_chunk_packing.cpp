@@ -15,7 +15,11 @@ namespace km {
 namespace {
 
 ChunkCounts counts_of(const MeshChunk& chunk) {
-  return {chunk.offsets.size(), chunk.faces.size(), !chunk.labels.empty(), !chunk.views.empty()};
+  return {.vertices = chunk.offsets.size(),
+          .faces = chunk.faces.size(),
+          .labelled = !chunk.labels.empty(),
+          .coloured = !chunk.colors.empty(),
+          .seen = !chunk.views.empty()};
 }
 
 // The chunk after packing and unpacking.
@@ -24,6 +28,7 @@ MeshChunk unpacked(const MeshChunk& chunk) {
   result.offsets.clear();
   result.faces.clear();
   result.labels.clear();
+  result.colors.clear();
   result.views.clear();
   CHECK(unpack(packed(chunk), counts_of(chunk), result));
   return result;
@@ -48,6 +53,8 @@ MeshChunk shuffled_chunk() {
   for (const Eigen::Vector3f& p : mesh.vertices)
     origin.seen_by.push_back(p.x() < 0.0F ? Seen{0, 2} : Seen{3, 8});
   for (const Eigen::Vector3f& p : mesh.vertices)
+    mesh.colors.push_back({static_cast<std::uint8_t>(100.0F + 40.0F * p.x()), 40, 250});
+  for (const Eigen::Vector3f& p : mesh.vertices)
     origin.mapped.emplace_back(p + Eigen::Vector3f::Constant(10.0F));
   return split_mesh(mesh, 1, 0, {.cell_m = 20.0}, &origin).chunks.at(0);
 }
@@ -59,7 +66,8 @@ auto content_of(const MeshChunk& chunk, MeshChunk::Triple face) {
   std::ranges::rotate(face, lowest);
   std::vector<std::pair<MeshChunk::Triple, std::vector<int>>> corners;
   for (const std::uint16_t v : face)
-    corners.push_back({chunk.offsets[v], {chunk.labels[v], chunk.views[v][0], chunk.views[v][1]}});
+    corners.push_back({chunk.offsets[v],
+                       {chunk.labels[v], chunk.colors[v], chunk.views[v][0], chunk.views[v][1]}});
   return corners;
 }
 
@@ -71,6 +79,9 @@ TEST_CASE("A chunk is equal after packing and unpacking", "[mesh]") {
   SECTION("without labels") {
     chunk.labels.clear();
   }
+  SECTION("without colours") {
+    chunk.colors.clear();
+  }
   SECTION("without views") {
     chunk.views.clear();
   }
@@ -78,6 +89,7 @@ TEST_CASE("A chunk is equal after packing and unpacking", "[mesh]") {
     chunk.offsets = {{0, 65535, 32768}, {65535, 0, 0}, {32767, 65535, 1}};
     chunk.faces = {{65535, 0, 32768}, {0, 65535, 0}, {32767, 32768, 32767}};
     chunk.labels = {0, 255, 128};
+    chunk.colors = {0, 65535, 0x8410};
     chunk.views = {{{0, 255}}, {{255, 0}}, {{127, 128}}};
   }
   SECTION("with random numbers") {

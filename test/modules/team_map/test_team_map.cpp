@@ -1,6 +1,7 @@
 #include <catch2/catch.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <random>
 #include <vector>
@@ -71,6 +72,29 @@ TEST_CASE("Copies of a floor are fused between them, and every part is there onc
     const bool near_border = std::abs(p.x() - 2.0F) < 0.2F || std::abs(p.x() - 4.0F) < 0.2F ||
                              std::abs(p.y() - 1.5F) > 1.4F;
     if (!near_border) CHECK(height == Approx(expected).margin(3e-3));
+  }
+}
+
+TEST_CASE("The fused map has the colours of its chunks, and the median of their voxels",
+          "[team_map]") {
+  TeamMesh team;
+  for (RobotId robot = 0; robot < 3; ++robot) {
+    LabelledMesh floor = floor_from(0.0F, 0.0F);
+    floor.colors.assign(floor.vertices.size(), {static_cast<std::uint8_t>(80 * robot), 200, 40});
+    for (MeshChunk chunk : chunks_of(floor, robot)) {
+      chunk.voxel_m = std::array{0.04F, 0.1F, 0.9F}[robot];
+      CHECK(team.add(chunk) == ChunkVerdict::kTaken);
+    }
+  }
+  const LabelledMesh mesh = fused(team);
+  CHECK(mesh.faces.size() == fuse_chunks(team.placed(), 1.0).mesh.faces.size());
+  CHECK(mesh.faces.size() > 2000);  // 2400, two in each square of 0.1 m, and some more on slopes
+  CHECK(mesh.faces.size() < 4800);
+  REQUIRE(mesh.colors.size() == mesh.vertices.size());
+  for (const auto& [red, green, blue] : mesh.colors) {
+    CHECK(std::abs(red - 80) <= 8);  // five bits
+    CHECK(std::abs(green - 200) <= 4);
+    CHECK(std::abs(blue - 40) <= 8);
   }
 }
 
