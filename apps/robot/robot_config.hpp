@@ -116,7 +116,7 @@ struct MappingConfig {
   DenseSource depth = DenseSource::kAuto;
   DenseSource labels = DenseSource::kAuto;
   double rate_hz = 5.0;
-  double max_depth_error_m = 0.2;
+  double max_depth_error_m = 0.5;
   double mesh_interval_s = 3.0;
 
   void visit_fields(auto& visitor) {
@@ -140,9 +140,8 @@ struct MappingConfig {
                   "[1/s] frames that go into the map, by their stamps; a mapper that is too slow "
                   "skips frames, except at --rate auto and max, where the recording waits for it");
     visitor.field("max_depth_error_m", max_depth_error_m, {0.001, 100.0},
-                  "[m] largest expected standard deviation of depths that are used; beyond half of "
-                  "semantic_mapping's truncation surfaces have holes and steps; the standard "
-                  "deviation follows from a quarter of a pixel of disparity, see usable_range_m()");
+                  "[m] largest expected standard deviation of depths that are used; see "
+                  "semantic_mapping.depth_sigma_per_m");
     visitor.field("mesh_interval_s", mesh_interval_s, {0.1, 3600.0},
                   "[s] interval between meshes, which are corrected and written to files");
   }

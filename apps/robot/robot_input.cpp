@@ -457,13 +457,16 @@ std::optional<MappingPlan> plan_mapping(const MappingConfig& config,
   return plan;
 }
 
-double depth_sigma_per_m(const StereoRig& rig) {
-  constexpr double kDisparityError_px = 0.25;
-  return kDisparityError_px / (rig.cameras[0].fx * rig.baseline_m());
+std::optional<double> depth_baseline_m(const RobotOptions& options) {
+  if (has_messages(options) || layout_of(options.dataset) != FolderLayout::kEuroc)
+    return std::nullopt;
+  return read_depth_baseline_m(find_mav0(options.dataset));
 }
 
-double usable_range_m(const StereoRig& rig, double max_error_m) {
-  return std::sqrt(max_error_m / depth_sigma_per_m(rig));
+double depth_sigma_per_m(const StereoRig& rig, const MappingPlan& plan) {
+  constexpr double kStereoError_px = 0.36, kDepthImageError_px = 0.125;
+  const double error_px = plan.reads_depth() ? kDepthImageError_px : kStereoError_px;
+  return error_px / (rig.cameras[0].fx * plan.depth_baseline_m.value_or(rig.baseline_m()));
 }
 
 std::vector<RosTopic> live_topics(const SensorTopicNames& names) {

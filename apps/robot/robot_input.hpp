@@ -30,6 +30,8 @@ namespace km {
 struct MappingPlan {
   DenseSensorConfig sensor;
   LabelPalette palette;  ///< Empty without labels.
+  /// Baseline of a stereo camera with the errors of the depth images; absent: that of the rig.
+  std::optional<double> depth_baseline_m = {};
 
   [[nodiscard]] bool reads_depth() const { return sensor.depth == DepthFrom::kImages; }
   [[nodiscard]] bool reads_labels() const { return sensor.labels == LabelsFrom::kImages; }
@@ -59,14 +61,14 @@ struct ImageSources {
                                                       const SegmentationConfig& segmentation,
                                                       const std::optional<ImageSources>& sources);
 
-/// Standard deviation of a depth of `rig` over the square of the depth [1/m], if that of a
-/// disparity is a quarter of a pixel: 0.25 px / (f * baseline). With an RGB-D rig the baseline is
-/// the virtual one, see rgbd_rig(). With stereo cameras, depth images are assumed to be no better
-/// than stereo depth.
-[[nodiscard]] double depth_sigma_per_m(const StereoRig& rig);
+/// The baseline_m of the depth images beside a stereo pair in EuRoC's layout, nullopt for other
+/// inputs. Throws DatasetError.
+[[nodiscard]] std::optional<double> depth_baseline_m(const RobotOptions& options);
 
-/// Distance at which the standard deviation of the depth of `rig` is `max_error_m`.
-[[nodiscard]] double usable_range_m(const StereoRig& rig, double max_error_m);
+/// Standard deviation of a depth over the square of the depth [1/m]: e / (f * baseline). For stereo
+/// depth, e is 0.36 px, the rms error of StereoDepth below one pixel in rendered images. For depth
+/// images, e is an eighth of a pixel, the step of structured light.
+[[nodiscard]] double depth_sigma_per_m(const StereoRig& rig, const MappingPlan& plan);
 
 /// No input: the robot of a finished run stands still and serves the others.
 struct PastRun {};

@@ -600,8 +600,9 @@ int run_robot(const RobotOptions& asked, SignalWatch& signals,
   RobotOptions options = asked;
   const RobotConfig config = load_robot_config(options);
   const RigInput rig = read_rig_input(options);
-  const std::optional<MappingPlan> mapping = plan_mapping(
+  std::optional<MappingPlan> mapping = plan_mapping(
       config.mapping, config.stereo_depth, config.segmentation, sources_of(options, rig.messages));
+  if (mapping && mapping->reads_depth()) mapping->depth_baseline_m = depth_baseline_m(options);
   std::optional<RobotInput> input = open_robot_input(options, config, mapping, rig, signals);
   if (!input) {
     log::info("robot") << "interrupted before the calibration was complete: no results";

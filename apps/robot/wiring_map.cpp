@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "apps/robot/wiring.hpp"
@@ -15,9 +16,10 @@ void Robot::add_mapping(const RobotConfig& config, const PlaybackPace& pace, con
                         const MappingPlan& plan, std::optional<ResumedMap> before) {
   const Overflow overflow = pace.waits ? Overflow::kBlock : Overflow::kDropOldest;
   SemanticMappingConfig map = config.semantic_mapping;
-  map.max_range_m =
-      std::min(map.max_range_m, usable_range_m(rig, config.mapping.max_depth_error_m));
-  if (!map.depth_sigma_per_m && !plan.reads_depth()) map.depth_sigma_per_m = depth_sigma_per_m(rig);
+  if (!map.depth_sigma_per_m) map.depth_sigma_per_m = depth_sigma_per_m(rig, plan);
+  if (*map.depth_sigma_per_m > 0.0)
+    map.max_range_m = std::min(
+        map.max_range_m, std::sqrt(config.mapping.max_depth_error_m / *map.depth_sigma_per_m));
   DenseSensor sensor(rig, plan.sensor);
   const Camera camera = sensor.camera();
   add<DenseSensingNode>(true, std::move(sensor), plan.sensor.labels, config.mapping.rate_hz,
@@ -40,8 +42,7 @@ void Robot::add_mapping(const RobotConfig& config, const PlaybackPace& pace, con
   if (before) mapper.continue_from(*std::move(before));
   ray_thinner_.emplace(camera, map.max_range_m);
   add<DistanceFieldNode>(
-      true, map.voxel_size_m,
-      DistanceFieldTopics{.space = topics_.space_updates, .slices = topics_.distance_slices});
+      true, DistanceFieldTopics{.space = topics_.space_updates, .slices = topics_.distance_slices});
 }
 
 void Robot::add_mesh_correction(const RobotConfig& config) {
@@ -78,7 +79,7 @@ CrossingEnds Robot::share_meshes(const RobotConfig& robot, const LabelPalette& p
   const MapSharingConfig& config = robot.map;
   if (config.team == TeamMapMode::kOff) return {.send = false, .receive = false};
   const bool coarse = config.team == TeamMapMode::kCoarse;
-  const double voxel_m = coarse ? config.coarse_voxel_m : robot.semantic_mapping.voxel_size_m;
+  const double voxel_m = config.coarse_voxel_m;
   team_map_ = &add<TeamMapNode>(false, voxel_m, palette,
                                 TeamMapTopics{.own_chunks = topics_.sent_chunks,
                                               .received_chunks = topics_.chunks.from_peers(),

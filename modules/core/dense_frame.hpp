@@ -2,6 +2,7 @@
 
 #include <memory>
 
+#include "modules/core/color_image.hpp"
 #include "modules/core/frame.hpp"
 #include "modules/core/geometry.hpp"
 #include "modules/core/ids.hpp"
@@ -17,6 +18,8 @@ struct DenseFrame {
   std::shared_ptr<const LabelImage> labels = nullptr;
   SE3 T_odom_cam = SE3::Identity();  ///< Pose in the frame of T_odom_kf.
   KeyframeIndex keyframe = 0;        ///< Last keyframe of the robot at that time.
+  /// Colours in the camera of `depth`, grey ones of a grey image; null if unknown.
+  std::shared_ptr<const ColorImage> color = nullptr;
 };
 
 }  // namespace km

@@ -24,7 +24,9 @@ DenseSensor::DenseSensor(const StereoRig& rig, const DenseSensorConfig& config)
 DenseImages DenseSensor::sense(const StereoFrame& frame) {
   DenseImages images;
   add_depth(frame, images);
-  if (images.problem == DenseProblem::kNone) add_labels(frame, images);
+  if (images.problem != DenseProblem::kNone) return images;
+  add_labels(frame, images);
+  add_color(frame, images);
   return images;
 }
 
@@ -41,6 +43,15 @@ void DenseSensor::add_depth(const StereoFrame& frame, DenseImages& images) {
   } else {
     images.depth = frame.depth;
   }
+}
+
+void DenseSensor::add_color(const StereoFrame& frame, DenseImages& images) const {
+  if (!fits(frame.left, left_)) return;
+  ColorImage gray{frame.left.width, frame.left.height, {}};
+  gray.pixels.reserve(frame.left.pixels.size());
+  for (const std::uint8_t value : frame.left.pixels) gray.pixels.push_back({value, value, value});
+  images.color = std::make_shared<const ColorImage>(
+      stereo_ ? stereo_->rectification().rectified(gray) : std::move(gray));
 }
 
 void DenseSensor::add_labels(const StereoFrame& frame, DenseImages& images) {

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "modules/core/camera.hpp"
+#include "modules/core/color_image.hpp"
 #include "modules/core/frame.hpp"
 #include "modules/dense_sensing/segmentation_network.hpp"
 #include "modules/dense_sensing/stereo_depth.hpp"
@@ -44,6 +45,7 @@ struct [[nodiscard]] DenseImages {
   DenseProblem problem = DenseProblem::kNone;
   std::shared_ptr<const DepthImage> depth;   ///< Null if there is a problem.
   std::shared_ptr<const LabelImage> labels;  ///< Null without labels.
+  std::shared_ptr<const ColorImage> color;   ///< Grey if the camera is. Null if there is a problem.
   bool wrong_label_size = false;    ///< Labels of another size than the left camera's are dropped.
   std::size_t unmapped_pixels = 0;  ///< Pixels of classes that the label map of the network lacks,
                                     ///< see Segmentation.
@@ -64,6 +66,7 @@ class DenseSensor {
  private:
   void add_depth(const StereoFrame& frame, DenseImages& images);
   void add_labels(const StereoFrame& frame, DenseImages& images);
+  void add_color(const StereoFrame& frame, DenseImages& images) const;
 
   Camera left_, right_;
   LabelsFrom labels_;

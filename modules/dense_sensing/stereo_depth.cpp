@@ -207,6 +207,15 @@ LabelImage StereoRectification::rectified(const LabelImage& labels) const {
   return result;
 }
 
+ColorImage StereoRectification::rectified(const ColorImage& color) const {
+  ColorImage result{camera_.width, camera_.height, {}};
+  result.pixels.reserve(left_pixel_.size());
+  for (const std::int32_t index : left_pixel_)
+    result.pixels.push_back(index == kOutside ? ColorImage::Pixel()
+                                              : color.pixels[static_cast<std::size_t>(index)]);
+  return result;
+}
+
 StereoDepth::StereoDepth(const StereoRig& rig, const StereoDepthConfig& config)
     : config_(checked_depths(config)),
       rectification_(rig, config_.downscale),

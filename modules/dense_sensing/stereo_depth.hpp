@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "modules/core/camera.hpp"
+#include "modules/core/color_image.hpp"
 #include "modules/core/frame.hpp"
 #include "modules/core/label_palette.hpp"
 #include "modules/dense_sensing/stereo_depth_config.hpp"
@@ -34,6 +35,9 @@ class StereoRectification {
   /// The labels of the nearest pixels; 0 outside the real camera's view. Precondition: `labels` has
   /// the left camera's size.
   [[nodiscard]] LabelImage rectified(const LabelImage& labels) const;
+
+  /// The colours of the nearest pixels; black outside. Precondition: `color` has that size too.
+  [[nodiscard]] ColorImage rectified(const ColorImage& color) const;
 
  private:
   static constexpr std::int32_t kOutside = -1;

@@ -100,6 +100,40 @@ NearBlocks select_near_blocks(const DepthView& view, const SE3& T_odom_cam, doub
   return selector.result();
 }
 
+float exposure_gain(const DepthView& view, const SE3& T_odom_cam, double voxel_size_m,
+                    const BlockMap& map) {
+  constexpr int kStep_px = 12;
+  constexpr std::size_t kLeastPixels = 50;
+  constexpr int kDark = 30, kBright = 720;  // sums of three channels of usable pixels
+  if (view.colors.empty() || map.size() == 0) return 1.0F;
+  const auto sum_of = [](const ColorImage::Pixel& color) { return color[0] + color[1] + color[2]; };
+  std::size_t count = 0;
+  double of_map = 0.0, of_view = 0.0;
+  for (int v = 0; v < view.height; v += kStep_px)
+    for (int u = 0; u < view.width; u += kStep_px) {
+      const std::size_t pixel = static_cast<std::size_t>(v) * static_cast<std::size_t>(view.width) +
+                                static_cast<std::size_t>(u);
+      const float depth = DepthView::depth_m(view.pixels[pixel]);
+      const int seen = sum_of(view.colors[pixel]);
+      if (depth <= 0.0F || seen < kDark || seen > kBright) continue;
+      const Eigen::Vector3f ray((static_cast<float>(u) - view.cx) / view.fx,
+                                (static_cast<float>(v) - view.cy) / view.fy, 1.0F);
+      const Eigen::Vector3d at = T_odom_cam * (depth * ray).cast<double>().eval() / voxel_size_m;
+      if (!(at.cwiseAbs().maxCoeff() < 1e7)) continue;
+      const Eigen::Vector3i voxel = at.array().round().cast<int>();
+      const Eigen::Vector3i inside = voxel.unaryExpr([](int x) { return x & (kBlockSide - 1); });
+      const VoxelBlock* block = map.find((voxel - inside) / kBlockSide);
+      if (block == nullptr || block->colors == nullptr) continue;
+      const VoxelColor& known = (*block->colors)[voxel_index(inside.x(), inside.y(), inside.z())];
+      if (known.quality == 0) continue;
+      ++count;
+      of_map += sum_of(known.color);
+      of_view += seen;
+    }
+  if (count < kLeastPixels) return 1.0F;
+  return static_cast<float>(std::clamp(of_map / of_view, 0.5, 2.0));
+}
+
 // Eight voxels along x. Plain loops over arrays, which the compiler vectorises.
 struct BlockFusion::Row {
   alignas(32) std::array<float, kBlockSide> z;                // [m]
@@ -111,8 +145,8 @@ struct BlockFusion::Row {
 };
 
 BlockFusion::BlockFusion(const SemanticMappingConfig& config, const DepthView& view,
-                         const SE3& T_odom_cam, KeyframeIndex keyframe)
-    : view_(view), keyframe_(keyframe) {
+                         const SE3& T_odom_cam, KeyframeIndex keyframe, float gain)
+    : view_(view), keyframe_(keyframe), gain_(gain) {
   const SE3 T_cam_odom = T_odom_cam.inverse();
   Eigen::Matrix3d K = Eigen::Matrix3d::Identity();
   // Half a pixel is added, so that truncation rounds to the nearest pixel.
@@ -121,10 +155,10 @@ BlockFusion::BlockFusion(const SemanticMappingConfig& config, const DepthView& v
       0.0, 0.0, 1.0;
   M_ = K * T_cam_odom.linear();
   offset_ = K * T_cam_odom.translation();
-  step_ = (config.voxel_size_m * M_).cast<float>();
-  block_m_ = kBlockSide * config.voxel_size_m;
+  step_ = (config.voxel_m() * M_).cast<float>();
+  block_m_ = kBlockSide * config.voxel_m();
 
-  voxel_ = static_cast<float>(config.voxel_size_m);
+  voxel_ = static_cast<float>(config.voxel_m());
   truncation_ = static_cast<float>(SemanticMappingConfig::kTruncation_voxels) * voxel_;
   near_ = kNearVoxels * voxel_;
   closest_ = 0.5F * static_cast<float>(std::max(config.min_range_m, 0.01));
@@ -251,6 +285,27 @@ void BlockFusion::vote(const Row& row, VoxelLabels* labels) const {
   }
 }
 
+// The colour of a voxel is that of its nearest views. A clearly better view replaces the colour,
+// and one of the same quality moves it by a quarter.
+void BlockFusion::tint(const Row& row, VoxelColor* colors) const {
+  constexpr int kBetter = 16;
+  for (std::size_t i = 0; i < kBlockSide; ++i) {
+    if ((row.near_bits >> i & 1U) == 0) continue;
+    const ColorImage::Pixel& seen = view_.colors[static_cast<std::size_t>(row.index[i])];
+    const int quality = 1 + static_cast<int>(254.0F * std::sqrt(std::sqrt(row.observed_weight[i])));
+    VoxelColor& voxel = colors[i];
+    if (quality + kBetter < voxel.quality) continue;
+    const bool replaces = quality > voxel.quality + kBetter || voxel.quality == 0;
+    for (std::size_t c = 0; c < 3; ++c) {
+      const float value = std::min(gain_ * static_cast<float>(seen[c]), 255.0F);
+      const auto before = static_cast<float>(voxel.color[c]);
+      voxel.color[c] =
+          static_cast<std::uint8_t>((replaces ? value : before + 0.25F * (value - before)) + 0.5F);
+    }
+    voxel.quality = static_cast<std::uint8_t>(std::max<int>(voxel.quality, quality));
+  }
+}
+
 void BlockFusion::fuse(VoxelBlock& block) const {
   const Eigen::Vector3f corner = corner_of(block);
   const bool labelled = view_.labelled && block.labels != nullptr;
@@ -266,6 +321,7 @@ void BlockFusion::fuse(VoxelBlock& block) const {
     near = true;
     block.near_rows[r] = static_cast<std::uint8_t>(block.near_rows[r] | row.near_bits);
     if (labelled) vote(row, &(*block.labels)[first]);
+    if (block.colors != nullptr && !view_.colors.empty()) tint(row, &(*block.colors)[first]);
   }
   if (near) block.last_seen = keyframe_;
   if ((moved || near) && !block.changed) {

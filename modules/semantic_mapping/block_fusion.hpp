@@ -28,6 +28,11 @@ struct NearBlocks {
                                             std::uint64_t frame, KeyframeIndex keyframe,
                                             BlockMap& map);
 
+/// Factor on the colours of a view that makes it as bright as the map, 0.5 to 2. It is the ratio of
+/// the sums over a sample of pixels whose voxels have colours; 1 for too few of them.
+[[nodiscard]] float exposure_gain(const DepthView& view, const SE3& T_odom_cam, double voxel_size_m,
+                                  const BlockMap& map);
+
 /// Fuses one depth view into blocks. fuse() changes only its block, so it may run on several blocks
 /// at once.
 ///
@@ -38,8 +43,9 @@ struct NearBlocks {
 /// weight falls linearly to zero, because a voxel farther behind may belong to another surface.
 class BlockFusion {
  public:
+  /// Colours of the view are multiplied by `gain`.
   BlockFusion(const SemanticMappingConfig& config, const DepthView& view, const SE3& T_odom_cam,
-              KeyframeIndex keyframe);
+              KeyframeIndex keyframe, float gain = 1.0F);
 
   /// Relation of a view and a block.
   enum class Relation {
@@ -67,6 +73,7 @@ class BlockFusion {
   void project(const Eigen::Vector3f& start, Row& row) const;
   void update(Row& row, std::size_t first, VoxelBlock& block) const;
   void vote(const Row& row, VoxelLabels* labels) const;
+  void tint(const Row& row, VoxelColor* colors) const;
   [[nodiscard]] float weight_of(float depth) const;
 
   const DepthView& view_;
@@ -76,6 +83,7 @@ class BlockFusion {
   Eigen::Matrix3f step_;    // columns: M times one voxel along x, y, z
   double block_m_;
   float truncation_, voxel_, near_, closest_, max_weight_;
+  float gain_;
   float variance_, quadratic_variance_;  // kDepthSigma_m^2, depth_sigma_per_m^2
 };
 

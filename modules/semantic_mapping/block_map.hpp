@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "modules/core/color_image.hpp"
 #include "modules/core/ids.hpp"
 #include "modules/semantic_mapping/voxel_labels.hpp"
 
@@ -42,6 +43,12 @@ struct BlockMesh {
   std::vector<std::uint16_t> cell_of_face;  ///< voxel_index of the cell's lowest corner.
 };
 
+/// Colour of a voxel, and the quality of the view that it is from; 0: no colour.
+struct VoxelColor {
+  ColorImage::Pixel color = {0, 0, 0};
+  std::uint8_t quality = 0;
+};
+
 /// Conditions under which an observed voxel counts as known: at least this number of views, and a
 /// sum of weights above this one.
 struct KnownFrom {
@@ -64,6 +71,9 @@ struct VoxelBlock {
 
   /// Null until a labelled frame showed the block.
   std::unique_ptr<std::array<VoxelLabels, kBlockVoxels>> labels;
+
+  /// Null until a frame with colours showed the block.
+  std::unique_ptr<std::array<VoxelColor, kBlockVoxels>> colors;
 
   /// Null until a face of the mesh has a vertex on one of the block's edges.
   std::unique_ptr<BlockMesh> mesh;

@@ -163,7 +163,16 @@ std::size_t DepthViewMaker::make_strip(int row, const DepthImage& depth, const L
   return off_palette;
 }
 
-const DepthView& DepthViewMaker::make(const DepthImage& depth, const LabelImage* labels) {
+const DepthView& DepthViewMaker::make(const DepthImage& depth, const LabelImage* labels,
+                                      const ColorImage* color) {
+  view_.colors.clear();
+  if (color != nullptr) {
+    view_.colors.assign(view_.pixels.size(), ColorImage::Pixel());
+    for (std::size_t i = 0; i < view_.outside(); ++i) {
+      const std::size_t from = source_.empty() ? i : source_[i];
+      if (from != kNoSource) view_.colors[i] = color->pixels[from];
+    }
+  }
   cv::parallel_for_(cv::Range(0, view_.tile_rows), [&](const cv::Range& range) {
     for (int row = range.start; row < range.end; ++row)
       off_palette_[static_cast<std::size_t>(row)] = make_strip(row, depth, labels);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "modules/core/camera.hpp"
+#include "modules/core/color_image.hpp"
 #include "modules/core/frame.hpp"
 #include "modules/core/label_palette.hpp"
 
@@ -29,6 +30,9 @@ struct DepthView {
   std::vector<std::uint16_t> nearest, farthest;
   int tile_columns = 0, tile_rows = 0;
 
+  /// Colour of each of `pixels`, or empty.
+  std::vector<ColorImage::Pixel> colors;
+
   std::size_t off_palette_pixels = 0;  ///< Pixels whose label the palette lacks.
   bool labelled = false;
 
@@ -47,8 +51,9 @@ class DepthViewMaker {
                  const LabelPalette& palette);
 
   /// The view of these images, valid until the next call. Precondition: both have the camera's
-  /// size; labels may be null.
-  const DepthView& make(const DepthImage& depth, const LabelImage* labels);
+  /// size; labels and colours may be null.
+  const DepthView& make(const DepthImage& depth, const LabelImage* labels,
+                        const ColorImage* color = nullptr);
 
  private:
   void plan_rectification(const Camera& camera);

@@ -34,6 +34,20 @@ VoxelLabels labels_of(const VoxelBlock& block, std::size_t voxel) {
   return block.labels == nullptr ? VoxelLabels() : (*block.labels)[voxel];
 }
 
+VoxelColor color_of(const VoxelBlock& block, std::size_t voxel) {
+  return block.colors == nullptr ? VoxelColor() : (*block.colors)[voxel];
+}
+
+// The colour at share `t` of the way from a to b. A voxel without colour does not count.
+ColorImage::Pixel blended(const VoxelColor& a, const VoxelColor& b, float t) {
+  if (a.quality == 0 || b.quality == 0) return a.quality == 0 ? b.color : a.color;
+  ColorImage::Pixel color;
+  for (std::size_t c = 0; c < color.size(); ++c)
+    color[c] = static_cast<std::uint8_t>((1.0F - t) * static_cast<float>(a.color[c]) +
+                                         t * static_cast<float>(b.color[c]) + 0.5F);
+  return color;
+}
+
 // MapMesh::certainty of a weight: log4(weight) + 8.
 std::uint8_t certainty_of(float weight) {
   const float steps = 0.5F * std::log2(std::max(weight, std::numeric_limits<float>::min())) + 8.0F;
@@ -196,6 +210,8 @@ void IncrementalMesh::compute(Vertex& vertex, const BlockCells& cells, const Eig
   vertex.labels = a < 0.0F ? near_labels : far_labels;
   if (vertex.labels.best() == 0) vertex.labels = a < 0.0F ? far_labels : near_labels;
 
+  vertex.color = blended(color_of(near_block, near_voxel), color_of(far_block, far_voxel), t);
+
   vertex.certainty =
       certainty_of(std::min(near_block.weight[near_voxel], far_block.weight[far_voxel]));
 
@@ -319,7 +335,7 @@ SurfaceDrop IncrementalMesh::drop(const SupersededSurface& superseded) {
   return dropped;
 }
 
-MapMesh IncrementalMesh::snapshot(const BlockMap& map, bool labelled) {
+MapMesh IncrementalMesh::snapshot(const BlockMap& map, bool labelled, bool coloured) {
   std::vector<std::uint32_t> order;
   order.reserve(vertex_count());
   for (std::size_t i = 0; i < vertices_.size(); ++i)
@@ -332,13 +348,16 @@ MapMesh IncrementalMesh::snapshot(const BlockMap& map, bool labelled) {
   LabelledMesh& mesh = map_mesh.mesh;
   std::vector<std::uint32_t> index(vertices_.size()), changed;
   std::vector<Eigen::Vector3f> filtered;
+  const auto least_move_m = static_cast<float>(0.05 * voxel_m_);
   for (const std::uint32_t place : order) {
     const Vertex& vertex = vertices_[place];
     index[place] = static_cast<std::uint32_t>(mesh.vertices.size());
     mesh.vertices.push_back(vertex.position);
     filtered.push_back(vertex.filtered);
-    if (vertex.computed > filtered_) changed.push_back(index[place]);
+    if (!((vertex.position - vertex.filtered_at).norm() <= least_move_m))
+      changed.push_back(index[place]);
     if (labelled) mesh.labels.push_back(vertex.labels.best());
+    if (coloured) mesh.colors.push_back(vertex.color);
     map_mesh.seen_by.push_back({vertex.first, vertex.last});
     map_mesh.ids.push_back(vertex.id);
     map_mesh.certainty.push_back(vertex.certainty);
@@ -352,9 +371,9 @@ MapMesh IncrementalMesh::snapshot(const BlockMap& map, bool labelled) {
   for (const auto& block : map.blocks())
     if (block->mesh != nullptr) add(block->mesh->faces);
   filter_surface(mesh.vertices, mesh.faces, changed, filtered);
+  for (const std::uint32_t i : changed) vertices_[order[i]].filtered_at = mesh.vertices[i];
   for (std::size_t i = 0; i < order.size(); ++i) vertices_[order[i]].filtered = filtered[i];
   mesh.vertices = std::move(filtered);
-  filtered_ = update_;
   return map_mesh;
 }
 

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "modules/mesh/map_mesh.hpp"
@@ -46,9 +47,10 @@ class IncrementalMesh {
   /// ignored. n log n in the mesh.
   SurfaceDrop drop(const SupersededSurface& superseded);
 
-  /// All faces and the vertices they use; no labels unless `labelled`. Positions are those of
-  /// filter_surface(), which runs near the vertices that changed since the last snapshot.
-  [[nodiscard]] MapMesh snapshot(const BlockMap& map, bool labelled);
+  /// All faces and the vertices they use, with labels and colours as wanted. Positions are those of
+  /// filter_surface(), which runs near vertices that are new, or have moved by a twentieth of a
+  /// voxel since they were last filtered.
+  [[nodiscard]] MapMesh snapshot(const BlockMap& map, bool labelled, bool coloured = false);
 
   [[nodiscard]] std::size_t vertex_count() const { return vertices_.size() - free_.size(); }
   [[nodiscard]] std::size_t face_count() const { return faces_; }
@@ -62,10 +64,14 @@ class IncrementalMesh {
   struct Vertex {
     Eigen::Vector3f position = Eigen::Vector3f::Zero();
     Eigen::Vector3f filtered = Eigen::Vector3f::Zero();
+    /// Position at the last time that `filtered` was computed; NaN: never.
+    Eigen::Vector3f filtered_at =
+        Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN());
     std::uint32_t uses = 0;       // number of face corners that use it
     std::uint64_t id = kRemoved;  // id as in MapMesh::ids; kRemoved: the entry is free
     BlockMesh* owner = nullptr;   // mesh of the block of its edge; null: the block was erased
     VoxelLabels labels;
+    ColorImage::Pixel color = {0, 0, 0};
     KeyframeIndex first = 0, last = 0;
     std::uint32_t computed = 0;  // number of the update in which position and labels were computed
     std::uint16_t edge = 0;      // index of the edge in the owner
@@ -99,7 +105,6 @@ class IncrementalMesh {
   std::size_t faces_ = 0;
   std::uint64_t next_id_ = 0;
   std::uint32_t update_ = 0;
-  std::uint32_t filtered_ = 0;  // number of the update before the last snapshot
 };
 
 }  // namespace km

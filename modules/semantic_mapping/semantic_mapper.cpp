@@ -1,6 +1,8 @@
 #include "modules/semantic_mapping/semantic_mapper.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <opencv2/core/utility.hpp>
 #include <optional>
 #include <stdexcept>
@@ -43,6 +45,22 @@ bool fits(const Image& image, const Pixels& pixels, const Camera& camera) {
 
 }  // namespace
 
+double fitting_voxel_m(const SemanticMappingConfig& config, const DepthImage& depth) {
+  constexpr std::array kSides_m = {0.02, 0.03, 0.05, 0.1};
+  std::vector<std::uint16_t> known;
+  for (const std::uint16_t mm : depth.millimetres)
+    if (mm >= 1e3 * config.min_range_m && mm <= 1e3 * config.max_range_m) known.push_back(mm);
+  if (known.empty()) return kSides_m.back();
+  const auto quartile = known.begin() + static_cast<std::ptrdiff_t>(known.size() * 3 / 4);
+  std::ranges::nth_element(known, quartile);
+  const double depth_m = 1e-3 * *quartile;
+  const DepthNoise noise = noise_of(config);
+  const double wanted_m =
+      std::max(depth_m / 120.0, 0.2 * std::hypot(noise.base_m, noise.per_m * depth_m * depth_m));
+  const auto found = std::ranges::lower_bound(kSides_m, wanted_m);
+  return found == kSides_m.end() ? kSides_m.back() : *found;
+}
+
 struct SemanticMapper::State {
   // A block in view and the kind of its update.
   struct Update {
@@ -57,7 +75,7 @@ struct SemanticMapper::State {
         camera(its_camera),
         views(camera, config.min_range_m, config.max_range_m, palette),
         coarse_views(camera, noise_of(config), config.min_range_m),
-        mesh(config.voxel_size_m, known_from(config)) {}
+        mesh(config.voxel_m(), known_from(config)) {}
 
   std::vector<Update> select(const DepthView& view, const BlockFusion& fusion,
                              const SE3& T_odom_cam, IntegrationReport& report);
@@ -79,7 +97,7 @@ struct SemanticMapper::State {
   std::optional<Eigen::Vector3d> camera_at;  // last position
   double way_m = 0.0;                        // distance travelled by the camera
   std::optional<SpaceTracker> space;
-  bool labelled = false;
+  bool labelled = false, coloured = false;
   std::size_t dropped_faces = 0;
 };
 
@@ -88,12 +106,14 @@ std::vector<SemanticMapper::State::Update> SemanticMapper::State::select(
     IntegrationReport& report) {
   std::vector<Update> updates;
   const NearBlocks near =
-      select_near_blocks(view, T_odom_cam, config.voxel_size_m,
+      select_near_blocks(view, T_odom_cam, config.voxel_m(),
                          static_cast<std::size_t>(config.max_blocks), frame, keyframe, map);
   report.blocks_refused = near.refused;
   for (VoxelBlock* block : near.blocks) {
     if (view.labelled && block->labels == nullptr)
       block->labels = std::make_unique<std::array<VoxelLabels, kBlockVoxels>>();
+    if (!view.colors.empty() && block->colors == nullptr)
+      block->colors = std::make_unique<std::array<VoxelColor, kBlockVoxels>>();
     block->last_seen_m = way_m;
     updates.push_back({block, true, false});
   }
@@ -166,7 +186,8 @@ SemanticMapper::SemanticMapper(SemanticMapper&&) noexcept = default;
 SemanticMapper& SemanticMapper::operator=(SemanticMapper&&) noexcept = default;
 
 IntegrationReport SemanticMapper::integrate(const DepthImage& depth, const LabelImage* labels,
-                                            const SE3& T_odom_cam, KeyframeIndex keyframe) {
+                                            const SE3& T_odom_cam, KeyframeIndex keyframe,
+                                            const ColorImage* color) {
   State& state = *state_;
   if (keyframe < state.keyframe)
     throw std::invalid_argument("mapping: keyframe " + std::to_string(keyframe) + " after " +
@@ -182,19 +203,22 @@ IntegrationReport SemanticMapper::integrate(const DepthImage& depth, const Label
   }
   report.label_size_differs = labels != nullptr && !fits(*labels, labels->ids, state.camera);
   if (report.label_size_differs) labels = nullptr;
+  if (color != nullptr && !fits(*color, color->pixels, state.camera)) color = nullptr;
 
   const bool new_keyframe = keyframe != state.keyframe;
   state.keyframe = keyframe;
   state.labelled |= labels != nullptr;
+  state.coloured |= color != nullptr;
   ++state.frame;
   state.way_m +=
       (T_odom_cam.translation() - state.camera_at.value_or(T_odom_cam.translation())).norm();
   state.camera_at = T_odom_cam.translation();
-  const DepthView& view = state.views.make(depth, labels);
+  const DepthView& view = state.views.make(depth, labels, color);
   state.coarse_views.add(depth, T_odom_cam, keyframe);
   report.off_palette_pixels = view.off_palette_pixels;
 
-  const BlockFusion fusion(state.config, view, T_odom_cam, keyframe);
+  const float gain = exposure_gain(view, T_odom_cam, state.config.voxel_m(), state.map);
+  const BlockFusion fusion(state.config, view, T_odom_cam, keyframe, gain);
   const auto updates = state.select(view, fusion, T_odom_cam, report);
   State::fuse(fusion, updates);
   if (state.space) {
@@ -230,7 +254,7 @@ SpaceChanges SemanticMapper::take_space_changes() {
 }
 
 MapMesh SemanticMapper::mesh() const {
-  MapMesh map = state_->mesh.snapshot(state_->map, state_->labelled);
+  MapMesh map = state_->mesh.snapshot(state_->map, state_->labelled, state_->coloured);
   map.views = state_->coarse_views.views();
   return map;
 }

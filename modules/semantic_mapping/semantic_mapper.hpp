@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "modules/core/camera.hpp"
+#include "modules/core/color_image.hpp"
 #include "modules/core/frame.hpp"
 #include "modules/core/geometry.hpp"
 #include "modules/core/ids.hpp"
@@ -75,8 +76,10 @@ class SemanticMapper {
   /// Fuses one depth image and, unless null, its labels. `T_odom_cam` is the camera's pose,
   /// `keyframe` the robot's last keyframe at that time. Throws std::invalid_argument if `keyframe`
   /// is before that of an earlier call.
+  /// Colours of the camera's image may be added; those of another size do not count.
   IntegrationReport integrate(const DepthImage& depth, const LabelImage* labels,
-                              const SE3& T_odom_cam, KeyframeIndex keyframe);
+                              const SE3& T_odom_cam, KeyframeIndex keyframe,
+                              const ColorImage* color = nullptr);
 
   /// Meshes the blocks that changed since the last call. Call it after every frame or less often. A
   /// new vertex gets the keyframe of the first frame since the last call as its first one. Returns
@@ -88,7 +91,7 @@ class SemanticMapper {
   SurfaceDrop drop(const SupersededSurface& superseded);
 
   /// The mesh as of the last update_mesh(), final and active parts together, in the odometry frame.
-  /// It has labels if any frame had labels, and no colours (see LabelledMesh::colour_by()). Every
+  /// It has labels, or colours, if any frame had some. Every
   /// vertex is part of a face. Time and memory proportional to the mesh.
   [[nodiscard]] MapMesh mesh() const;
 

@@ -3,6 +3,7 @@
 #include <optional>
 
 #include "modules/core/config.hpp"
+#include "modules/core/frame.hpp"
 #include "modules/semantic_mapping/block_map.hpp"
 
 namespace km {
@@ -11,9 +12,9 @@ namespace km {
 struct SemanticMappingConfig {
   static constexpr const char* kSection = "semantic_mapping";
 
-  double voxel_size_m = 0.10;
+  std::optional<double> voxel_size_m = {};
   double min_range_m = 0.3;
-  double max_range_m = 10.0;
+  double max_range_m = 20.0;
   std::optional<double> depth_sigma_per_m = {};
   int min_views = 3;
   double window_m = 8.0;
@@ -34,10 +35,13 @@ struct SemanticMappingConfig {
   /// depth_sigma_per_m if there is none: that of usual RGB-D cameras.
   static constexpr double kDepthSigma_per_m = 0.003;
 
+  [[nodiscard]] double voxel_m() const { return voxel_size_m.value_or(0.10); }
+
   void visit_fields(auto& visitor) {
-    visitor.field(
-        "voxel_size_m", voxel_size_m, {0.005, 1.0},
-        "[m] side of a voxel; half of it needs about four times the memory, time and triangles");
+    visitor.field("voxel_size_m", voxel_size_m, {0.005, 1.0},
+                  "[m] side of a voxel; half of it needs about four times the memory, time and "
+                  "triangles; left "
+                  "out: 0.02 to 0.1 by the depths of the first image and their noise");
     visitor.field("min_range_m", min_range_m, {0.0, 10.0},
                   "[m along the optical axis] smallest depth that is used");
     visitor.field("max_range_m", max_range_m, {0.5, 65.0}, "[m] largest depth that is used");
@@ -45,8 +49,8 @@ struct SemanticMappingConfig {
         "depth_sigma_per_m", depth_sigma_per_m, {0.0, 1.0},
         "[1/m] standard deviation of depth z is sqrt(0.01^2 + (this z^2)^2) m; s / (f b) for "
         "stereo with focal length f [px], baseline b [m] and a "
-        "matching error of s px; left out: that of a quarter of a pixel for stereo depth, "
-        "0.003 for depth images");
+        "matching error of s px; left out: s is 0.36 for stereo depth and 0.125 for depth images, "
+        "with the baseline of the depth camera");
     visitor.field("min_views", min_views, {1, 255},
                   "number of images that must show a surface before it is meshed; excludes single "
                   "wrong depths. More are needed until the standard deviation of their mean depth "
@@ -64,8 +68,13 @@ struct SemanticMappingConfig {
 /// Voxels are known once min_views images have observed them, and the standard deviation of the
 /// mean of their depths is below a voxel.
 [[nodiscard]] inline KnownFrom known_from(const SemanticMappingConfig& config) {
-  const double share = SemanticMappingConfig::kDepthSigma_m / config.voxel_size_m;
+  const double share = SemanticMappingConfig::kDepthSigma_m / config.voxel_m();
   return {static_cast<std::uint8_t>(config.min_views), static_cast<float>(share * share)};
 }
+
+/// The side of voxels that fits a camera's first depth image: 0.02, 0.03, 0.05 or 0.1 m. It is the
+/// smallest above a 120th of the upper quartile of the depths and a fifth of its standard
+/// deviation.
+[[nodiscard]] double fitting_voxel_m(const SemanticMappingConfig& config, const DepthImage& depth);
 
 }  // namespace km

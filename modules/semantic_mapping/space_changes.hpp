@@ -26,6 +26,7 @@ using SpaceChanges = std::vector<BlockSpace>;
 /// Changes from one keyframe to the next.
 struct SpaceUpdate {
   Stamp stamp = 0;
+  double voxel_m = 0.1;     ///< Side of a voxel; constant.
   double camera_z_m = 0.0;  ///< Height of the camera in the odometry frame.
   bool is_first = false;    ///< The changes are the whole space: earlier updates no longer count.
   SpaceChanges changes;

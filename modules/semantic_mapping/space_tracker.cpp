@@ -42,7 +42,7 @@ void SpaceTracker::note_left(const Eigen::Vector3i& position) {
 void SpaceTracker::see_free(const DepthView& view, const BlockFusion& fusion, const SE3& T_odom_cam,
                             const BlockMap& map, double way_m) {
   const double depth_m = std::min(kFreeRange_m, config_.max_range_m);
-  const auto [low, high] = blocks_in(view, T_odom_cam, depth_m, kBlockSide * config_.voxel_size_m);
+  const auto [low, high] = blocks_in(view, T_odom_cam, depth_m, kBlockSide * config_.voxel_m());
   for (int z = low.z(); z <= high.z(); ++z)
     for (int y = low.y(); y <= high.y(); ++y)
       for (int x = low.x(); x <= high.x(); ++x) {

@@ -169,16 +169,15 @@ TEST_CASE("Recorded depth and labels are preferred, others computed", "[robot][m
   CHECK(full.plan(config, network)->sensor.labels == LabelsFrom::kNetwork);
 }
 
-TEST_CASE("Depth is used up to the range at which it is accurate enough", "[robot][mapping]") {
-  Camera camera;
-  camera.fx = 500.0;
-  const StereoRig rig = rgbd_rig(camera, 0.1);
-  const double range_m = usable_range_m(rig, 0.2);
-  CHECK(range_m == Approx(6.3246).epsilon(1e-4));
-  CHECK(depth_sigma_per_m(rig) * range_m * range_m == Approx(0.2));
-  // A quarter of a pixel further away it is off by 0.2 m, to first order.
-  const double disparity_px = 50.0 / range_m;
-  CHECK(50.0 / (disparity_px - 0.25) - range_m == Approx(0.2).epsilon(0.05));
+TEST_CASE("Noise of depth follows from the camera that measures it", "[robot][mapping]") {
+  const StereoRig rig = rgbd_rig({.fx = 500.0, .fy = 500.0}, 0.1);
+  MappingPlan plan;
+  plan.sensor.depth = DepthFrom::kStereo;
+  CHECK(depth_sigma_per_m(rig, plan) == Approx(0.36 / 50.0));
+  plan.sensor.depth = DepthFrom::kImages;
+  CHECK(depth_sigma_per_m(rig, plan) == Approx(0.125 / 50.0));
+  plan.depth_baseline_m = 0.25;  // beside a stereo pair
+  CHECK(depth_sigma_per_m(rig, plan) == Approx(0.001));
 }
 
 TEST_CASE("A bag has the images that its rig file names", "[robot][mapping]") {

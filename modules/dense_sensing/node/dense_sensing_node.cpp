@@ -69,9 +69,13 @@ void DenseSensingNode::step(const LocatedFrame& located) {
     last_ = stamp;
     ++progress_.frames;
     progress_.without_labels += wants_labels_ && images.labels == nullptr ? 1 : 0;
-    topics_.frames.publish({stamp, images.depth, images.labels,
-                            located.T_odom_body * located.T_body_rig * sensor_.camera().T_body_cam,
-                            located.keyframe});
+    topics_.frames.publish(
+        {.stamp = stamp,
+         .depth = images.depth,
+         .labels = images.labels,
+         .T_odom_cam = located.T_odom_body * located.T_body_rig * sensor_.camera().T_body_cam,
+         .keyframe = located.keyframe,
+         .color = images.color});
   }
   topics_.progress.publish(progress_);
 }

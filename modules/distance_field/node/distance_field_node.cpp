@@ -13,20 +13,19 @@ constexpr std::size_t kQueue = 256;
 
 }  // namespace
 
-DistanceFieldNode::DistanceFieldNode(double voxel_size_m, const DistanceFieldTopics& topics)
+DistanceFieldNode::DistanceFieldNode(const DistanceFieldTopics& topics)
     : WorkerNode({.name = "distance_field",
                   .queue = kQueue,
                   .in_background = true,
                   .step_limit_s = 120.0}),
-      voxel_size_m_(voxel_size_m),
       slices_(topics.slices) {
   follow(topics.space);
 }
 
 void DistanceFieldNode::step(const SpaceUpdate& update) {
   if (update.is_first)
-    field_.emplace(std::min(kMaxDistance_m, DistanceField::kMaxReach * voxel_size_m_),
-                   voxel_size_m_);
+    field_.emplace(std::min(kMaxDistance_m, DistanceField::kMaxReach * update.voxel_m),
+                   update.voxel_m);
   field_->set(update.changes);
   newest_ = update.stamp;
   camera_z_m_ = update.camera_z_m;

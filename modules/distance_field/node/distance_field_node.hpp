@@ -24,7 +24,7 @@ class DistanceFieldNode final : public WorkerNode<Topic<SpaceUpdate>::Message> {
   /// Largest distance of the slices, or the 100 voxels that DistanceField can compute.
   static constexpr double kMaxDistance_m = 2.0;
 
-  DistanceFieldNode(double voxel_size_m, const DistanceFieldTopics& topics);
+  explicit DistanceFieldNode(const DistanceFieldTopics& topics);
   ~DistanceFieldNode() override { stop(); }
 
   /// Handles one update synchronously. The thread calls only this function; tests can call it too.
@@ -37,7 +37,6 @@ class DistanceFieldNode final : public WorkerNode<Topic<SpaceUpdate>::Message> {
   }
   void publish_slice();
 
-  const double voxel_size_m_;
   std::optional<DistanceField> field_;
   const Out<DistanceSlice> slices_;
   double camera_z_m_ = 0.0;

@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "modules/core/text_table.hpp"
 #include "runtime/log.hpp"
 
 namespace km {
@@ -20,7 +21,8 @@ SemanticMappingNode::SemanticMappingNode(const SemanticMappingConfig& config, co
                   .overflow = overflow,
                   .in_background = true,
                   .step_limit_s = 120.0}),
-      mapper_(config, camera, palette),
+      config_(checked(config)),
+      camera_(camera),
       palette_(palette),
       mesh_interval_s_(mesh_interval_s),
       topics_(topics) {
@@ -32,7 +34,7 @@ void SemanticMappingNode::conclude() {
   if (progress_.integrated == 0 && !before_) return;
   progress_.too_late = load().dropped;
   publish_mesh();
-  progress_.size = mapper_.size();
+  if (mapper_) progress_.size = mapper_->size();
   topics_.progress.publish(progress_);
   const MappingProgress& p = progress_;
   log::info(name()) << p.integrated << " frames, " << p.size.vertices << " vertices, "
@@ -48,17 +50,20 @@ void SemanticMappingNode::conclude() {
 void SemanticMappingNode::drop_superseded() {
   const Topic<SupersededSurface>::Message superseded = superseded_.take();
   if (superseded == nullptr) return;
-  const SurfaceDrop dropped = mapper_.drop(before_ ? before_->drop(*superseded) : *superseded);
+  const SupersededSurface own = before_ ? before_->drop(*superseded) : *superseded;
+  if (!mapper_) return;
+  const SurfaceDrop dropped = mapper_->drop(own);
   log::debug(name()) << "dropped " << dropped.faces << " faces seen again";
 }
 
 void SemanticMappingNode::step(const DenseFrame& frame) {
   drop_superseded();
-  count(frame,
-        mapper_.integrate(*frame.depth, frame.labels.get(), frame.T_odom_cam, frame.keyframe));
+  if (!mapper_) make_mapper(*frame.depth);
+  count(frame, mapper_->integrate(*frame.depth, frame.labels.get(), frame.T_odom_cam,
+                                  frame.keyframe, frame.color.get()));
   // The mesh is updated once for each keyframe, so that a vertex gets the first one that saw it.
   if (meshed_ != frame.keyframe) {
-    mapper_.update_mesh();
+    mapper_->update_mesh();
     publish_space(frame);
   }
   meshed_ = frame.keyframe;
@@ -67,8 +72,17 @@ void SemanticMappingNode::step(const DenseFrame& frame) {
     published_ = frame.stamp;
     publish_mesh();
   }
-  progress_.size = mapper_.size();
+  progress_.size = mapper_->size();
   topics_.progress.publish(progress_);
+}
+
+void SemanticMappingNode::make_mapper(const DepthImage& depth) {
+  const bool is_chosen = !config_.voxel_size_m;
+  if (is_chosen) config_.voxel_size_m = fitting_voxel_m(config_, depth);
+  log::info(name()) << "voxels of " << fixed(config_.voxel_m(), 3) << " m"
+                    << (is_chosen ? ", by the depths of the first image" : "") << "; depths up to "
+                    << fixed(config_.max_range_m, 1) << " m";
+  mapper_.emplace(config_, camera_, palette_);
 }
 
 void SemanticMappingNode::count(const DenseFrame& frame, const IntegrationReport& report) {
@@ -86,16 +100,22 @@ void SemanticMappingNode::count(const DenseFrame& frame, const IntegrationReport
 void SemanticMappingNode::publish_space(const DenseFrame& frame) {
   const bool is_wanted = wants_space_ && wants_space_();
   const bool is_first = is_wanted && !tracks_space_;
-  if (is_wanted != std::exchange(tracks_space_, is_wanted)) mapper_.track_space(is_wanted);
+  if (is_wanted != std::exchange(tracks_space_, is_wanted)) mapper_->track_space(is_wanted);
   if (is_wanted)
-    topics_.space.publish(SpaceUpdate{frame.stamp, frame.T_odom_cam.translation().z(), is_first,
-                                      mapper_.take_space_changes()});
+    topics_.space.publish(SpaceUpdate{.stamp = frame.stamp,
+                                      .voxel_m = config_.voxel_m(),
+                                      .camera_z_m = frame.T_odom_cam.translation().z(),
+                                      .is_first = is_first,
+                                      .changes = mapper_->take_space_changes()});
 }
 
 void SemanticMappingNode::publish_mesh() {
-  mapper_.update_mesh();
-  MapMesh map = mapper_.mesh();
-  if (!map.mesh.labels.empty()) map.mesh.colour_by(palette_);
+  MapMesh map;
+  if (mapper_) {
+    mapper_->update_mesh();
+    map = mapper_->mesh();
+  }
+  if (map.mesh.colors.empty() && !map.mesh.labels.empty()) map.mesh.colour_by(palette_);
   topics_.maps.publish(before_ ? before_->with(map) : std::move(map));
 }
 

@@ -50,12 +50,15 @@ class SemanticMappingNode final : public WorkerNode<Topic<DenseFrame>::Message> 
  private:
   void handle(const Topic<DenseFrame>::Message& frame) override { step(*frame); }
   void conclude() override;
+  void make_mapper(const DepthImage& depth);
   void count(const DenseFrame& frame, const IntegrationReport& report);
   void drop_superseded();
   void publish_mesh();
   void publish_space(const DenseFrame& frame);
 
-  SemanticMapper mapper_;
+  SemanticMappingConfig config_;
+  Camera camera_;
+  std::optional<SemanticMapper> mapper_;  // from the first frame on
   LabelPalette palette_;
   const double mesh_interval_s_;
   const SemanticMappingTopics topics_;

@@ -133,6 +133,11 @@ SensorRig read_euroc_rig(const fs::path& mav0, bool with_depth) {
   return read_euroc_calibration(mav0, choice).rig;
 }
 
+double read_depth_baseline_m(const fs::path& mav0) {
+  return sensor_yaml(mav0, "depth0")
+      .number("baseline_m", kDepthBaseline_m, DepthCamera().baseline_m);
+}
+
 double read_depth_scale(const fs::path& mav0) {
   return sensor_yaml(mav0, "depth0")
       .number("depth_scale", kDepthScale_m, DepthCamera().depth_scale_m);

@@ -29,6 +29,9 @@ namespace km {
 [[nodiscard]] RigCalibration read_euroc_calibration(const std::filesystem::path& mav0,
                                                     const RigChoice& choice);
 
+/// `baseline_m` of depth0. Errors as for read_euroc_rig().
+[[nodiscard]] double read_depth_baseline_m(const std::filesystem::path& mav0);
+
 /// `depth_scale` of depth0: metres of one unit stored in its images. Errors as for
 /// read_euroc_rig().
 [[nodiscard]] double read_depth_scale(const std::filesystem::path& mav0);

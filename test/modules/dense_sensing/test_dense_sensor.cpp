@@ -31,6 +31,8 @@ TEST_CASE("Recorded depth and labels are not changed", "[dense_sensor]") {
   CHECK(images.problem == DenseProblem::kNone);
   CHECK(images.depth == frame.depth);
   CHECK(images.labels == frame.labels);
+  REQUIRE(images.color != nullptr);
+  CHECK(images.color->pixels.at(5)[1] == frame.left.pixels.at(5));
   DenseSensor metric(rig, {});
   CHECK(metric.sense(frame).labels == nullptr);
 }

@@ -78,7 +78,7 @@ TEST_CASE("The mesh of a sphere is closed across blocks and near the sphere",
   CHECK(2 * result.vertices.size() == result.faces.size() + 4);
   const Errors errors = errors_of(result, sphere);
   CHECK(errors.mean < 0.1);
-  CHECK(errors.largest < 0.15);  // the filter flattens curvature
+  CHECK(errors.largest < 0.2);  // the filter flattens curvature
   // A polyhedron with its corners on the sphere is inside it. It is smaller, by curvature times
   // voxel.
   const double volume = 4.0 / 3.0 * std::numbers::pi * std::pow(kRadius_m, 3);

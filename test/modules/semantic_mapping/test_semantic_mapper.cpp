@@ -225,6 +225,48 @@ TEST_CASE("Surface is meshed once enough images show it", "[semantic_mapping]") 
   }
 }
 
+TEST_CASE("Vertices have the colours of the image, at one exposure", "[semantic_mapping]") {
+  SemanticMapper mapper(settings(0.05), small_camera(), two_classes());
+  const DepthAndLabels images = wall(2.0);
+  ColorImage color{images.depth.width, images.depth.height, {}};
+  for (int v = 0; v < color.height; ++v)
+    for (int u = 0; u < color.width; ++u)
+      color.pixels.push_back(u < color.width / 2 ? ColorImage::Pixel{200, 40, 40}
+                                                 : ColorImage::Pixel{40, 40, 120});
+  for (KeyframeIndex look = 0; look < 4; ++look) {
+    if (look == 2)  // a shorter exposure
+      for (auto& pixel : color.pixels)
+        for (auto& channel : pixel) channel = static_cast<std::uint8_t>(channel * 0.7);
+    (void)mapper.integrate(images.depth, &images.labels, at(0), look, &color);
+  }
+  mapper.update_mesh();
+  const LabelledMesh mesh = mapper.mesh().mesh;
+  REQUIRE(mesh.colors.size() == mesh.vertices.size());
+  for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
+    if (std::abs(mesh.vertices[i].x()) < 0.15F) continue;
+    const ColorImage::Pixel expected = mesh.vertices[i].x() < 0.0F ? ColorImage::Pixel{200, 40, 40}
+                                                                   : ColorImage::Pixel{40, 40, 120};
+    for (std::size_t c = 0; c < 3; ++c) CHECK(std::abs(mesh.colors[i][c] - expected[c]) <= 3);
+  }
+}
+
+TEST_CASE("Voxels fit the depths and their noise", "[semantic_mapping]") {
+  SemanticMappingConfig config;
+  const auto voxel_m = [&](std::uint16_t mm) {
+    return fitting_voxel_m(config, {4, 1, {0, mm, mm, 60000}});
+  };
+  config.depth_sigma_per_m = 0.001;  // a depth camera
+  CHECK(voxel_m(2200) == 0.02);
+  CHECK(voxel_m(3500) == 0.03);
+  CHECK(voxel_m(5500) == 0.05);
+  CHECK(voxel_m(12000) == 0.1);
+  config.depth_sigma_per_m = 0.007;  // stereo of a small baseline
+  CHECK(voxel_m(2200) == 0.02);
+  CHECK(voxel_m(5500) == 0.05);
+  CHECK(voxel_m(8000) == 0.1);
+  CHECK(voxel_m(0) == 0.1);  // unknown
+}
+
 TEST_CASE("Carving removes an object that has gone", "[semantic_mapping]") {
   SemanticMapper mapper(settings(0.05), small_camera(), two_classes());
   for (KeyframeIndex i = 0; i < 5; ++i) REQUIRE(integrate(mapper, wall(3.0, true), at(0), i));
