@@ -22,6 +22,7 @@
 #include "modules/place_recognition/vocabulary_file.hpp"
 #include "modules/recordings/ros_messages.hpp"
 #include "modules/sensors/node/rig_file.hpp"
+#include "modules/sensors/usual_numbers.hpp"
 #include "runtime/clock.hpp"
 #include "runtime/dds/ros_subscription.hpp"
 
@@ -59,15 +60,17 @@ class Stopper {
   std::jthread thread_;  // last member: stops first
 };
 
-SensorSample sample_of(DatasetReader& reader, double live_s,
-                       const ReportProgress& report_progress) {
+SensorSample sample_of(DatasetReader& reader, double live_s, const ReportProgress& report_progress,
+                       std::vector<Doubt>& doubts) {
   std::optional<Stopper> stopper;
   if (live_s > 0.0) stopper.emplace(reader, live_s);
   SensorSampler sampler;
+  FirstPackets first;
   const auto total = static_cast<double>(reader.pair_count());
   for (double done = 0.0; const auto packet = reader.next(); ++done) {
     report_progress("looking at images", total > 0.0 ? done / total : 0.0);
     sampler.add(*packet);
+    for (Doubt& found : first.add(*packet)) doubts.push_back(std::move(found));
   }
   return sampler.sample();
 }
@@ -178,7 +181,8 @@ std::vector<Figure> figures_of(const RunFacts& facts) {
 
 Examination examine_packets(DatasetReader& reader, const RobotConfig& config, double live_s,
                             const ReportProgress& report_progress) {
-  const SensorSample sample = sample_of(reader, live_s, report_progress);
+  std::vector<Doubt> doubts;
+  const SensorSample sample = sample_of(reader, live_s, report_progress, doubts);
   report_progress("comparing", 0.0);
   Examination result = examine_streams(sample, reader.report());
   for (const std::string& remark : reader.remarks())
@@ -191,6 +195,9 @@ Examination examine_packets(DatasetReader& reader, const RobotConfig& config, do
   result.add(examine_inertial(sample, rig));
   result.add(examine_words(sample.descriptors, load_vocabulary(find_shipped_file(
                                                    config.run.vocabulary, "run.vocabulary"))));
+  for (const Doubt& found : doubts)
+    if (!has(result, found.id))
+      result.add(kWarning, found.id, found.what, found.means, found.to_do);
   sort_by_severity(result.findings);
   return result;
 }

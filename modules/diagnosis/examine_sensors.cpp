@@ -71,7 +71,8 @@ void examine_rate(const char* sensor, const std::string& id, const std::vector<S
                                                     fixed(found.largest_gap_s, 3) + " s, jitter " +
                                                     milliseconds(found.jitter_s));
   const UsualNumber rate = id == "imu" ? UsualNumber::kImuRate_hz : UsualNumber::kImageRate_hz;
-  if (const auto unusual = doubt(rate, found.rate_hz)) add_doubt(*unusual, kError, result);
+  if (const auto unusual = doubt(rate, found.rate_hz); unusual && found.rate_hz > least_hz)
+    add_doubt(*unusual, kWarning, result);
   if (!(found.rate_hz >= least_hz))
     result.add(kWarning, id + ".rate",
                std::string(sensor) + " at " + fixed(found.rate_hz, 1) + " Hz, less than " +

@@ -64,11 +64,12 @@ Camera camera_of(const RosCameraInfo& info, RosImages images) {
   const auto is_zero = [](const auto& numbers) {
     return std::ranges::all_of(numbers, [](double number) { return number == 0.0; });
   };
-  if (raw ? is_zero(info.k) : is_zero(info.p))
+  const bool has_K = !is_zero(info.k), has_P = !is_zero(info.p);
+  if (!(raw ? has_K : has_P))
     refuse(info, matrix + " is 0: the camera is not calibrated" +
-                     (raw && !is_zero(info.p)
-                          ? "; P is not, so its images are rectified (rectified: true)"
-                          : ""));
+                     (has_P   ? "; P is not, so its images are rectified (rectified: true)"
+                      : has_K ? "; K is not, so its images are raw (rectified: false)"
+                              : ""));
   refuse_parts(info);
   if (const auto problem = resolution_problem(info.width, info.height))
     refuse(info, "width and height: " + *problem);

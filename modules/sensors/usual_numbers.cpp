@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <string_view>
+#include <utility>
 
 #include "modules/core/config.hpp"
 #include "modules/core/text_table.hpp"
@@ -31,7 +33,7 @@ constexpr std::string_view kStamps =
     "check the unit of the stamps: the reader takes a whole number as nanoseconds";
 
 // In the order of UsualNumber.
-constexpr std::array<Row, 6> kRows = {{
+constexpr std::array<Row, 7> kRows = {{
     {"stereo.baseline",
      "a baseline",
      "m",
@@ -50,7 +52,7 @@ constexpr std::array<Row, 6> kRows = {{
     {"frames.stamps",
      "images at a rate",
      "Hz",
-     {0.0, 1000.0},
+     {1.0, 1000.0},
      {{{1e3, "of stamps in microseconds"},
        {1e6, "of stamps in milliseconds"},
        {1e9, "of stamps in seconds"}}},
@@ -59,7 +61,7 @@ constexpr std::array<Row, 6> kRows = {{
     {"imu.stamps",
      "inertial samples at a rate",
      "Hz",
-     {0.0, 2e4},
+     {10.0, 2e4},
      {{{1e3, "of stamps in microseconds"},
        {1e6, "of stamps in milliseconds"},
        {1e9, "of stamps in seconds"}}},
@@ -82,7 +84,28 @@ constexpr std::array<Row, 6> kRows = {{
      {{{1e3, "in millimetres"}, {1e-3, "multiplied by 0.001 twice"}, {10.0, "in units of 0.1 mm"}}},
      "if its unit is wrong, all lengths are wrong by the same factor",
      "state depth: {scale_m: ...} in the rig file, the depth of one unit of a 16-bit image"},
+    {"depth.share",
+     "depth for a share",
+     "of the pixels",
+     {0.005, 1.0},
+     {},
+     "odometry and map get no depth",
+     "check depth: {scale_m, min_range_m, max_range_m} in the rig file against the unit of the "
+     "images"},
 }};
+
+// Value with four digits, "20000" and not "2e+04".
+std::string number_text(double value) {
+  return value >= 1e3 && value < 1e7 ? fixed(value, 0) : rounded(value, 4);
+}
+
+// NaN without values.
+double median_of(std::vector<double> values) {
+  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::ranges::nth_element(values, middle);
+  return *middle;
+}
 
 }  // namespace
 
@@ -90,11 +113,11 @@ std::optional<Doubt> doubt(UsualNumber number, double value) {
   const Row& row = kRows.at(static_cast<std::size_t>(number));
   if (std::isnan(value) || row.usual.contains(value)) return std::nullopt;
   const auto text = [&row](double shown) {
-    return rounded(shown, 4) + ' ' + std::string(row.unit);
+    return number_text(shown) + ' ' + std::string(row.unit);
   };
   Doubt doubt{.id = std::string(row.id),
               .what = std::string(row.name) + " of " + text(value) + ", usually " +
-                      rounded(row.usual.min, 4) + " to " + text(row.usual.max),
+                      number_text(row.usual.min) + " to " + text(row.usual.max),
               .means = std::string(row.means),
               .to_do = std::string(row.to_do)};
   for (const Confusion& confusion : row.confusions) {
@@ -104,7 +127,7 @@ std::optional<Doubt> doubt(UsualNumber number, double value) {
     if (!confusion.id.empty() && !doubt.is_explained) doubt.id = confusion.id;
     doubt.is_explained = true;
   }
-  if (number == UsualNumber::kGravity_mps2 && !doubt.is_explained && value < row.usual.min / 3.0) {
+  if (number == UsualNumber::kGravity_mps2 && !doubt.is_explained && value < row.usual.min / 2.0) {
     doubt.id = "imu.no_gravity";
     doubt.what += ": the driver subtracts gravity, or uses another unit";
     doubt.to_do = "set the driver to raw acceleration";
@@ -125,18 +148,23 @@ std::vector<Doubt> rig_doubts(const StereoRig& rig) {
 }
 
 double median_acceleration(const std::vector<ImuSample>& samples) {
-  if (samples.empty()) return std::numeric_limits<double>::quiet_NaN();
   std::vector<double> norms;
   for (const ImuSample& sample : samples) norms.push_back(sample.accel.norm());
-  const auto middle = norms.begin() + static_cast<std::ptrdiff_t>(norms.size() / 2);
-  std::ranges::nth_element(norms, middle);
-  return *middle;
+  return median_of(std::move(norms));
+}
+
+void FirstPackets::add_depth(const StereoFrame& frame) {
+  constexpr std::size_t kStep = 101;  // not a divisor of usual widths
+  if (frame.depth == nullptr) return;
+  const std::vector<std::uint16_t>& depth_mm = frame.depth->millimetres;
+  for (std::size_t k = 0; k < depth_mm.size(); k += kStep) depths_m_.push_back(1e-3 * depth_mm[k]);
 }
 
 std::vector<Doubt> FirstPackets::add(const SensorPacket& packet) {
   if (frames_.size() >= kFrames) return {};
   frames_.push_back(packet.frame->stamp);
   samples_.insert(samples_.end(), packet.imu.begin(), packet.imu.end());
+  add_depth(*packet.frame);
   if (frames_.size() < kFrames) return {};
   const auto rate_hz = [](Stamp first, Stamp last, std::size_t count) {
     const double seconds = seconds_between(first, last);
@@ -152,6 +180,13 @@ std::vector<Doubt> FirstPackets::add(const SensorPacket& packet) {
     judge(UsualNumber::kImuRate_hz,
           rate_hz(samples_.front().stamp, samples_.back().stamp, samples_.size()));
   judge(UsualNumber::kGravity_mps2, median_acceleration(samples_));
+  const auto measured = std::ranges::partition(depths_m_, [](double m) { return m > 0.0; });
+  const auto count = static_cast<std::size_t>(measured.begin() - depths_m_.begin());
+  judge(UsualNumber::kDepthShare,
+        static_cast<double>(count) / static_cast<double>(depths_m_.size()));  // NaN without depth
+  depths_m_.resize(count);
+  judge(UsualNumber::kDepth_m, median_of(depths_m_));
+  depths_m_ = {};
   samples_ = {};
   return doubts;
 }

@@ -17,7 +17,8 @@ enum class UsualNumber {
   kImageRate_hz,
   kImuRate_hz,
   kGravity_mps2,
-  kDepth_m
+  kDepth_m,
+  kDepthShare
 };
 
 /// A value outside the range that robots have.
@@ -39,7 +40,7 @@ struct Doubt {
 /// Median norm of the accelerations [m/s^2]; NaN without samples.
 [[nodiscard]] double median_acceleration(const std::vector<ImuSample>& samples);
 
-/// Judges rates and accelerations of the first packets of a source.
+/// Judges rates, accelerations and depths of the first packets of a source.
 class FirstPackets {
  public:
   /// The doubts when kFrames frames have been added, once; empty before and afterwards.
@@ -48,8 +49,11 @@ class FirstPackets {
   static constexpr std::size_t kFrames = 30;
 
  private:
+  void add_depth(const StereoFrame& frame);
+
   std::vector<Stamp> frames_;
   std::vector<ImuSample> samples_;
+  std::vector<double> depths_m_;  // at some pixels, 0: not measured
 };
 
 }  // namespace km

@@ -287,6 +287,7 @@ TEST_CASE("Numbers of sensors outside the usual range are named by their confusi
       Case{UsualNumber::kGravity_mps2, 1001.0, "imu.accel_in_g", "if in thousandths of g"},
       Case{UsualNumber::kGravity_mps2, 0.3, "imu.no_gravity", "subtracts gravity"},
       Case{UsualNumber::kGravity_mps2, 20.0, "imu.gravity", "usually 8.3 to 11.3"},
+      Case{UsualNumber::kDepthShare, 0.001, "depth.share", "a share of 0.001 of the pixels"},
       Case{UsualNumber::kDepth_m, 1800.0, "depth.size", "1.8 m if in millimetres"});
   CAPTURE(c.id, c.value);
   const auto found = doubt(c.number, c.value);
@@ -303,13 +304,16 @@ TEST_CASE("The first packets of a source show its rates and units once", "[senso
   for (Stamp k = 0; k < 40; ++k) {
     auto frame = std::make_shared<StereoFrame>();
     frame->stamp = 50'000 * k;  // 20 Hz in microseconds
+    frame->depth = std::make_shared<DepthImage>(
+        DepthImage{64, 48, std::vector<std::uint16_t>(64U * 48U, 60'000)});
     SensorPacket packet{frame, {}};
     for (Stamp i = 0; i < 10; ++i)
       packet.imu.push_back({50'000 * k + 5'000 * i, Eigen::Vector3d::Zero(), {0, 0, 9.81}});
     for (const Doubt& doubt : first.add(packet)) found.push_back(doubt);
   }
-  REQUIRE(found.size() == 2);
-  CHECK(found[0].id == "frames.stamps");
+  REQUIRE(found.size() == 3);
+  CHECK_THAT(found[0].what, Catch::Contains("20000 Hz, usually 1 to 1000 Hz: 20 Hz if of stamps"));
+  CHECK(found[2].id == "depth.size");
   CHECK(found[1].id == "imu.stamps");
 }
 
