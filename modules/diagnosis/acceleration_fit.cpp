@@ -52,7 +52,7 @@ void add_window(std::span<const BodyStep> steps, std::vector<Change>& changes) {
   if (steps.size() < 4) return;
   std::vector<Change> found;
   Change mean{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
-  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();  // of the step in the window
+  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();  // rotation of the step in its window
   for (std::size_t k = 0; k + 1 < steps.size(); ++k) {
     const BodyStep &a = steps[k], &b = steps[k + 1];
     const Eigen::Matrix3d R_next = R * a.T.linear();

@@ -18,7 +18,7 @@ namespace {
 struct Confusion {
   double factor;
   std::string_view words;
-  std::string_view id = {};  // of the finding, if it is not that of the number
+  std::string_view id = {};  // id of the finding; empty: that of the number
 };
 
 struct Row {
