@@ -13,7 +13,7 @@ namespace {
 auto rank_of(const PoseEdge& e) {
   const double trace = 1.5 / e.precision.kappa + 3.0 / e.precision.tau;  // see precision_of()
   const Eigen::Vector3d& t = e.T_from_to.translation();
-  return std::tuple(trace, e.precision.kappa, e.from, t.x(), t.y(), t.z());
+  return std::tuple(trace, e.precision.kappa, e.from.index, t.x(), t.y(), t.z(), e.from);
 }
 
 }  // namespace

@@ -38,6 +38,15 @@ constexpr ClosureId kSecond{{5, 2}, {9, 2}};
 
 }  // namespace
 
+TEST_CASE("Ids do not decide which of two equally precise closures counts", "[own_graph]") {
+  const auto closure = [](RobotId from, KeyframeIndex i, RobotId to, KeyframeIndex k) {
+    return PoseEdge{.from = {from, i}, .to = {to, k}, .precision = {2.0, 3.0}};
+  };
+  const bool forward_is_better = is_better(closure(1, 5, 4, 9), closure(4, 9, 1, 5));
+  CHECK(forward_is_better != is_better(closure(4, 9, 1, 5), closure(1, 5, 4, 9)));
+  CHECK(forward_is_better == is_better(closure(4, 5, 1, 9), closure(1, 9, 4, 5)));
+}
+
 TEST_CASE("an edge set is offered once all its closures are known", "[own_graph]") {
   OwnGraph graph = graph_of(5, 2);
   REQUIRE(graph.add(InlierSet{5, 9, 3, {kFirst, kSecond}}));
