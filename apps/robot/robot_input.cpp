@@ -409,7 +409,7 @@ RecordedGraph open_graph(const RobotOptions& options) {
     log::warn("graph") << options.graph.string() << ": " << graph.indefinite_edges
                        << " edges have an information matrix that is not positive definite: "
                           "weighed by its blocks";
-  return graph;
+  return in_space(std::move(graph));
 }
 
 }  // namespace

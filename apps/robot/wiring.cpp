@@ -74,6 +74,8 @@ Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput 
   auto bridge = std::make_unique<DdsBridge>(participant_, config.budget);
   bridge_ = bridge.get();
   const std::optional<Camera> camera = left_camera_of(input);
+  const auto* recorded = std::get_if<RecordedGraph>(&input.source);
+  const int dimension = recorded == nullptr ? 3 : recorded->dimension;
   if (auto* reader = std::get_if<std::unique_ptr<DatasetReader>>(&input.source))
     add_sensing(config, options.pace, std::move(*reader), mapping, std::move(input.map));
   else if (auto* graph = std::get_if<RecordedGraph>(&input.source))
@@ -89,7 +91,7 @@ Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput 
   if (input.fixes) add_fixes(*std::move(input.fixes));
   add_loop_closure(config);
   add_journal(options, input, results);
-  add_back_end(config);
+  add_back_end(config, dimension);
   add_overlay();
   if (mapping) {
     add_mesh_correction(config);
@@ -285,7 +287,7 @@ void Robot::add_loop_closure(const RobotConfig& config) {
                        });
 }
 
-void Robot::add_back_end(const RobotConfig& config) {
+void Robot::add_back_end(const RobotConfig& config, int dimension) {
   forward<Closure>(topics_.own_closures, topics_.closures);
   forward<Closure>(topics_.shared_closures.received, topics_.closures);
   pcm_ = &add<PcmNode>(false, config.pcm, identity_.robot,
@@ -297,7 +299,7 @@ void Robot::add_back_end(const RobotConfig& config) {
                        resume_count(identity_.boot) << kResumeBits);
   auto& team = add<TeamNode>(
       false, config.pose_graph, TeamPeer{identity_.robot, identity_.boot},
-      solver_choice(config.pose_graph), [this] { return overlay_->session_bytes(); },
+      solver_choice(config.pose_graph, dimension), [this] { return overlay_->session_bytes(); },
       TeamTopics{.odometry = topics_.keyframe_odometry,
                  .closures = topics_.closures,
                  .fixes = topics_.fixes,
@@ -311,7 +313,8 @@ void Robot::add_back_end(const RobotConfig& config) {
                  .messages = topics_.team_messages,
                  .trajectory = topics_.trajectory,
                  .progress = topics_.progress,
-                 .verdicts = topics_.closure_verdicts});
+                 .verdicts = topics_.closure_verdicts},
+      dimension);
   team.begin_in_map(map_id_);
   if (has_solution()) team.restore(restored_->solution);
 }

@@ -271,7 +271,7 @@ class Robot {
   void add_constellations(const ConstellationsConfig& config);
   void add_playback(const RobotConfig& config, double rate, RecordedGraph graph);
   void add_loop_closure(const RobotConfig& config);
-  void add_back_end(const RobotConfig& config);
+  void add_back_end(const RobotConfig& config, int dimension);
   void add_overlay();
   void add_network(CrossingEnds meshes);
   void add_records();

@@ -24,6 +24,8 @@ inline constexpr Bounds<double> kAxisVariance{1e-15, 1e12};
 /// Standard deviation on each axis of the step between two runs of a robot [m]: it was carried, so
 /// that the length of the step is unknown. No step inside a run has a tenth of it.
 inline constexpr double kUnknownStep_m = 1e4;
+/// Standard deviation of the rotation of such a step: about that of a uniform rotation.
+inline constexpr double kUnknownTurn_rad = 2.0;
 
 /// Standard deviation of the tilt of a vertical [rad].
 inline constexpr Bounds<double> kTiltSigma_rad{1e-4, 1.6};

@@ -30,4 +30,13 @@ Precision precision_of(const Matrix6& covariance) {
   return from_traces(conditional_trace(R, C, of_t), conditional_trace(t, C.transpose(), of_R));
 }
 
+Precision planar_precision_of(const Matrix6& covariance) {
+  const Block Sigma = covariance.block<3, 3>(2, 2);  // angle, x, y
+  const Eigen::LLT<Block> factor(Sigma);
+  if (factor.info() != Eigen::Success || !Sigma.allFinite())
+    throw std::invalid_argument("planar_precision_of: covariance is not positive definite");
+  const Block information = factor.solve(Block::Identity());
+  return {information(0, 0), 2.0 / information.bottomRightCorner<2, 2>().inverse().trace()};
+}
+
 }  // namespace km

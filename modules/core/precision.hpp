@@ -23,6 +23,10 @@ struct Precision {
 /// its own blocks. Throws std::invalid_argument unless the traces are positive and finite.
 [[nodiscard]] Precision precision_of(const Matrix6& covariance);
 
+/// The same in the plane, of the rows angle, x and y: kappa = I_33 and tau = 2 / tr I_t^-1. Throws
+/// std::invalid_argument if these rows are not positive definite.
+[[nodiscard]] Precision planar_precision_of(const Matrix6& covariance);
+
 /// The isotropic covariance with these weights: Sigma_R = 1/(2 kappa) I, Sigma_t = 1/tau I.
 /// Throws std::invalid_argument unless both are positive and finite.
 [[nodiscard]] inline Matrix6 covariance_of(const Precision& precision) {

@@ -30,8 +30,13 @@ constexpr double kLeastBoxSide_m = 1.0;  // least side of the volume for false c
 }  // namespace
 
 Corroboration::Corroboration(std::span<const PoseEdge> closures, const PoseOf& pose,
-                             const std::map<RobotId, Precision>& step, int dimension)
-    : pose_(pose), step_(step), dimension_(dimension), edges_(closures) {
+                             const std::map<RobotId, Precision>& step, int dimension,
+                             LaterRuns later_runs)
+    : pose_(pose),
+      step_(step),
+      dimension_(dimension),
+      later_runs_(std::move(later_runs)),
+      edges_(closures) {
   for (std::size_t k = 0; k < closures.size(); ++k) {
     const PoseEdge& e = closures[k];
     const bool up = e.from < e.to;
@@ -41,6 +46,17 @@ Corroboration::Corroboration(std::span<const PoseEdge> closures, const PoseOf& p
   std::stable_sort(closures_.begin(), closures_.end(), [](const Upward& a, const Upward& b) {
     return std::pair(a.lower, a.upper) < std::pair(b.lower, b.upper);
   });
+}
+
+// False if a step between the lower or between the upper ends is unknown.
+bool Corroboration::same_runs(const Upward& one, const Upward& other) const {
+  const auto run_of = [this](const KeyframeId& id) {
+    const auto runs = later_runs_.find(id.robot);
+    return runs == later_runs_.end()
+               ? std::ptrdiff_t{0}
+               : std::ranges::upper_bound(runs->second, id.index) - runs->second.begin();
+  };
+  return run_of(one.lower) == run_of(other.lower) && run_of(one.upper) == run_of(other.upper);
 }
 
 double Corroboration::cycle_length(const Upward& one, const Upward& other) const {
@@ -72,7 +88,7 @@ void Corroboration::count_lengths(NoiseHistogram& histogram, std::size_t most) c
       if (steps_between(closures_[a].lower, closures_[b].lower) > kSteps) break;
       const std::uint32_t steps = steps_between(closures_[a].lower, closures_[b].lower) +
                                   steps_between(closures_[a].upper, closures_[b].upper);
-      if (steps <= kSteps) cycles.push_back({steps, a, b});
+      if (steps <= kSteps && same_runs(closures_[a], closures_[b])) cycles.push_back({steps, a, b});
     }
   std::stable_sort(cycles.begin(), cycles.end(),
                    [](const Cycle& x, const Cycle& y) { return x.steps < y.steps; });
@@ -159,6 +175,7 @@ void Corroboration::count_cycles(PairCycles& cycles) const {
         break;
       const std::uint32_t steps = lower + steps_between(closures_[a].upper, closures_[b].upper);
       if (steps == 0) continue;  // no odometry between them
+      if (!same_runs(closures_[a], closures_[b])) continue;
       const bool same = places.place_of[closures_[a].index] == places.place_of[closures_[b].index];
       if (same && steps <= kSteps) inside.push_back({steps, a, b});
       if (!same && is_first[a] && is_first[b] && steps <= kStepsBetweenPlaces &&
@@ -179,7 +196,7 @@ void Corroboration::count_cycles(PairCycles& cycles) const {
 }
 
 bool Corroboration::agree(const Upward& one, const Upward& other, double barc) const {
-  if (steps_between(one.upper, other.upper) > kBeside) return false;
+  if (steps_between(one.upper, other.upper) > kBeside || !same_runs(one, other)) return false;
   const SE3 T = pose_(one.lower).inverse() * pose_(other.lower) * other.T_lower_upper *
                 pose_(other.upper).inverse() * pose_(one.upper);
   const SE3& measured = one.T_lower_upper;

@@ -23,9 +23,9 @@ class Corroboration {
   /// `closures`: of one pair of robots. `pose`: where their ends are, by odometry or by an earlier
   /// optimisation. `step`: mean weights of an odometry step of each robot. For a robot without an
   /// entry they are 1, and in isolated() those of the closure. `dimension` 2: poses are planar. All
-  /// arguments must outlive this object.
+  /// arguments must outlive this object. No cycle contains the step to a run in `later_runs`.
   Corroboration(std::span<const PoseEdge> closures, const PoseOf& pose,
-                const std::map<RobotId, Precision>& step, int dimension);
+                const std::map<RobotId, Precision>& step, int dimension, LaterRuns later_runs = {});
 
   /// Counts the Mahalanobis lengths of cycles through two closures whose ends are a few keyframes
   /// apart on both robots, and the odometry between them. It counts at most `most` cycles, those
@@ -56,6 +56,7 @@ class Corroboration {
     Precision precision;
   };
 
+  [[nodiscard]] bool same_runs(const Upward& one, const Upward& other) const;
   [[nodiscard]] double cycle_length(const Upward& one, const Upward& other) const;
   [[nodiscard]] NoiseCycle noise_cycle(const Upward& one, const Upward& other, double volume) const;
   [[nodiscard]] double turn_rad(const Upward& one, const Upward& other) const;
@@ -65,6 +66,7 @@ class Corroboration {
   const PoseOf& pose_;
   const std::map<RobotId, Precision>& step_;
   int dimension_;
+  LaterRuns later_runs_;
   std::span<const PoseEdge> edges_;
   std::vector<Upward> closures_;  // ascending by the lower end
 };

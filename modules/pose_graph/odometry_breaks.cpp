@@ -61,7 +61,9 @@ std::vector<ErrorCycle> error_cycles(const OdometryChain& chain, std::span<const
                                      int dimension) {
   std::vector<PoseEdge> inside;
   for (const PoseEdge& e : closures)
-    if (std::max(e.from.index, e.to.index) < chain.T_first_kf.size()) inside.push_back(e);
+    if (std::max(e.from.index, e.to.index) < chain.T_first_kf.size() &&
+        chain.joins(e.from.index, e.to.index))
+      inside.push_back(e);
   std::ranges::sort(inside, {}, &PoseEdge::id);
   const std::vector<double> weights = find_places(inside).weights();
   const std::size_t stride = (inside.size() + kMostErrorCycles - 1) / kMostErrorCycles;

@@ -52,12 +52,14 @@ OdometryChain::OdometryChain(std::span<const PoseEdge> steps, int dimension)
     : dimension_(dimension) {
   for (const PoseEdge& step : steps) {
     T_first_kf.push_back(T_first_kf.back() * step.T_from_to);
+    const bool known = !is_unknown_step(step);
+    run_.push_back(run_.back() + (known ? 0 : 1));
     const Matrix6 Ad = adjoint(T_first_kf.back());
     const Matrix6 claimed = covariance_in(step.precision, dimension);
     for (const auto part : {OdometryCycle::kRotation, OdometryCycle::kTranslation}) {
       Matrix6 Sigma = Matrix6::Zero();
       const Eigen::Index begin = part == OdometryCycle::kRotation ? 0 : 3;
-      Sigma.block<3, 3>(begin, begin) = claimed.block<3, 3>(begin, begin);
+      if (known) Sigma.block<3, 3>(begin, begin) = claimed.block<3, 3>(begin, begin);
       covariance_[part].push_back(covariance_[part].back() + Ad * Sigma * Ad.transpose());
     }
   }

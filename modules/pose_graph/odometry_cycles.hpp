@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <vector>
@@ -13,7 +14,7 @@
 namespace km {
 
 /// The covariance that corresponds to the weights of an edge, tangent [rotation; translation]. In
-/// the plane (`dimension` 2) kappa is the precision of the angle (see precision_of_blocks()), and
+/// the plane (`dimension` 2) kappa is the precision of the angle (see planar_precision_of()), and
 /// roll, pitch and z have variance zero.
 [[nodiscard]] Matrix6 covariance_in(const Precision& precision, int dimension);
 
@@ -72,11 +73,15 @@ class OdometryChain {
   /// `steps[k]` is from keyframe k to keyframe k + 1. `dimension` 2: poses are planar.
   OdometryChain(std::span<const PoseEdge> steps, int dimension);
 
+  /// True if all steps between the keyframes are known.
+  [[nodiscard]] bool joins(std::size_t a, std::size_t b) const { return run_[a] == run_[b]; }
+
   /// The cycle from the lower end along the steps to the upper one, and back by the closure.
-  /// Precondition: both ends are keyframes of the chain.
+  /// Precondition: both ends are keyframes of the chain, and it joins() them.
   [[nodiscard]] OdometryCycle close(const PoseEdge& closure) const;
   /// The cycle along closure `one`, the steps to the upper end of closure `other`, back along it,
-  /// and the steps to the beginning. Precondition: all ends are keyframes of the chain.
+  /// and the steps to the beginning. Precondition: all ends are keyframes of the chain, and
+  /// it joins() both lower ones and both upper ones.
   [[nodiscard]] OdometryCycle close(const PoseEdge& one, const PoseEdge& other) const;
 
   std::vector<SE3> T_first_kf{SE3::Identity()};
@@ -87,6 +92,7 @@ class OdometryChain {
                                     OdometryCycle::Component part) const;
 
   int dimension_;
+  std::vector<std::uint32_t> run_{0};  // number of unknown steps before each keyframe
   // Claimed covariance of the steps up to each keyframe, as perturbations of the first pose. The
   // difference of two keyframes is the covariance of the chain between them.
   std::array<std::vector<Matrix6>, 2> covariance_{std::vector{Matrix6(Matrix6::Zero())},

@@ -47,7 +47,8 @@ std::vector<PoseEdge> in_order(std::span<const PoseEdge> closures, std::size_t k
 // Cycles, with weights such that each place counts once.
 std::vector<Cycle> cycles_of(const OdometryChain& chain, std::span<const PoseEdge> closures,
                              std::size_t& places) {
-  const std::vector<PoseEdge> sorted = in_order(closures, chain.T_first_kf.size());
+  std::vector<PoseEdge> sorted = in_order(closures, chain.T_first_kf.size());
+  std::erase_if(sorted, [&](const PoseEdge& e) { return !chain.joins(e.from.index, e.to.index); });
   const ClosurePlaces found = find_places(sorted);
   const std::vector<double> weights = found.weights();
   places = found.sizes.size();
@@ -67,7 +68,10 @@ std::vector<Cycle> short_cycles(const OdometryChain& chain, std::span<const Pose
   for (std::size_t k = 0; k + 1 < sorted.size(); ++k) {
     const ClosureId one = sorted[k].id(), other = sorted[k + 1].id();
     const auto steps = steps_between(one.from, other.from) + steps_between(one.to, other.to);
-    if (steps == 0 || steps > kMaxShortCycleSteps) continue;
+    if (steps == 0 || steps > kMaxShortCycleSteps ||
+        !chain.joins(one.from.index, other.from.index) ||
+        !chain.joins(one.to.index, other.to.index))
+      continue;
     cycles.push_back(chain.close(sorted[k], sorted[k + 1]));
     cycles.back().weight = kShortCycleWeight;
   }

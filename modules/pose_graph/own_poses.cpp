@@ -116,8 +116,9 @@ std::vector<PoseEdge> likely_closures(const OwnGraph& graph, RobotId self,
   if (!explained.empty()) return explained;
   const std::map<RobotId, Precision> step{{self, graph.mean_step_precision()}};
   const Corroboration::PoseOf pose = [&](const KeyframeId& id) { return poses[id.index]; };
-  const std::vector<bool> isolated = Corroboration(inside, pose, step, graph.dimension())
-                                         .isolated(default_threshold(graph.dimension()));
+  const std::vector<bool> isolated =
+      Corroboration(inside, pose, step, graph.dimension(), {{self, graph.later_runs()}})
+          .isolated(default_threshold(graph.dimension()));
   std::vector<PoseEdge> likely;
   for (std::size_t k = 0; k < inside.size(); ++k)
     if (!isolated[k]) likely.push_back(inside[k]);

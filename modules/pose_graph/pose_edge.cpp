@@ -24,11 +24,10 @@ bool is_unknown_step(const PoseEdge& step) {
 }
 
 PoseEdge unknown_step(const KeyframeId& from) {
-  constexpr double kTurn_rad = 2.0;  // about that of a uniform rotation
   return {from,
           {from.robot, from.index + 1},
           SE3::Identity(),
-          {0.5 / (kTurn_rad * kTurn_rad), 1.0 / (kUnknownStep_m * kUnknownStep_m)}};
+          {0.5 / (kUnknownTurn_rad * kUnknownTurn_rad), 1.0 / (kUnknownStep_m * kUnknownStep_m)}};
 }
 
 std::optional<PoseEdge> pose_edge(const RelativePose& measured) {

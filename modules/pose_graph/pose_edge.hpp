@@ -1,5 +1,6 @@
 #pragma once
 
+#include <map>
 #include <optional>
 #include <span>
 #include <vector>
@@ -38,6 +39,10 @@ struct PoseEdge {
 
 /// True for the step between two runs of a robot, see kUnknownStep_m.
 [[nodiscard]] bool is_unknown_step(const PoseEdge& step);
+
+/// First keyframes of the runs of each robot after its first one, ascending. A step to such a
+/// keyframe is unknown.
+using LaterRuns = std::map<RobotId, std::vector<KeyframeIndex>>;
 
 /// A step of this kind, from `from` to the next keyframe.
 [[nodiscard]] PoseEdge unknown_step(const KeyframeId& from);

@@ -20,7 +20,7 @@ inline constexpr double kLargestMu = 1e30;
 
 /// Square root of the 99.9999 % quantile of the chi-squared distribution with the degrees of
 /// freedom of a pose, 6 or (dimension 2) 3. In the plane the cost counts rotations twice (see
-/// precision_of_blocks()), so that the limit on the rotation of an inlier is slightly stricter.
+/// planar_precision_of()), so that the limit on the rotation of an inlier is slightly stricter.
 [[nodiscard]] double default_threshold(int dimension);
 
 /// Schedule of graduated non-convexity: it decides when mu increases and when the weights are

@@ -65,6 +65,7 @@ std::optional<FrozenPart> freeze_part(const Session& session, RobotId self, cons
   frozen.own = graph.own_edges();
   frozen.odometry = graph.keyframes() - 1;
   frozen.step_precision[self] = graph.mean_step_precision();
+  frozen.later_runs[self] = graph.later_runs();
   frozen.upright = session.upright;
   frozen.origin = {plan.has_member(session.anchor) ? session.anchor : coordinator_of(plan), 0};
   if (session.upright) frozen.verticals = graph.verticals();
@@ -190,6 +191,7 @@ bool SessionPart::gather(const PublicPoses& published) {
     const MemberPoses& poses = *poses_of(published, robot, *stage_);
     add_public_poses(poses, graph_.public_poses);
     if (!graph_.again) graph_.step_precision[robot] = poses.step_precision;
+    graph_.later_runs[robot] = poses.later_runs;
     for (const auto& [id, kept] : poses.verdicts)
       if (graph_.again && joins_members(id)) graph_.decided[id] = kept;
   }

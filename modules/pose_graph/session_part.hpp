@@ -21,9 +21,9 @@ namespace km {
 
 /// The contribution of a robot to a session, frozen when it joins.
 struct FrozenPart {
-  /// `public_poses` has the poses of absent robots only, and `step_precision` the entry of this
-  /// robot only. The other members of the session send theirs. The agent sets `start`, and the
-  /// decisions on closures to absent robots.
+  /// `public_poses` has the poses of absent robots only. `step_precision` and `later_runs` have
+  /// the entry of this robot only. The other members of the session send theirs. The agent sets
+  /// `start`, and the decisions on closures to absent robots.
   SessionGraph graph = {};
   TreePlace place = {};
   bool in_frame = false;  ///< `start` is already in the frame of the session.

@@ -352,12 +352,29 @@ void TeamAgent::advance(TeamOutput& output) {
   if (in_session()) conclude(output);
 }
 
+namespace {
+
+// The first of `keyframes`, which are ascending, in every run.
+std::vector<KeyframeIndex> first_in_runs(std::span<const KeyframeIndex> runs,
+                                         std::span<const KeyframeIndex> keyframes) {
+  std::vector<KeyframeIndex> first;
+  for (const KeyframeIndex run : runs) {
+    const auto found = std::ranges::lower_bound(keyframes, run);
+    if (found != keyframes.end() && (first.empty() || first.back() != *found))
+      first.push_back(*found);
+  }
+  return first;
+}
+
+}  // namespace
+
 void TeamAgent::publish_poses(TeamOutput& output) {
   MemberPoses message{.sender = self_, .session = part_->session().id};
   message.stage = *part_->stage();
   message.frame = part_->session().plan.frame;
   message.step_precision = graph_.mean_step_precision();
   message.keyframes = part_->public_keyframes();
+  message.later_runs = first_in_runs(graph_.later_runs(), message.keyframes);
   message.T_frame_kf = part_->public_poses();
   for (const WeighedClosure& verdict : part_->verdicts().closures)
     if (verdict.id.from.robot != verdict.id.to.robot) message.verdicts.push_back(verdict);

@@ -159,14 +159,18 @@ void describe(auto& archive, As<MemberPoses> auto& m) {
   archive(m.frame);
   describe_weight(archive, m.step_precision.kappa);
   describe_weight(archive, m.step_precision.tau);
-  std::uint64_t next = 0;  // keyframes are sent as differences
-  archive.list(m.keyframes, kMaxPublicPoses, kPoseBytes, [&](auto& keyframe) {
-    auto skipped = static_cast<std::uint32_t>(keyframe - next);
-    archive(skipped);
-    archive.require(next + skipped <= std::numeric_limits<KeyframeIndex>::max());
-    if constexpr (kReads<decltype(archive)>) keyframe = static_cast<KeyframeIndex>(next + skipped);
-    next = std::uint64_t{keyframe} + 1;
-  });
+  for (const auto& [keyframes, bytes] :
+       {std::pair(&m.keyframes, kPoseBytes), std::pair(&m.later_runs, std::size_t{1})}) {
+    std::uint64_t next = 0;  // keyframes are sent as differences
+    archive.list(*keyframes, kMaxPublicPoses, bytes, [&](auto& keyframe) {
+      auto skipped = static_cast<std::uint32_t>(keyframe - next);
+      archive(skipped);
+      archive.require(next + skipped <= std::numeric_limits<KeyframeIndex>::max());
+      if constexpr (kReads<decltype(archive)>)
+        keyframe = static_cast<KeyframeIndex>(next + skipped);
+      next = std::uint64_t{keyframe} + 1;
+    });
+  }
   archive.require(m.keyframes.empty() || m.keyframes.front() == 0);
   if constexpr (kReads<decltype(archive)>) m.T_frame_kf.resize(m.keyframes.size());
   for (auto& pose : m.T_frame_kf) {

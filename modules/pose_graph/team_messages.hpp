@@ -128,6 +128,8 @@ struct MemberPoses {
   TeamFrame frame = {};
   Precision step_precision = {};              ///< Mean weights of one step of its odometry.
   std::vector<KeyframeIndex> keyframes = {};  ///< Ascending, 0 first.
+  /// First of `keyframes` in every later run of the robot, ascending: see LaterRuns.
+  std::vector<KeyframeIndex> later_runs = {};
   std::vector<SinglePose> T_frame_kf = {};
   /// Verdicts of a solution on the closures to other robots that this robot weighs.
   std::vector<WeighedClosure> verdicts = {};

@@ -321,7 +321,7 @@ UpMessage TreeNewton::first_message() {
     std::vector<PoseEdge> closures;
     for (const std::size_t k : indices)
       if (known_[k].trust == Trust::kOpen && reports(known_[k])) closures.push_back(known_[k].edge);
-    Corroboration(closures, pose, graph_.step_precision, options_.dimension)
+    Corroboration(closures, pose, graph_.step_precision, options_.dimension, graph_.later_runs)
         .count_lengths(graph_.noise.lengths, most);
   }
   sums.lengths = graph_.noise.lengths;

@@ -38,7 +38,8 @@ void TreeNewton::weigh_by_noise() {
       if (known_[k].trust == Trust::kOpen) closures.push_back(known_[k].edge);
     PairCycles& cycles = graph_.noise.pairs[peer];
     if (!graph_.again)  // the poses now fit the closures that the first look has kept
-      Corroboration(closures, pose, graph_.step_precision, options_.dimension).count_cycles(cycles);
+      Corroboration(closures, pose, graph_.step_precision, options_.dimension, graph_.later_runs)
+          .count_cycles(cycles);
     cycles.factor = estimate_closure_noise(cycles, verdict_.noise_scale) / verdict_.noise_scale;
     weaken(indices, cycles.factor);
   }
@@ -76,7 +77,8 @@ void TreeNewton::find_isolated(double barc) {
         open.push_back(k);
       }
     const auto isolated =
-        Corroboration(closures, pose, graph_.step_precision, options_.dimension).isolated(barc);
+        Corroboration(closures, pose, graph_.step_precision, options_.dimension, graph_.later_runs)
+            .isolated(barc);
     const auto alone = std::ranges::count(isolated, true);
     for (std::size_t k = 0; k < open.size() && alone > kFewIsolated; ++k) {
       Known& known = known_[open[k]];

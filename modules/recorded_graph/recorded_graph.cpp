@@ -69,14 +69,25 @@ RobotId owner(const std::vector<RelativePose>& edges, const std::string& file) {
                            (owners.empty() ? " none" : list));
 }
 
-// Throws if a step is missing. `odometry` has an element for each step up to the last keyframe.
-void check_chain(const std::vector<std::optional<RelativePose>>& odometry, RobotId robot,
+RelativePose unknown_step(const KeyframeId& from) {
+  RelativePose step{from, {from.robot, from.index + 1}, SE3::Identity(), Matrix6::Zero()};
+  step.covariance.diagonal().head<3>().setConstant(kUnknownTurn_rad * kUnknownTurn_rad);
+  step.covariance.diagonal().tail<3>().setConstant(kUnknownStep_m * kUnknownStep_m);
+  return step;
+}
+
+// Throws if a keyframe up to `last` has no edge.
+void check_edges(const std::vector<RelativePose>& edges, RobotId robot, std::size_t last,
                  const std::string& file) {
-  const auto gap = std::find(odometry.begin(), odometry.end(), std::nullopt);
-  if (gap == odometry.end()) return;
-  const auto index = static_cast<std::uint32_t>(gap - odometry.begin());
-  throw std::runtime_error(file + ": no odometry from " + to_string({robot, index}) + " to " +
-                           to_string({robot, index + 1}));
+  std::vector<bool> has_edge(last + 1, false);
+  for (const RelativePose& edge : edges)
+    for (const KeyframeId& id : {edge.from, edge.to})
+      if (id.robot == robot) has_edge[id.index] = true;
+  const auto gap = std::ranges::find(has_edge, false);
+  if (gap != has_edge.end())
+    throw std::runtime_error(
+        file + ": no edge of keyframe " +
+        to_string({robot, static_cast<std::uint32_t>(gap - has_edge.begin())}));
 }
 
 // Number of steps of odometry if every index in the file is on the chain. Throws if there are fewer
@@ -104,9 +115,9 @@ void check_variances(const std::vector<RelativePose>& edges, const std::string& 
 }
 
 RecordedGraph make_recorded_graph(const G2oGraph& g2o, const std::string& file) {
-  if (g2o.dimension != 3) throw std::runtime_error(file + ": the graph is not 3D");
   check_variances(g2o.edges, file);
   RecordedGraph graph = make_recorded_graph(g2o.edges, file);
+  graph.dimension = g2o.dimension;
   graph.indefinite_edges = g2o.indefinite_edges;
   for (const G2oVertical& prior : g2o.verticals) {
     if (prior.id.robot != graph.robot || prior.id.index >= graph.poses())
@@ -123,6 +134,13 @@ SE3 RecordedGraph::T_odom_first() const {
   const auto first = verticals.find(0);
   if (first == verticals.end()) return SE3::Identity();
   return make_pose(rotation_to_z(first->second.up_body), Eigen::Vector3d::Zero());
+}
+
+RecordedGraph in_space(RecordedGraph graph) {
+  if (graph.dimension == 3) return graph;
+  for (auto* edges : {&graph.odometry, &graph.intra_closures, &graph.inter_closures})
+    for (RelativePose& e : *edges) e.covariance = covariance_of(planar_precision_of(e.covariance));
+  return graph;
 }
 
 std::vector<OdometryPose> odometry_poses(const RecordedGraph& graph) {
@@ -154,8 +172,9 @@ RecordedGraph make_recorded_graph(const std::vector<RelativePose>& edges, const 
     else
       graph.intra_closures.push_back(edge);
   }
-  check_chain(odometry, graph.robot, file);
-  for (const auto& edge : odometry) graph.odometry.push_back(*edge);
+  check_edges(edges, graph.robot, odometry.size(), file);
+  for (KeyframeIndex k = 0; k < odometry.size(); ++k)
+    graph.odometry.push_back(odometry[k] ? *odometry[k] : unknown_step({graph.robot, k}));
   return graph;
 }
 

@@ -17,6 +17,7 @@ namespace km {
 /// The part of one robot of a recorded pose graph.
 struct RecordedGraph {
   RobotId robot = 0;
+  int dimension = 3;                         ///< 2: planar, lifted to z = 0.
   std::vector<RelativePose> odometry;        ///< [i]: from keyframe i to i + 1 of `robot`.
   std::vector<RelativePose> intra_closures;  ///< Between keyframes of `robot`; order of the file.
   std::vector<RelativePose> inter_closures;  ///< One end on `robot`, either one; order of the file.
@@ -31,18 +32,23 @@ struct RecordedGraph {
   [[nodiscard]] SE3 T_odom_first() const;
 };
 
+/// The graph as robots solve it: in the plane, the covariance of each edge is that in space with
+/// equal weights, because roll, pitch and z of the covariance in the file are zero.
+[[nodiscard]] RecordedGraph in_space(RecordedGraph graph);
+
 /// [i]: keyframe i of `graph`, chained along its odometry from T_odom_first(), with the covariance
 /// accumulated since keyframe 0.
 [[nodiscard]] std::vector<OdometryPose> odometry_poses(const RecordedGraph& graph);
 
 /// Divides the measurements in the file of one robot into odometry and closures. Edges from
 /// keyframe i to i + 1 are its odometry (a second one for the same i is a closure). Other edges
-/// inside the robot and edges to other robots are closures. The robot is the one whose own
-/// keyframes have edges between them. `file` names the source in errors.
+/// inside the robot and edges to other robots are closures. A step without an edge is unknown, see
+/// kUnknownStep_m. The robot is the one whose own keyframes have edges between them. `file` names
+/// the source in errors.
 ///
 /// Throws std::runtime_error "file: what" unless exactly one robot has edges between its own
-/// keyframes and every edge ends on it. Also throws if its odometry is not a chain from keyframe 0
-/// without gaps, or if its closures do not end on that chain.
+/// keyframes and every edge ends on it. Also throws if a keyframe from 0 to the last one has
+/// no edge.
 [[nodiscard]] RecordedGraph make_recorded_graph(const std::vector<RelativePose>& edges,
                                                 const std::string& file);
 
@@ -53,7 +59,7 @@ struct RecordedGraph {
 [[nodiscard]] std::vector<RelativePose> read_measurements_csv(std::istream& in,
                                                               const std::string& file);
 
-/// Reads the part of one robot from a 3D g2o file (*.g2o) with its verticals, or from a table of
+/// Reads the part of one robot from a g2o file (*.g2o) with its verticals, or from a table of
 /// measurements (*.csv). From the JRL file of a team (*.jrl) it reads the part of `robot`. Throws
 /// std::runtime_error as the functions above and read_jrl() do. Also throws "file: what" if a
 /// vertical has no keyframe on the chain of the robot, or if the file contains another robot than

@@ -11,14 +11,6 @@
 namespace km {
 namespace {
 
-template <int N>
-Eigen::Matrix<double, N, N> inverse_of(const Eigen::Matrix<double, N, N>& M) {
-  const Eigen::LLT<Eigen::Matrix<double, N, N>> llt(M);
-  if (llt.info() != Eigen::Success || !M.allFinite())
-    throw std::invalid_argument("precision_of_blocks: covariance is not positive definite");
-  return llt.solve(Eigen::Matrix<double, N, N>::Identity());
-}
-
 std::set<KeyframeId> poses_of(const G2oGraph& graph, const std::string& file) {
   std::set<KeyframeId> poses;
   for (const G2oVertex& vertex : graph.vertices) poses.insert(vertex.id);
@@ -98,6 +90,8 @@ std::vector<RecordedGraph> read_parts(const std::vector<std::filesystem::path>& 
   std::vector<RecordedGraph> parts;
   for (const auto& file : files) {
     parts.push_back(read_recorded_graph(file));
+    if (parts.back().dimension != parts.front().dimension)
+      throw std::runtime_error(file.string() + ": 2D and 3D in one folder");
     const auto same = std::find_if(parts.begin(), parts.end() - 1, [&](const RecordedGraph& part) {
       return part.robot == parts.back().robot;
     });
@@ -115,12 +109,9 @@ std::vector<RecordedGraph> read_parts(const std::vector<std::filesystem::path>& 
 }  // namespace
 
 Precision precision_of_blocks(const Matrix6& covariance, int dimension) {
-  if (dimension == 2) {
-    const Eigen::Matrix3d planar = covariance({2, 3, 4}, {2, 3, 4});  // angle, x, y
-    const Eigen::Matrix3d information = inverse_of<3>(planar);
-    return {information(0, 0), 2.0 / inverse_of<2>(information.bottomRightCorner<2, 2>()).trace()};
-  }
-  (void)inverse_of<6>(covariance);  // a file is refused where a robot has a way out
+  if (dimension == 2) return planar_precision_of(covariance);
+  if (!covariance.allFinite() || Eigen::LLT<Matrix6>(covariance).info() != Eigen::Success)
+    throw std::invalid_argument("precision_of_blocks: covariance is not positive definite");
   return precision_of(covariance);
 }
 
@@ -182,7 +173,7 @@ TeamGraph partition_graph(const G2oGraph& graph, const std::map<KeyframeId, std:
 TeamGraph read_team_folder(const std::filesystem::path& folder) {
   const std::vector<RecordedGraph> parts = read_parts(part_files(folder));
   check_complete(parts, folder);
-  G2oGraph all{.dimension = 3, .vertices = {}, .edges = {}};
+  G2oGraph all{.dimension = parts.front().dimension, .vertices = {}, .edges = {}};
   std::map<KeyframeId, std::size_t> robot_of;
   std::set<std::pair<KeyframeId, KeyframeId>> from_start;
   for (std::size_t k = 0; k < parts.size(); ++k) {

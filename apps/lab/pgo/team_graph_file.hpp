@@ -13,9 +13,8 @@
 namespace km {
 
 /// Weights of a relative pose in a graph of this dimension. 3: precision_of(), as robots weigh
-/// their measurements. 2: kappa = I_33, tau = 2 / tr(I_t^-1) of the information matrix in the
-/// plane, as SE-Sync reads g2o files. Throws std::invalid_argument if `covariance` (in the plane,
-/// for dimension 2) is not positive definite.
+/// their measurements. 2: planar_precision_of(). Throws std::invalid_argument if `covariance` (in
+/// the plane, for dimension 2) is not positive definite.
 [[nodiscard]] Precision precision_of_blocks(const Matrix6& covariance, int dimension);
 
 /// Divides the poses of a graph among `robots` robots, in ascending order of ids. Each robot gets a

@@ -21,7 +21,8 @@ Overloaded(Handlers...) -> Overloaded<Handlers...>;  // Clang before 17 does not
 }  // namespace
 
 TeamNode::TeamNode(const PoseGraphConfig& config, TeamPeer self, MemberSolverFactory solvers,
-                   std::function<std::uint64_t()> sent_bytes, const TeamTopics& topics)
+                   std::function<std::uint64_t()> sent_bytes, const TeamTopics& topics,
+                   int dimension)
     // The time of a round grows with the graph.
     : WorkerNode({.name = PoseGraphConfig::kSection,
                   .queue = kQueue,
@@ -30,7 +31,7 @@ TeamNode::TeamNode(const PoseGraphConfig& config, TeamPeer self, MemberSolverFac
       self_(self),
       topics_(topics),
       sent_bytes_(std::move(sent_bytes)),
-      agent_(config, self, std::move(solvers)) {
+      agent_(config, self, std::move(solvers), dimension) {
   follow(topics.odometry, topics.closures, topics.fixes, topics.inlier_sets,
          topics.peer_inlier_sets, topics.restored_inlier_sets, topics.peer_events, topics.links,
          topics.peer_messages);

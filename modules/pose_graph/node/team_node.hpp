@@ -46,9 +46,10 @@ using TeamInput =
 class TeamNode final : public WorkerNode<TeamInput> {
  public:
   /// `self`: as announced by the participant. `solvers`: creates the solver of each session. Throws
-  /// ConfigError if `config` is out of bounds. `sent_bytes`: see TeamAgent::step().
+  /// ConfigError if `config` is out of bounds. `sent_bytes`: see TeamAgent::step(). `dimension`:
+  /// see TeamAgent.
   TeamNode(const PoseGraphConfig& config, TeamPeer self, MemberSolverFactory solvers,
-           std::function<std::uint64_t()> sent_bytes, const TeamTopics& topics);
+           std::function<std::uint64_t()> sent_bytes, const TeamTopics& topics, int dimension = 3);
   ~TeamNode() override { stop(); }
 
   /// See TeamAgent. Call before start().

@@ -62,7 +62,7 @@ class Lanes {
   [[nodiscard]] std::optional<NoiseScale> noise_scale(std::size_t most = 300) const {
     NoiseHistogram lengths;
     const Corroboration::PoseOf pose = [this](const KeyframeId& k) { return poses_.at(k); };
-    Corroboration(closures_, pose, step_, dimension_).count_lengths(lengths, most);
+    Corroboration(closures_, pose, step_, dimension_, later_runs_).count_lengths(lengths, most);
     return fit_noise(lengths, dimension_);
   }
   // Cycles through two true closures and at most 10 steps of odometry.
@@ -83,8 +83,8 @@ class Lanes {
   }
   [[nodiscard]] std::set<ClosureId> isolated(const std::vector<PoseEdge>& closures) const {
     const Corroboration::PoseOf pose = [this](const KeyframeId& k) { return poses_.at(k); };
-    const std::vector<bool> alone =
-        Corroboration(closures, pose, step_, dimension_).isolated(default_threshold(dimension_));
+    const std::vector<bool> alone = Corroboration(closures, pose, step_, dimension_, later_runs_)
+                                        .isolated(default_threshold(dimension_));
     REQUIRE(alone.size() == closures.size());
     std::set<ClosureId> ids;
     for (std::size_t k = 0; k < alone.size(); ++k)
@@ -97,6 +97,8 @@ class Lanes {
     for (const PoseEdge& e : closures_) ids.insert(e.id());
     return ids;
   }
+  // The step to keyframe `k` of the second robot is unknown.
+  void interrupt(int k) { later_runs_[kOther].push_back(id(1, k).index); }
   [[nodiscard]] std::mt19937& rng() { return rng_; }
 
  private:
@@ -125,6 +127,7 @@ class Lanes {
   Precision precision_;
   std::map<RobotId, Precision> step_;
   std::map<KeyframeId, SE3> poses_;
+  LaterRuns later_runs_;
   std::vector<PoseEdge> closures_;
 };
 
@@ -232,6 +235,14 @@ TEST_CASE("A closure far from all others stands alone", "[pose_graph]") {
   Lanes lanes(GENERATE(2, 3), 1.0, 4);
   for (const int k : {10, 40, 70}) lanes.add_true(k, k);
   CHECK(lanes.isolated() == lanes.ids());
+}
+
+TEST_CASE("No cycle contains an unknown step", "[pose_graph]") {
+  Lanes lanes(3, 1.0, 2);
+  for (int k = 0; k < 40; ++k) lanes.add_true(k, k);
+  for (int k = 1; k < 40; ++k) lanes.interrupt(k);
+  CHECK_FALSE(lanes.noise_scale());
+  CHECK(lanes.isolated().size() == 40);
 }
 
 TEST_CASE("False closures stand alone, even near true ones", "[pose_graph]") {

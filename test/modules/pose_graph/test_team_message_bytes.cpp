@@ -63,7 +63,8 @@ MemberPoses some_poses() {
                     .stage = MemberStage::kSolved,
                     .frame = {kPeer2, 8},
                     .step_precision = {123.456, 7.0},
-                    .keyframes = {0, 1, 5, 200, 4'000'000'000U}};
+                    .keyframes = {0, 1, 5, 200, 4'000'000'000U},
+                    .later_runs = {5, 4'000'000'000U}};
   for (std::size_t k = 0; k < poses.keyframes.size(); ++k)
     poses.T_frame_kf.push_back(SinglePose::of(random_pose(random, 100.0)));
   poses.verdicts = {{closure_id({7, 200}, {2, 3}), true}, {closure_id({7, 5}, {60000, 9}), false}};
@@ -229,6 +230,7 @@ TEST_CASE("Invalid poses of a member are refused", "[pose_graph]") {
       some_poses(),
       {{"keyframes out of order", [](P& m) { std::swap(m.keyframes[1], m.keyframes[2]); }},
        {"keyframe 0 is missing", [](P& m) { m.keyframes[0] = 1, m.keyframes[1] = 2; }},
+       {"runs out of order", [](P& m) { std::swap(m.later_runs[0], m.later_runs[1]); }},
        {"fewer poses than keyframes", [](P& m) { m.T_frame_kf.pop_back(); }},
        {"more poses than keyframes", [](P& m) { m.T_frame_kf.push_back(m.T_frame_kf[0]); }},
        {"not finite", [](P& m) { m.T_frame_kf[3].t.z() = static_cast<float>(kInfinity); }},
