@@ -62,10 +62,16 @@ std::vector<SE3> deformed_to_received(const std::vector<SE3>& poses, RobotId sel
 }
 
 std::vector<SE3> better_of_chordal(std::vector<SE3> poses, std::span<const PoseEdge> own) {
+  // Without a closure across an unknown step, its weight is too small for a factorisation.
+  constexpr Precision kLeast{0.1, 1e-3};
+  std::vector<PoseEdge> edges(own.begin(), own.end());
+  for (PoseEdge& e : edges)
+    e.precision = {std::max(e.precision.kappa, kLeast.kappa),
+                   std::max(e.precision.tau, kLeast.tau)};
   std::vector<SE3> chordal =
-      chordal_initialisation(static_cast<Eigen::Index>(poses.size()), block_edges(own));
+      chordal_initialisation(static_cast<Eigen::Index>(poses.size()), block_edges(edges));
   for (SE3& T : chordal) T = poses.front() * T;
-  return cost_of(own, chordal) < cost_of(own, poses) ? chordal : poses;
+  return cost_of(edges, chordal) < cost_of(edges, poses) ? chordal : poses;
 }
 
 }  // namespace km

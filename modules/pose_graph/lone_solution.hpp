@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "modules/pose_graph/session_graph.hpp"
@@ -24,5 +25,14 @@ LoneSolution solve_alone(SessionGraph graph, TreeNewtonOptions options);
 /// away, while closures between robots are weighed. The start does not move if there are no
 /// closures inside this robot, if there is no solution, or if these do not mostly_fit() it.
 [[nodiscard]] std::vector<SE3> relaxed_start(SessionGraph graph, const TreeNewtonOptions& options);
+
+/// The solution of `graph`, which has no closures to members, with all its closures, if they and
+/// odometry are as precise as they claim: the hypothesis that nothing is false. The cost is then
+/// chi-squared distributed, with 6 degrees of freedom (in the plane 3) for each closure that is not
+/// needed to join two runs. No closure has a residual that would reject it. The start is the
+/// chordal initialisation with all closures, so the test needs no odometry that is precise over
+/// long distances.
+[[nodiscard]] std::optional<std::vector<SE3>> solution_if_all_true(SessionGraph graph,
+                                                                   TreeNewtonOptions options);
 
 }  // namespace km

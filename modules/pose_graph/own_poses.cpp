@@ -23,16 +23,6 @@ namespace {
 // chordal start.
 constexpr std::size_t kEnoughForChordal = 20;
 
-// The edges for the chordal initialisation. Without a closure across an unknown step, the weight of
-// this step is too small for a factorisation.
-std::vector<PoseEdge> weighed_to_start(std::vector<PoseEdge> edges) {
-  constexpr Precision kLeast{0.1, 1e-3};
-  for (PoseEdge& e : edges)
-    e.precision = {std::max(e.precision.kappa, kLeast.kappa),
-                   std::max(e.precision.tau, kLeast.tau)};
-  return edges;
-}
-
 // True if more than half of the places of `closures` agree with the poses. O(n log n), unlike the
 // search for the transform on which most of them agree.
 bool fits(std::span<const PoseEdge> closures, const std::vector<SE3>& poses) {
@@ -135,13 +125,13 @@ std::vector<SE3> own_start(const OwnGraph& graph, RobotId self, bool trusted) {
   const std::vector<PoseEdge>* inside = graph.newest_edges(self);
   if (inside == nullptr) return poses;
   const std::vector<PoseEdge> all = graph.own_edges();
-  if (trusted) return better_of_chordal(std::move(poses), weighed_to_start(all));
+  if (trusted) return better_of_chordal(std::move(poses), all);
   const std::size_t steps = graph.keyframes() - 1;
   std::vector<PoseEdge> likely(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(steps));
   for (const PoseEdge& closure : likely_closures(graph, self, poses, *inside))
     likely.push_back(closure);
   if (likely.size() < steps + kEnoughForChordal) return poses;
-  std::vector<SE3> chordal = better_of_chordal(poses, weighed_to_start(std::move(likely)));
+  std::vector<SE3> chordal = better_of_chordal(poses, likely);
   const auto cost = [&](const std::vector<SE3>& T_odom_kf) {
     return truncated_cost(all, steps, T_odom_kf, graph.dimension());
   };

@@ -239,10 +239,11 @@ class TeamAgent {
 
   OwnFrame frame_;
   OwnPoses poses_;
-  // The start of this robot in sessions of several robots, and what it follows from.
+  // The start of this robot in a session, and what it follows from.
   struct Relaxed {
     std::uint32_t revision = 0;
     bool upright = false;
+    bool alone = false;  // in a session of one robot
     std::vector<SE3> poses = {};
   };
   std::optional<Relaxed> relaxed_;

@@ -251,8 +251,7 @@ void TeamAgent::set_start(const Session& session, SessionGraph& graph) {
       graph.fixes = fix_edges(graph_.fixes(), placement_.kept, graph.start);
     }
   }
-  if (session.plan.members.size() > 1 && expects_false())
-    graph.start = relaxed_own_start(session, graph);
+  if (expects_false()) graph.start = relaxed_own_start(session, graph);
   if (session.plan.frame != session.id && session.plan.members.front().peer == self_) {
     const SE3 T_frame_start = poses_.T_frame_kf().front() * graph.start.front().inverse();
     for (SE3& T : graph.start) T = T_frame_start * T;
@@ -265,13 +264,16 @@ void TeamAgent::set_start(const Session& session, SessionGraph& graph) {
 
 std::vector<SE3> TeamAgent::relaxed_own_start(const Session& session, SessionGraph graph) {
   const std::uint32_t revision = graph_.revision();
+  const bool alone = session.plan.members.size() == 1;
   const bool known = graph.fixes.empty() && relaxed_ && relaxed_->revision == revision &&
-                     relaxed_->upright == session.upright;
+                     relaxed_->upright == session.upright && relaxed_->alone == alone;
   if (known) return relaxed_->poses;
   for (auto* edges : {&graph.between, &graph.to_absent, &graph.datum_ties}) edges->clear();
-  relaxed_ = {
-      revision, session.upright,
-      relaxed_start(std::move(graph), {.dimension = graph_.dimension(), .barc = config_.barc})};
+  const TreeNewtonOptions options{.dimension = graph_.dimension(), .barc = config_.barc};
+  std::optional<std::vector<SE3>> start;
+  if (graph.fixes.empty()) start = solution_if_all_true(graph, options);
+  if (!start) start = alone ? graph.start : relaxed_start(std::move(graph), options);
+  relaxed_ = {revision, session.upright, alone, std::move(*start)};
   return relaxed_->poses;
 }
 

@@ -98,6 +98,17 @@ TEST_CASE("a relaxed start is the optimum of the true own edges", "[pose_graph]"
   CHECK(true_cost(laps, laps.graph.start) > 10.0 * true_cost(laps, relaxed));
 }
 
+TEST_CASE("the hypothesis that nothing is false holds only if it is true", "[pose_graph]") {
+  const unsigned seed = GENERATE(range(1U, 11U));
+  CAPTURE(seed);
+  const Laps laps(seed, {});
+  const auto solution = solution_if_all_true(laps.graph, {});
+  REQUIRE(solution);
+  const LoneSolution optimum = solve_alone(laps.graph, {.robust = false});
+  CHECK(true_cost(laps, *solution) <= true_cost(laps, optimum.poses) * (1.0 + 1e-6));
+  CHECK_FALSE(solution_if_all_true(Laps(seed, {9U}).graph, {}));
+}
+
 TEST_CASE("a start without closures, or that cannot be solved, stays", "[pose_graph]") {
   Laps laps(1);
   SECTION("no closures") {
