@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
+#include <span>
 #include <stdexcept>
 #include <utility>
 
@@ -20,6 +22,18 @@ double largest_cost(std::ptrdiff_t closures, int dimension) {
   const double mean = dimension == 2 ? 4.0 : 6.0, variance = 12.0;
   const auto n = static_cast<double>(closures);
   return mean * n + kQuantile * std::sqrt(variance * n);
+}
+
+constexpr double kWhole = std::numeric_limits<double>::infinity();
+
+double squared_residual(const PoseEdge& e, const std::vector<SE3>& poses) {
+  return std::pow(residual_of(e, poses[e.from.index], poses[e.to.index]), 2);
+}
+
+double cost_of(std::span<const PoseEdge> edges, const std::vector<SE3>& poses, double most) {
+  double sum = 0.0;
+  for (const PoseEdge& e : edges) sum += std::min(squared_residual(e, poses), most);
+  return sum;
 }
 
 }  // namespace
@@ -64,24 +78,59 @@ std::optional<std::vector<SE3>> solution_if_all_true(SessionGraph graph,
       edges.end() - closures - std::count_if(edges.begin(), closures, is_unknown_step);
   if (free <= 0) return std::nullopt;
   const double largest = largest_cost(free, options.dimension);
-  const auto residual = [&](const PoseEdge& e, const std::vector<SE3>& poses) {
-    return residual_of(e, poses[e.from.index], poses[e.to.index]);
-  };
-  const auto cost = [&](const std::vector<SE3>& poses) {
-    double sum = 0.0;
-    for (const PoseEdge& e : edges) sum += std::pow(residual(e, poses), 2);
-    return sum;
-  };
   graph.start = better_of_chordal(std::move(graph.start), edges);
-  if (!(cost(graph.start) <= kFar * largest)) return std::nullopt;
+  if (!(cost_of(edges, graph.start, kWhole) <= kFar * largest)) return std::nullopt;
   options.robust = false;
   LoneSolution solution = solve_alone(std::move(graph), options);
   const double barc = default_threshold(options.dimension);
   const bool fit = std::all_of(closures, edges.end(), [&](const PoseEdge& e) {
-    return residual(e, solution.poses) <= barc;
+    return squared_residual(e, solution.poses) <= barc * barc;
   });
-  if (!solution.converged || !fit || cost(solution.poses) > largest) return std::nullopt;
+  if (!solution.converged || !fit || cost_of(edges, solution.poses, kWhole) > largest)
+    return std::nullopt;
   return std::move(solution.poses);
+} catch (const std::invalid_argument&) {  // the session will report it
+  return std::nullopt;
+}
+
+std::optional<DecidedSolution> solution_one_by_one(const SessionGraph& graph,
+                                                   TreeNewtonOptions options) try {
+  constexpr std::size_t kMost = 100'000;
+  constexpr std::uint32_t kRounds = 50;
+  const std::span<const PoseEdge> own(graph.own);
+  const std::span<const PoseEdge> odometry = own.first(graph.odometry);
+  std::vector<PoseEdge> closures(own.begin() + static_cast<std::ptrdiff_t>(graph.odometry),
+                                 own.end());
+  if (closures.empty() || closures.size() * graph.start.size() > kMost) return std::nullopt;
+  std::ranges::stable_sort(closures, {},
+                           [](const PoseEdge& e) { return steps_between(e.from, e.to); });
+  const LoneSolution weighed = solve_alone(graph, options);
+  const double rejected = weighed.barc * weighed.barc;
+  options.robust = false;
+  options.max_rounds = kRounds;
+  SessionGraph trial = graph;
+  trial.own.resize(graph.odometry);
+  DecidedSolution found{graph.start, {}};
+  double cost = 0.0;
+  for (int sweep = 0; sweep < 2; ++sweep)
+    for (const PoseEdge& closure : closures) {
+      if (found.decided[closure.id()]) continue;
+      trial.own.push_back(closure);
+      LoneSolution next = solve_alone(trial, options);
+      const double increased = cost_of(trial.own, next.poses, kWhole);
+      if (next.converged && increased - cost < rejected) {
+        found.decided[closure.id()] = true;
+        cost = increased;
+        trial.start = found.poses = std::move(next.poses);
+      } else {
+        trial.own.pop_back();
+      }
+    }
+  const double total = cost + rejected * static_cast<double>(own.size() - trial.own.size());
+  const double other =
+      cost_of(odometry, weighed.poses, kWhole) + cost_of(closures, weighed.poses, rejected);
+  if (!(total < other)) return std::nullopt;
+  return found;
 } catch (const std::invalid_argument&) {  // the session will report it
   return std::nullopt;
 }

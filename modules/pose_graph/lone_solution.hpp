@@ -1,5 +1,6 @@
 #pragma once
 
+#include <map>
 #include <optional>
 #include <vector>
 
@@ -34,5 +35,19 @@ LoneSolution solve_alone(SessionGraph graph, TreeNewtonOptions options);
 /// long distances.
 [[nodiscard]] std::optional<std::vector<SE3>> solution_if_all_true(SessionGraph graph,
                                                                    TreeNewtonOptions options);
+
+/// A solution of the own edges of a robot, and which closures it keeps.
+struct [[nodiscard]] DecidedSolution {
+  std::vector<SE3> poses;
+  std::map<ClosureId, bool> decided;
+};
+
+/// The closures of `graph`, which has none to members, one after the other, those along the fewest
+/// steps first. A closure is kept if it increases the cost of the solution by less than the cost of
+/// a rejected one. With few closures that odometry hardly predicts, graduated non-convexity ends in
+/// a worse minimum of this truncated cost. nullopt if it finds a lower one, or if there are more
+/// than 100,000 poses times closures.
+[[nodiscard]] std::optional<DecidedSolution> solution_one_by_one(const SessionGraph& graph,
+                                                                 TreeNewtonOptions options);
 
 }  // namespace km

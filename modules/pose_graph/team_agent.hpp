@@ -15,6 +15,7 @@
 #include "modules/pose_graph/closure_decisions.hpp"
 #include "modules/pose_graph/fix_placement.hpp"
 #include "modules/pose_graph/frame_ties.hpp"
+#include "modules/pose_graph/lone_solution.hpp"
 #include "modules/pose_graph/own_graph.hpp"
 #include "modules/pose_graph/own_poses.hpp"
 #include "modules/pose_graph/pose_graph_config.hpp"
@@ -182,7 +183,8 @@ class TeamAgent {
   bool join(const Session& session);
   [[nodiscard]] std::optional<FrozenPart> freeze(const Session& session) const;
   void set_start(const Session& session, SessionGraph& graph);
-  [[nodiscard]] std::vector<SE3> relaxed_own_start(const Session& session, SessionGraph graph);
+  [[nodiscard]] const DecidedSolution& relaxed_own_start(const Session& session,
+                                                         SessionGraph graph);
   [[nodiscard]] bool expects_false() const {
     return config_.robust && config_.method == PgoMethod::kNewton;
   }
@@ -244,7 +246,7 @@ class TeamAgent {
     std::uint32_t revision = 0;
     bool upright = false;
     bool alone = false;  // in a session of one robot
-    std::vector<SE3> poses = {};
+    DecidedSolution start = {};
   };
   std::optional<Relaxed> relaxed_;
   std::optional<RobotId> solution_anchor_;  // anchor of the last session with a solution

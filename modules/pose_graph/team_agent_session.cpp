@@ -251,7 +251,11 @@ void TeamAgent::set_start(const Session& session, SessionGraph& graph) {
       graph.fixes = fix_edges(graph_.fixes(), placement_.kept, graph.start);
     }
   }
-  if (expects_false()) graph.start = relaxed_own_start(session, graph);
+  if (expects_false()) {
+    const DecidedSolution& relaxed = relaxed_own_start(session, graph);
+    graph.start = relaxed.poses;
+    graph.decided = relaxed.decided;
+  }
   if (session.plan.frame != session.id && session.plan.members.front().peer == self_) {
     const SE3 T_frame_start = poses_.T_frame_kf().front() * graph.start.front().inverse();
     for (SE3& T : graph.start) T = T_frame_start * T;
@@ -262,19 +266,24 @@ void TeamAgent::set_start(const Session& session, SessionGraph& graph) {
       graph.decided.insert(*decided);
 }
 
-std::vector<SE3> TeamAgent::relaxed_own_start(const Session& session, SessionGraph graph) {
+const DecidedSolution& TeamAgent::relaxed_own_start(const Session& session, SessionGraph graph) {
   const std::uint32_t revision = graph_.revision();
   const bool alone = session.plan.members.size() == 1;
-  const bool known = graph.fixes.empty() && relaxed_ && relaxed_->revision == revision &&
+  const bool fixed = !graph.fixes.empty();
+  const bool known = !fixed && relaxed_ && relaxed_->revision == revision &&
                      relaxed_->upright == session.upright && relaxed_->alone == alone;
-  if (known) return relaxed_->poses;
+  if (known) return relaxed_->start;
+  relaxed_ = {revision, session.upright, alone, {graph.start, {}}};
+  DecidedSolution& start = relaxed_->start;
   for (auto* edges : {&graph.between, &graph.to_absent, &graph.datum_ties}) edges->clear();
   const TreeNewtonOptions options{.dimension = graph_.dimension(), .barc = config_.barc};
-  std::optional<std::vector<SE3>> start;
-  if (graph.fixes.empty()) start = solution_if_all_true(graph, options);
-  if (!start) start = alone ? graph.start : relaxed_start(std::move(graph), options);
-  relaxed_ = {revision, session.upright, alone, std::move(*start)};
-  return relaxed_->poses;
+  if (auto all_true = fixed ? std::nullopt : solution_if_all_true(graph, options))
+    start.poses = *std::move(all_true);
+  else if (!alone)
+    start.poses = relaxed_start(std::move(graph), options);
+  else if (auto one_by_one = fixed ? std::nullopt : solution_one_by_one(graph, options))
+    start = *std::move(one_by_one);
+  return start;
 }
 
 // Number of closures of this robot in the newest sets of edges.

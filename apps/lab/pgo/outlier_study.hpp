@@ -75,8 +75,7 @@ using OutlierProgress = std::function<void(std::size_t, std::size_t)>;
 /// By edge: whether pairwise consistency maximisation keeps the edge. It keeps all odometry, and
 /// the largest set of closures that agree pairwise, separately for each pair of robots and inside
 /// each robot (see Pcm). Closures come in the order of the edges. A second closure from the same
-/// pose to the same pose is dropped. Throws std::invalid_argument if a robot's odometry is
-/// interrupted, and as Pcm does.
+/// pose to the same pose is dropped. Throws as Pcm does.
 [[nodiscard]] std::vector<bool> pairwise_consistent(const TeamGraph& graph,
                                                     const PcmConfig& config);
 
