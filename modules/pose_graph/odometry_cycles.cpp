@@ -14,6 +14,14 @@ UncertainPose exact(UncertainPose pose) {
   return pose;
 }
 
+Matrix6 covariance_of_part(const Precision& precision, OdometryCycle::Component part,
+                           int dimension) {
+  Matrix6 Sigma = covariance_in(precision, dimension);
+  const Eigen::Index other = part == OdometryCycle::kRotation ? 3 : 0;
+  Sigma.block<3, 3>(other, other).setZero();
+  return Sigma;
+}
+
 }  // namespace
 
 Matrix6 covariance_in(const Precision& precision, int dimension) {
@@ -55,19 +63,18 @@ OdometryChain::OdometryChain(std::span<const PoseEdge> steps, int dimension)
     const bool known = !is_unknown_step(step);
     run_.push_back(run_.back() + (known ? 0 : 1));
     const Matrix6 Ad = adjoint(T_first_kf.back());
-    const Matrix6 claimed = covariance_in(step.precision, dimension);
     for (const auto part : {OdometryCycle::kRotation, OdometryCycle::kTranslation}) {
       Matrix6 Sigma = Matrix6::Zero();
-      const Eigen::Index begin = part == OdometryCycle::kRotation ? 0 : 3;
-      if (known) Sigma.block<3, 3>(begin, begin) = claimed.block<3, 3>(begin, begin);
+      if (known) Sigma = covariance_of_part(step.precision, part, dimension);
       covariance_[part].push_back(covariance_[part].back() + Ad * Sigma * Ad.transpose());
     }
   }
 }
 
 // From the lower keyframe to the upper one.
-UncertainPose OdometryChain::upward(const PoseEdge& closure) const {
-  const UncertainPose measured{closure.T_from_to, covariance_in(closure.precision, dimension_)};
+UncertainPose OdometryChain::upward(const PoseEdge& closure, OdometryCycle::Component part) const {
+  const UncertainPose measured{closure.T_from_to,
+                               covariance_of_part(closure.precision, part, dimension_)};
   return closure.from < closure.to ? measured : inverse(measured);
 }
 
@@ -84,13 +91,15 @@ OdometryCycle OdometryChain::close(const PoseEdge& closure) const {
   using enum OdometryCycle::Component;
   const auto [lower, upper] = std::minmax(closure.from.index, closure.to.index);
   OdometryCycle cycle{.closure = closure, .lower = lower, .upper = upper};
-  const UncertainPose measured = upward(closure);
   // The error is small, so the covariances of steps and closure may both be taken at the upper
   // keyframe.
-  cycle.error = se3_log(measured.T.inverse() * steps(lower, upper, kRotation).T);
-  for (const auto part : {kRotation, kTranslation})
-    cycle.covariance[part] = steps(lower, upper, part).Sigma;
-  cycle.covariance[kClosure] = measured.Sigma;
+  for (const auto part : {kRotation, kTranslation}) {
+    const UncertainPose measured = upward(closure, part), chain = steps(lower, upper, part);
+    cycle.error = se3_log(measured.T.inverse() * chain.T);
+    cycle.covariance[part] = chain.Sigma;
+    cycle.of_closures[part] = measured.Sigma;
+    cycle.covariance[kClosure] += measured.Sigma;
+  }
   return cycle;
 }
 
@@ -100,11 +109,12 @@ OdometryCycle OdometryChain::close(const PoseEdge& one, const PoseEdge& other) c
   const auto [other_lower, other_upper] = std::minmax(other.from.index, other.to.index);
   OdometryCycle cycle{.closure = one, .other = other, .lower = lower, .upper = upper};
   for (const auto part : {kRotation, kTranslation}) {
-    const TwoClosureCycle around{upward(one), steps(upper, other_upper, part),
-                                 inverse(upward(other)), steps(other_lower, lower, part)};
+    const TwoClosureCycle around{upward(one, part), steps(upper, other_upper, part),
+                                 inverse(upward(other, part)), steps(other_lower, lower, part)};
     cycle.error = se3_log(around.T());
     cycle.covariance[part] = around.covariance_of_odometry();
-    cycle.covariance[kTwoClosures] = around.covariance_of_closures();
+    cycle.of_closures[part] = around.covariance_of_closures();
+    cycle.covariance[kTwoClosures] += cycle.of_closures[part];
   }
   return cycle;
 }

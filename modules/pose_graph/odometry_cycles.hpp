@@ -58,6 +58,8 @@ struct OdometryCycle {
   Vector6 error = Vector6::Zero();
   std::array<Matrix6, kComponents> covariance = {  ///< Claimed covariance of `error`, by source.
       Matrix6::Zero(), Matrix6::Zero(), Matrix6::Zero(), Matrix6::Zero()};
+  /// Claimed covariance by the rotations and by the translations of the closures.
+  std::array<Matrix6, 2> of_closures = {Matrix6::Zero(), Matrix6::Zero()};
   double weight = 1.0;  ///< Number of independent observations.
 
   [[nodiscard]] Matrix6 claimed() const {
@@ -87,7 +89,7 @@ class OdometryChain {
   std::vector<SE3> T_first_kf{SE3::Identity()};
 
  private:
-  [[nodiscard]] UncertainPose upward(const PoseEdge& closure) const;
+  [[nodiscard]] UncertainPose upward(const PoseEdge& closure, OdometryCycle::Component part) const;
   [[nodiscard]] UncertainPose steps(std::size_t from, std::size_t to,
                                     OdometryCycle::Component part) const;
 

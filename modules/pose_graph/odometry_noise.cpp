@@ -140,6 +140,7 @@ double log_posterior(const Cycles& all, const Factors& v) {
 
 struct Fit {
   Factors factors{1.0, 1.0, 1.0, 1.0};
+  double log_posterior = 0.0;
   double log_odds = 0.0;  // that odometry is noisier than it claims
 };
 
@@ -196,6 +197,7 @@ Fit fit_factors(const Cycles& all) {
         }
       if (!is_better) break;
     }
+  fit.log_posterior = most;
   fit.log_odds = most - log_posterior_of_claims(all);
   return fit;
 }
@@ -207,6 +209,16 @@ std::vector<Cycle> with_normal_errors(std::vector<Cycle> cycles, const Factors& 
     const double variance = cycle.covariance[kRotation].topLeftCorner<3, 3>().trace() / axes;
     return v[kRotation] * variance > kLargestTurnSigma_rad * kLargestTurnSigma_rad;
   });
+  return cycles;
+}
+
+// With the factors of odometry for the closures, too.
+std::vector<Cycle> in_common(std::vector<Cycle> cycles) {
+  for (Cycle& cycle : cycles) {
+    for (const auto part : {kRotation, kTranslation})
+      cycle.covariance[part] += cycle.of_closures[part];
+    cycle.covariance[kClosure] = cycle.covariance[kTwoClosures] = Matrix6::Zero();
+  }
   return cycles;
 }
 
@@ -244,14 +256,21 @@ OdometryNoise estimate_odometry_noise(std::span<const PoseEdge> steps,
   const bool few_are_long = 2 * normal.size() < cycles.size();
   normal.insert(normal.end(), near.begin(), near.end());
   const Fit refined = fit_factors({normal, volume, dimension});
-  if (refined.log_odds >= kLeastLogOdds)
+  const Fit common = fit_factors({in_common(normal), volume, dimension});
+  noise.of_closures = common.log_posterior - refined.log_posterior >= kLeastLogOdds;
+  if (noise.of_closures)
+    fit = common;
+  else if (refined.log_odds >= kLeastLogOdds)
     fit = refined;
   else if (!few_are_long)
     return noise;
   noise.rotation = std::sqrt(fit.factors[kRotation]);
   noise.translation = std::sqrt(fit.factors[kTranslation]);
   cycles.insert(cycles.end(), near.begin(), near.end());
+  if (noise.of_closures) cycles = in_common(std::move(cycles));
   noise.likely = likely_closures({cycles, volume, dimension}, fit.factors);
+  if (noise.of_closures)
+    for (PoseEdge& e : noise.likely) e.precision = noise.corrected(e.precision);
   return noise;
 }
 

@@ -13,12 +13,13 @@ namespace km {
 struct OdometryNoise {
   double rotation = 1.0;     ///< At least 1.
   double translation = 1.0;  ///< At least 1.
+  bool of_closures = false;  ///< The closures inside the robot have these ratios, too.
   std::size_t places = 0;    ///< Number of places behind the estimate.
   /// Closures that are more likely true than false; a subset if there are very many. Empty if the
   /// odometry is as precise as it claims.
   std::vector<PoseEdge> likely = {};
 
-  /// The actual precision of a step of odometry.
+  /// The actual precision of a step of odometry, or of a closure if `of_closures`.
   [[nodiscard]] Precision corrected(const Precision& claimed) const {
     return {claimed.kappa / (rotation * rotation), claimed.tau / (translation * translation)};
   }
@@ -40,6 +41,10 @@ struct OdometryNoise {
 /// log 2. With few cycles the factors therefore remain near 1. Variance components: Foerstner, "Ein
 /// Verfahren zur Schaetzung von Varianz- und Kovarianzkomponenten", 1979; v_R and v_t are at least
 /// 1. They are 1 unless the odds that odometry is noisier than it claims are at least 1000 to 1.
+///
+/// If one factor for all rotations and one for all translations, of steps and of closures, have a
+/// posterior 1000 times as high, the claims of the whole graph are wrong:
+/// OdometryNoise::of_closures.
 ///
 /// Closures near each other at both ends share most of their chain, and false closures between two
 /// similar parts of the environment come in groups. Such closures form a place, which counts as one

@@ -213,8 +213,12 @@ void OwnGraph::judge_odometry(bool corrects) {
 std::vector<PoseEdge> OwnGraph::own_edges() const {
   std::vector<PoseEdge> edges = odometry_;
   odometry_judgement_.correct(edges);
+  const OdometryNoise& noise = odometry_judgement_.noise;
   if (const std::vector<PoseEdge>* inside = newest_edges(self_))
-    edges.insert(edges.end(), inside->begin(), inside->end());
+    for (PoseEdge e : *inside) {
+      if (noise.of_closures) e.precision = noise.corrected(e.precision);
+      edges.push_back(e);
+    }
   return edges;
 }
 

@@ -164,6 +164,22 @@ TEST_CASE("A wrong place counts once, however many closures it has", "[odometry_
   CHECK(noise.translation < 2.0);
 }
 
+TEST_CASE("Steps and closures that are equally noisy have wrong claims together",
+          "[odometry_noise]") {
+  const unsigned seed = GENERATE(range(1U, 6U));
+  const double closures = GENERATE(1.0, 11.0);
+  CAPTURE(seed, closures);
+  Walk walk(seed);
+  walk.walk(11.0, 11.0);
+  // Cycles of two closures have one step or seven.
+  for (std::uint32_t k = 0; k + 51 < Walk::kKeyframes; k += 4)
+    for (const std::uint32_t turn : {50U, 51U})
+      walk.closures.push_back(walk.edge(k, k + turn, closures, closures));
+  const OdometryNoise noise = walk.noise();
+  CHECK(noise.of_closures == (closures > 1.0));
+  CHECK(factor(noise.rotation, 11.0) < 1.7);
+}
+
 TEST_CASE("Closures that are noisier than they claim do not count as noise of odometry",
           "[odometry_noise]") {
   const unsigned seed = GENERATE(range(1U, 6U));
