@@ -76,8 +76,11 @@ std::vector<Eigen::Index> part_of_poses(const TeamGraph& graph) {
 
 std::vector<PoseEdge> odometry_steps(const TeamGraph& graph, std::size_t robot) {
   std::vector<PoseEdge> steps;
-  for (KeyframeIndex k = 0; k + 1 < static_cast<KeyframeIndex>(graph.poses_of(robot)); ++k)
-    steps.push_back(unknown_step({static_cast<RobotId>(robot), k}));
+  for (Eigen::Index i = graph.first[robot]; i + 1 < graph.first[robot + 1]; ++i) {
+    steps.push_back(unknown_step(graph.keyframe_of(i)));
+    const auto vertex = graph.vertices.begin() + i;
+    if (!graph.vertices.empty()) steps.back().T_from_to = vertex[0].inverse() * vertex[1];
+  }
   const std::vector<bool> odometry = odometry_edges(graph);
   for (std::size_t k = 0; k < odometry.size(); ++k) {
     const BlockEdge& e = graph.edges[k];

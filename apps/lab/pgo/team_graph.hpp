@@ -18,6 +18,8 @@ struct TeamGraph {
   std::vector<Eigen::Index> first = {};  ///< N + 1 entries, ascending, from 0.
   std::vector<BlockEdge> edges = {};     ///< Each edge once. Parallel edges all count.
   std::vector<KeyframeId> ids = {};      ///< Ids of the poses in the file.
+  /// Poses in the file, which start the solution where odometry has gaps; empty without vertices.
+  std::vector<SE3> vertices = {};
   /// Vertical priors, ascending by pose. If there are any, solutions have z up. GaussSeidelTeam
   /// does not support them.
   std::vector<VerticalPrior> verticals = {};

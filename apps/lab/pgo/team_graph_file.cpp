@@ -158,6 +158,9 @@ TeamGraph partition_graph(const G2oGraph& graph, const std::map<KeyframeId, std:
     team.ids.insert(team.ids.end(), ids.begin(), ids.end());
     team.first.push_back(static_cast<Eigen::Index>(team.ids.size()));
   }
+  if (!graph.vertices.empty()) team.vertices.resize(team.ids.size());
+  for (const auto& [id, T_file_kf] : graph.vertices)
+    team.vertices[static_cast<std::size_t>(number_of.at(id))] = T_file_kf;
   for (const RelativePose& e : graph.edges) {
     const Precision weight = weight_of(e, graph.dimension, file);
     team.edges.push_back(
