@@ -23,7 +23,7 @@ struct Precision {
 /// its own blocks. Throws std::invalid_argument unless the traces are positive and finite.
 [[nodiscard]] Precision precision_of(const Matrix6& covariance);
 
-/// The same in the plane, of the rows angle, x and y: kappa = I_33 and tau = 2 / tr I_t^-1. Throws
+/// Weights in the plane, of the rows angle, x and y: kappa = I_33 and tau = 2 / tr I_t^-1. Throws
 /// std::invalid_argument if these rows are not positive definite.
 [[nodiscard]] Precision planar_precision_of(const Matrix6& covariance);
 

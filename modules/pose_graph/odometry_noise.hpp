@@ -42,9 +42,8 @@ struct OdometryNoise {
 /// Verfahren zur Schaetzung von Varianz- und Kovarianzkomponenten", 1979; v_R and v_t are at least
 /// 1. They are 1 unless the odds that odometry is noisier than it claims are at least 1000 to 1.
 ///
-/// If one factor for all rotations and one for all translations, of steps and of closures, have a
-/// posterior 1000 times as high, the claims of the whole graph are wrong:
-/// OdometryNoise::of_closures.
+/// A second model has one factor for all rotations and one for all translations, of steps and of
+/// closures. If its posterior is 1000 times as high, it counts: OdometryNoise::of_closures.
 ///
 /// Closures near each other at both ends share most of their chain, and false closures between two
 /// similar parts of the environment come in groups. Such closures form a place, which counts as one

@@ -34,7 +34,7 @@ struct SessionGraph {
   std::map<KeyframeId, SE3> public_poses = {};
   /// Mean weights of one step of odometry, as reported by each robot.
   std::map<RobotId, Precision> step_precision = {};
-  LaterRuns later_runs = {};  ///< Of other robots by their public keyframes.
+  LaterRuns later_runs = {};  ///< Those of other robots by their public keyframes.
   /// Positions of own keyframes relative to keyframe 0, never weighed: see fix_edges().
   std::vector<PoseEdge> fixes = {};
   /// Edges to keyframe 0 of other members in the datum of this robot, never weighed: see

@@ -32,8 +32,8 @@ struct RecordedGraph {
   [[nodiscard]] SE3 T_odom_first() const;
 };
 
-/// The graph as robots solve it: in the plane, the covariance of each edge is that in space with
-/// equal weights, because roll, pitch and z of the covariance in the file are zero.
+/// The graph as robots solve it. In the plane, each edge gets the covariance in space with equal
+/// weights, because the file has no variance of roll, pitch and z.
 [[nodiscard]] RecordedGraph in_space(RecordedGraph graph);
 
 /// [i]: keyframe i of `graph`, chained along its odometry from T_odom_first(), with the covariance
