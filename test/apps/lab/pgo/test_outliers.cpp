@@ -4,6 +4,7 @@
 #include <sstream>
 #include <string>
 
+#include "apps/lab/pgo/agent_team.hpp"
 #include "apps/lab/pgo/outlier_study.hpp"
 #include "apps/lab/pgo/team_graph_file.hpp"
 #include "test/support/command.hpp"
@@ -164,6 +165,13 @@ TEST_CASE("a robot with few closures and imprecise odometry keeps its true ones"
     CHECK(result.true_lost == 0);
     CHECK(result.false_kept <= 1);  // odometry allows it
   }
+}
+
+TEST_CASE("noise of steps and closures that no claim covers rejects nothing", "[outliers]") {
+  const auto file = shared_data("pose_graphs/3d/sphere_bignoise_vertex3.g2o");
+  if (!file) return;
+  const TeamGraph graph = partition_contiguously(read_g2o(*file), 1, file->string());
+  CHECK(std::ranges::count(run_agent_team(graph, {}).kept, false) == 0);
 }
 
 TEST_CASE("rejected closures do not distort the map, and kept false ones do", "[outliers]") {
