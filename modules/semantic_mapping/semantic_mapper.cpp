@@ -56,7 +56,7 @@ double fitting_voxel_m(const SemanticMappingConfig& config, const DepthImage& de
   const double depth_m = 1e-3 * *quartile;
   const DepthNoise noise = noise_of(config);
   const double wanted_m =
-      std::max(depth_m / 120.0, 0.2 * std::hypot(noise.base_m, noise.per_m * depth_m * depth_m));
+      std::max(depth_m / 130.0, 0.2 * std::hypot(noise.base_m, noise.per_m * depth_m * depth_m));
   const auto found = std::ranges::lower_bound(kSides_m, wanted_m);
   return found == kSides_m.end() ? kSides_m.back() : *found;
 }

@@ -73,7 +73,7 @@ struct SemanticMappingConfig {
 }
 
 /// The side of voxels that fits a camera's first depth image: 0.02, 0.03, 0.05 or 0.1 m. It is the
-/// smallest above a 120th of the upper quartile of the depths and a fifth of its standard
+/// smallest above a 130th of the upper quartile of the depths and a fifth of its standard
 /// deviation.
 [[nodiscard]] double fitting_voxel_m(const SemanticMappingConfig& config, const DepthImage& depth);
 
