@@ -247,6 +247,8 @@ void SessionPart::solve(double now_s) {
   const SolverState state = solver_->state();
   if (state.failed) return fail("the team's equations cannot be solved");
   if (state.deferred && stage_ == MemberStage::kEntered) return look_again();
+  // A second look without closures to weigh ends in its first round: the first one is the result.
+  if (stage_ == MemberStage::kLooked && state.round == 1) solver_.reset();
   stage_ = MemberStage::kSolved;
 }
 
@@ -309,8 +311,7 @@ bool SessionPart::follow(const Session& session) {
 }
 
 void SessionPart::keep_only_results() {
-  if (!solver_) return;
-  results_ = results_of_solver();
+  if (solver_) results_ = results_of_solver();
   solver_.reset();
   graph_ = {};
 }

@@ -155,6 +155,8 @@ DownMessage TreeRoot::decide_start(const TreeSums& sums, std::uint32_t round) {
     const bool deferred = sums.isolated > kFewOpen && enough && joined(members_, sums.votes);
     return start(deferred, deferred ? sums : *first_);
   }
+  const bool weighs = options_.robust && members_.size() > 1;
+  if (again_ && weighs && sums.open == 0) return answer(Next::kStop);
   first_ = sums;
   free_ = sums.fixed == 0;
   const std::optional<NoiseScale> noise = fit_noise(sums.lengths, options_.dimension);
@@ -162,7 +164,7 @@ DownMessage TreeRoot::decide_start(const TreeSums& sums, std::uint32_t round) {
   const double margin = noise_scale_ < 1.0 ? std::min(1.0, kMargin * noise_scale_) : noise_scale_;
   barc_ = options_.barc > 0.0 ? options_.barc : margin * default_threshold(options_.dimension);
   may_defer_ = !again_ && noise && noise->consistent >= kMostlyConsistent && sums.open > kFewOpen;
-  alone_ = options_.robust && members_.size() > 1 && sums.open > 0;
+  alone_ = weighs && sums.open > 0;
   DownMessage message = may_defer_ || alone_ ? answer(Next::kCount) : start(false, sums);
   if (message.verdict.next == Next::kCount) message.verdict.deferred = may_defer_;
   if (options_.robust && free_ && !again_ && sums.open > 0)
@@ -212,8 +214,8 @@ DownMessage TreeRoot::step(const TreeSums& sums, const TreeFront& front,
   decrement_ = sums.decrement + root.decrement;
   const bool small = 0.5 * decrement_ <= options_.tolerance * cost_ + options_.absolute_tolerance;
   // Weights are decided before the poses have converged. If the converged poses contradict them,
-  // closures are weighed again.
-  const bool contradicts = alone_ && sums.rejected >= kLeastRejected &&
+  // closures are weighed again. A second look mostly rejects closures that it has reopened.
+  const bool contradicts = alone_ && !again_ && sums.rejected >= kLeastRejected &&
                            sums.rejected > kMostRejected * static_cast<double>(sums.open);
   if (schedule_.decided() && contradicts) return weigh_all();
   if (schedule_.decided() && small && sums.changed > 0 && schedule_.reopen())
