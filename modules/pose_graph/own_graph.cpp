@@ -234,17 +234,16 @@ std::vector<PoseEdge> OwnGraph::closures_across(KeyframeIndex run, KeyframeIndex
 }
 
 Precision OwnGraph::mean_step_precision() const {
-  if (odometry_.empty()) return {};
-  Precision sum{0.0, 0.0};
+  Precision sum{0.0, 0.0};  // sums of variances
   double steps = 0.0;
   for (const PoseEdge& step : odometry_) {
     if (is_unknown_step(step)) continue;
-    steps += 1.0;
-    sum.kappa += step.precision.kappa;
-    sum.tau += step.precision.tau;
+    sum.kappa += 1.0 / step.precision.kappa;
+    sum.tau += 1.0 / step.precision.tau;
+    ++steps;
   }
   if (steps == 0.0) return {};
-  return odometry_noise().corrected({sum.kappa / steps, sum.tau / steps});
+  return odometry_noise().corrected({steps / sum.kappa, steps / sum.tau});
 }
 
 }  // namespace km

@@ -99,8 +99,9 @@ class OwnGraph {
   /// Closures inside this robot between keyframes before `run` and keyframes from `run` to before
   /// `end`, by the newest edge set.
   [[nodiscard]] std::vector<PoseEdge> closures_across(KeyframeIndex run, KeyframeIndex end) const;
-  /// Mean weights of a step of odometry, corrected by odometry_noise(); the default weights while
-  /// there is no step.
+  /// Weights of the mean variances of a step of odometry, corrected by odometry_noise(). Steps at
+  /// rest with small variances hardly change them. Unknown steps do not count; the default weights
+  /// while there are no others.
   [[nodiscard]] Precision mean_step_precision() const;
 
  private:
