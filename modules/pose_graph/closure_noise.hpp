@@ -3,6 +3,7 @@
 #include <array>
 #include <map>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "modules/core/geometry.hpp"
@@ -44,6 +45,8 @@ struct ClosureNoiseRecord {
   /// Cycle lengths of the pairs in which this robot has the lower id, and of this robot alone.
   NoiseHistogram lengths = {};
   std::map<RobotId, PairCycles> pairs = {};  ///< By the other robot; own id: inside this robot.
+  /// The robots of the team whose odometry is noisier than it claims, see likely_odometry_noise().
+  std::vector<std::pair<RobotId, double>> odometry = {};
 };
 
 /// Estimates how many times larger than claimed the standard deviations of the closures of one pair

@@ -26,6 +26,7 @@ struct SolverState {
   double cost = 0.0;         ///< Team cost at poses(), with the weights of the closures there.
   double gradient = 0.0;     ///< Newton: sqrt(g^T H^-1 g); rbcd: norm of the Riemannian gradient.
   double noise_scale = 1.0;  ///< Noise scale of the closures, estimated by the team.
+  double odometry_noise = 1.0;  ///< This robot: likely_odometry_noise() [ratio].
   double barc = 0.0;  ///< Largest residual of a closure that is kept [sigma]; 0: none is rejected.
   bool deferred = false;  ///< Closures that stand alone were deferred: a second look is due.
   bool failed = false;    ///< The graph of the team could not be solved.

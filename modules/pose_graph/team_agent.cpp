@@ -369,6 +369,8 @@ OptimizerProgress TeamAgent::make_progress() const {
     progress.not_joined = ties_.not_joined;
   }
   progress.round += part_->state().round;
+  progress.odometry_rotation_noise *= part_->state().odometry_noise;
+  progress.odometry_translation_noise *= part_->state().odometry_noise;
   progress.seconds += part_->last_activity_s() - part_->started_s();
   progress.settled = !in_session() && session.finished && !publish_due_ && holds_all(session.plan);
   return progress;

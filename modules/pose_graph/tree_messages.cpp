@@ -6,6 +6,7 @@
 #include <iterator>
 
 #include "modules/core/byte_archive.hpp"
+#include "modules/pose_graph/odometry_evidence.hpp"
 
 namespace km {
 namespace {
@@ -110,6 +111,8 @@ void TreeSums::add(const TreeSums& other) {
 void describe(auto& archive, As<PairVote> auto& v) {
   archive(v.a, v.b, v.used, v.motion.T, v.motion.centre, v.motion.radius_m, v.motion.spread_m,
           v.motion.strength.kappa, v.motion.strength.tau, v.noise);
+  archive.list(v.odometry, kMaxElements, sizeof(float));
+  archive.require(v.odometry.empty() || v.odometry.size() == kNoiseLevels * kNoiseLevels);
   archive.require(v.noise >= 0.0F && v.motion.radius_m >= 0.0 && v.motion.spread_m >= 0.0 &&
                   v.motion.strength.kappa >= 0.0 && v.motion.strength.tau >= 0.0);
 }
@@ -124,7 +127,7 @@ void describe(auto& archive, As<TreeSums> auto& s) {
   archive.require(std::ranges::adjacent_find(lengths, std::ranges::greater_equal(),
                                              &Length::first) == lengths.end());
   if constexpr (kReads<decltype(archive)>) s.lengths = {lengths.begin(), lengths.end()};
-  archive.list(s.votes, kMaxElements, 91);
+  archive.list(s.votes, kMaxElements, 92);
   archive.require(std::ranges::adjacent_find(s.votes, std::not_fn(below)) == s.votes.end());
 }
 
@@ -241,6 +244,10 @@ void describe(auto& archive, As<TreeVerdict> auto& v) {
                   v.usual_pair.tau > 0.0 && v.gradient >= 0.0);
   for (auto& x : v.drift) archive(x);
   archive.list(v.moves, kMaxElements, 29, [&](auto& move) { archive(move.first, move.second); });
+  archive.list(v.odometry, kMaxElements, 9, [&](auto& noise) {
+    archive(noise.first, noise.second);
+    archive.require(noise.second >= 1.0);
+  });
 }
 
 void describe(auto& archive, As<DownMessage> auto& m) {

@@ -71,6 +71,8 @@ struct PairVote {
   std::uint32_t used = 0;  ///< Number of closures in use.
   PairMotion motion = {};  ///< Motion of b at the start; set if `used` > 0.
   float noise = 0.0F;      ///< PairCycles::factor; 0: not estimated yet, or from too few places.
+  /// See odometry_evidence(); in the first round only.
+  std::vector<float> odometry = {};
 };
 
 /// Sums over a subtree.
@@ -140,6 +142,9 @@ struct TreeVerdict {
   double usual_noise = 1.0;  ///< kStart: see usual_pair_noise().
   /// kCount, kStart: first these robots are moved as a whole, see better_placement(). Ascending.
   std::vector<std::pair<RobotId, SinglePose>> moves = {};
+  /// kCount: the odometry of these robots is this many times noisier than it claims. The robots
+  /// then only count again. Ascending.
+  std::vector<std::pair<RobotId, double>> odometry = {};
   /// kStart: strength of the usual pair of robots, see usual_strength(). While closures are
   /// weighed, no pair is more than 1.25 times as strong. A pair that the other edges contradict
   /// remains limited afterwards.

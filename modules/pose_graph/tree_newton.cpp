@@ -9,6 +9,7 @@
 #include "modules/core/lie.hpp"
 #include "modules/pose_graph/closure_cover.hpp"
 #include "modules/pose_graph/corroboration.hpp"
+#include "modules/pose_graph/odometry_evidence.hpp"
 
 namespace km {
 namespace {
@@ -75,6 +76,7 @@ TreeNewton::TreeNewton(SessionGraph graph, TreePlace place, const TreeNewtonOpti
     known_.push_back({.edge = e});
   }
   classify();
+  weaken_odometry();  // in a second look
   if (!place_.parent) root_.emplace(place_.members, options_, graph_.upright, graph_.again);
 }
 
@@ -281,6 +283,14 @@ void TreeNewton::count_closures(TreeSums& sums) const {
       if (takes_part(known_[k])) closures.push_back(known_[k].edge);
     if (const auto motion = motion_of_pair(closures, graph_.self, pose))
       vote->second.motion = *motion;
+    const auto has_runs = [this](RobotId robot) {  // their unknown steps are no noise
+      const auto runs = graph_.later_runs.find(robot);
+      return runs != graph_.later_runs.end() && !runs->second.empty();
+    };
+    const bool whole = !has_runs(graph_.self) && !has_runs(peer);
+    if (options_.robust && round_ == 0 && !graph_.again && whole)
+      vote->second.odometry =
+          odometry_evidence(closures, pose, graph_.step_precision, options_.dimension);
     const auto cycles = graph_.noise.pairs.find(peer);
     if (noise_known_ && cycles != graph_.noise.pairs.end() && shows_noise(cycles->second))
       vote->second.noise = static_cast<float>(cycles->second.factor);
@@ -304,13 +314,30 @@ void TreeNewton::move_robots(const std::vector<std::pair<RobotId, SinglePose>>& 
   }
 }
 
+// All members know the mean steps of all, so all weaken them equally.
+void TreeNewton::weaken_odometry() {
+  for (const auto& [robot, factor] : graph_.noise.odometry) {
+    const auto weaker = [&, f2 = factor * factor](Precision& p) {
+      p.kappa /= f2;
+      p.tau /= f2;
+    };
+    if (const auto step = graph_.step_precision.find(robot); step != graph_.step_precision.end())
+      weaker(step->second);
+    if (robot != graph_.self) continue;
+    state_.odometry_noise = factor;
+    for (std::size_t k = 0; k < graph_.odometry; ++k) weaker(known_[k].edge.precision);
+  }
+}
+
 UpMessage TreeNewton::first_message() {
   UpMessage message{.round = round_, .sums = {}};
   TreeSums& sums = message.sums;
   sums.poses = static_cast<std::uint32_t>(graph_.start.size());
   sums.fixed = static_cast<std::uint32_t>(graph_.to_absent.size());
   count_closures(sums);
-  if (!options_.robust || round_ > 0) return message;
+  const bool counts_again = !verdict_.odometry.empty();
+  if (!options_.robust || (round_ > 0 && !counts_again)) return message;
+  if (counts_again) graph_.noise.lengths.clear();
   sums.lengths = graph_.noise.lengths;
   if (graph_.again) return message;
   const std::size_t most =
@@ -494,12 +521,16 @@ std::vector<SolverMessage> TreeNewton::go_down(const DownMessage& message) {
   };
   verdict_ = v;
   if (v.weigh_all) unsettle();
-  if (!front_) {
+  if (!v.odometry.empty()) {
+    graph_.noise.odometry = v.odometry;
+    weaken_odometry();
+  } else if (!front_) {
     weigh_by_noise();
     move_robots(v.moves);
   }
   switch (v.next) {
     case Next::kCount:
+      if (!v.odometry.empty()) break;
       settle();
       if (v.deferred) find_isolated(default_threshold(options_.dimension) * v.noise_scale);
       break;
@@ -537,6 +568,7 @@ std::vector<SolverMessage> TreeNewton::go_down(const DownMessage& message) {
             .cost = v.cost,
             .gradient = v.gradient,
             .noise_scale = v.noise_scale,
+            .odometry_noise = state_.odometry_noise,
             .barc = options_.robust ? v.barc : 0.0,
             .deferred = deferred,
             .failed = state_.failed};

@@ -97,6 +97,7 @@ class TreeNewton final : public MemberSolver {
   [[nodiscard]] std::vector<SE3> odometry_poses() const;
   [[nodiscard]] std::function<SE3(const KeyframeId&)> pose_before_closures(
       RobotId peer, const std::vector<SE3>& odometry) const;
+  void weaken_odometry();
   void weigh_by_noise();
   void weigh_by_usual_noise();
   void weaken(std::span<const std::size_t> closures, double factor);

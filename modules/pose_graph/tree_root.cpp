@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "modules/pose_graph/noise_histogram.hpp"
+#include "modules/pose_graph/odometry_evidence.hpp"
 
 namespace km {
 namespace {
@@ -157,6 +158,15 @@ DownMessage TreeRoot::decide_start(const TreeSums& sums, std::uint32_t round) {
   }
   const bool weighs = options_.robust && members_.size() > 1;
   if (again_ && weighs && sums.open == 0) return answer(Next::kStop);
+  if (!odometry_is_noisy_ && options_.robust && !again_) {
+    const auto noise = likely_odometry_noise(sums.votes);
+    if (!noise.empty()) {
+      odometry_is_noisy_ = true;
+      DownMessage message = answer(Next::kCount);
+      message.verdict.odometry.assign(noise.begin(), noise.end());
+      return message;
+    }
+  }
   first_ = sums;
   free_ = sums.fixed == 0;
   const std::optional<NoiseScale> noise = fit_noise(sums.lengths, options_.dimension);
@@ -204,7 +214,6 @@ DownMessage TreeRoot::decide(const TreeSums& sums, std::uint32_t round, const Tr
     convex_ = true;
     return refresh(true, weighing_);
   }
-  if (weighing_ != Weighing::kHold) schedule_.next({sums.changed, sums.fractional});
   return step(sums, front, poses);
 }
 
@@ -212,6 +221,12 @@ DownMessage TreeRoot::step(const TreeSums& sums, const TreeFront& front,
                            std::span<const SE3> poses) {
   const TreeFront::RootStep root = front.solve_root(upright_);
   decrement_ = sums.decrement + root.decrement;
+  // If odometry is noisy, the poses may be far from the minimum of the nearly convex cost at the
+  // beginning. A predicted decrease of more than the whole cost shows that the quadratic model does
+  // not hold there; mu then waits for another step.
+  const bool far =
+      odometry_is_noisy_ && !at_base_ && schedule_.is_nearly_convex() && 0.5 * decrement_ > cost_;
+  if (!far && weighing_ != Weighing::kHold) schedule_.next({sums.changed, sums.fractional});
   const bool small = 0.5 * decrement_ <= options_.tolerance * cost_ + options_.absolute_tolerance;
   // Weights are decided before the poses have converged. If the converged poses contradict them,
   // closures are weighed again. A second look mostly rejects closures that it has reopened.

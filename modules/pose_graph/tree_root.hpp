@@ -60,9 +60,10 @@ class TreeRoot {
   bool upright_;
   bool again_;
   RobustSchedule schedule_;
-  std::optional<TreeSums> first_;  // sums before any closure was deferred or decided
-  bool alone_ = false;             // robots have decided the closures inside them
-  bool may_defer_ = false;         // closures that stand alone are probably false
+  std::optional<TreeSums> first_;   // sums before any closure was deferred or decided
+  bool odometry_is_noisy_ = false;  // by cycles through other robots
+  bool alone_ = false;              // robots have decided the closures inside them
+  bool may_defer_ = false;          // closures that stand alone are probably false
   std::uint32_t round_ = 0;
   double barc_ = 0.0;
   double noise_scale_ = 1.0;

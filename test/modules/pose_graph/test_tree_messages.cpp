@@ -108,6 +108,7 @@ DownMessage some_down_message(TreeVerdict::Next next, TreeVerdict::Weighing weig
                      .noise_scale = 1.0 / 3.0,
                      .usual_noise = 2.5,
                      .moves = {{7, {.t = {1.0F, 2.0F, 3.0F}}}, {9, {}}},
+                     .odometry = {{1, 2.5}, {4, 1.0}},
                      .usual_pair = {.kappa = 12.5, .tau = 1e-7},
                      .cost = 1687.0,
                      .gradient = 1e-9,
