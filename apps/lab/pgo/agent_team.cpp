@@ -307,12 +307,15 @@ class AgentTeam {
     for (const Member& member : members_) run.costs.push_back(member.cost);
     for (std::size_t k = 0; k < members_.size(); ++k) {
       const Member& member = members_[k];
-      const auto poses = static_cast<std::size_t>(graph_.poses_of(k));
-      const bool published = member.trajectory && member.trajectory->T_world_kf.size() == poses;
-      const std::vector<SE3>& own =
-          published ? member.trajectory->T_world_kf : member.agent->poses();
-      run.T_world_kf.insert(run.T_world_kf.end(), own.begin(), own.end());
-      run.world_of.push_back(published ? member.trajectory->anchor : static_cast<RobotId>(k));
+      const std::size_t named_by = publishes(k) ? k : publisher_beside(k);
+      const SE3 T_world_frame = publishes(named_by) ? T_world_frame_of(named_by) : SE3::Identity();
+      for (const SE3& T_frame_kf : member.agent->poses())
+        run.T_world_kf.push_back(T_world_frame * T_frame_kf);
+      if (publishes(k))
+        std::ranges::copy(member.trajectory->T_world_kf,
+                          run.T_world_kf.end() - static_cast<std::ptrdiff_t>(graph_.poses_of(k)));
+      run.world_of.push_back(publishes(named_by) ? members_[named_by].trajectory->anchor
+                                                 : static_cast<RobotId>(named_by));
       const std::vector<RobotId>& uncertain = members_[run.world_of.back()].progress.tentative;
       run.tentative.push_back(std::ranges::binary_search(uncertain, static_cast<RobotId>(k)));
       run.rounds = std::max(run.rounds, static_cast<std::size_t>(member.progress.round));
@@ -326,6 +329,30 @@ class AgentTeam {
     return run;
   }
 
+  [[nodiscard]] bool publishes(std::size_t robot) const {
+    const auto& trajectory = members_[robot].trajectory;
+    return trajectory &&
+           std::ssize(trajectory->T_world_kf) == std::ptrdiff_t{graph_.poses_of(robot)};
+  }
+  [[nodiscard]] SE3 T_world_frame_of(std::size_t robot) const {
+    const Member& member = members_[robot];
+    return member.trajectory->T_world_kf.front() * member.agent->poses().front().inverse();
+  }
+  // A robot publishes nothing while its last run is not located. Its poses are then in the frame of
+  // the session, whose place another member may know: the first one that publishes, otherwise the
+  // lowest one.
+  [[nodiscard]] std::size_t publisher_beside(std::size_t robot) const {
+    std::optional<std::size_t> lowest;
+    for (std::size_t k = 0; k < members_.size(); ++k) {
+      const Member& other = members_[k];
+      if (other.agent->frame() != members_[robot].agent->frame() ||
+          std::ranges::binary_search(other.progress.not_joined, static_cast<RobotId>(robot)))
+        continue;
+      if (publishes(k)) return k;
+      if (!lowest) lowest = k;
+    }
+    return lowest.value_or(robot);
+  }
   [[nodiscard]] bool rejects(RobotId robot, const ClosureId& id) const {
     const auto& decided = members_[robot].agent->decided();
     const auto verdict = decided.find(id);
