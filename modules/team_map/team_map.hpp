@@ -29,7 +29,7 @@ inline constexpr std::size_t kMaxMapBoxes = std::size_t{1} << 17U;
 /// same arithmetic). Two robots with the same chunks and poses therefore have the same map.
 ///
 /// The voxels are those of the robots' maps: for each robot the largest that its chunks state, and
-/// of these the median, the lower one of two. Without statements they have `voxel_m`. Throws
+/// of these the median, the coarser one of two. Without statements they have `voxel_m`. Throws
 /// std::invalid_argument if this is not positive.
 [[nodiscard]] TeamMap fuse_chunks(const std::vector<PlacedChunk>& chunks, double voxel_m);
 

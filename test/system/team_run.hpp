@@ -79,8 +79,11 @@ inline TeamRun run_team(const std::filesystem::path& team, const std::filesystem
   run.result = run_command(std::string(KM_BIN_DIR "/kimera_multi_team --config ") + team.string() +
                            " --dataset " + dataset.string() + " --rate max --output " +
                            folder.path().string() + " --json " + json.string() + " --domain " +
-                           std::to_string(random_domain()) + ' ' + options +
-                           " -- --serve-limit 1000 " + robot_options);  // sanitizers are slow
+                           std::to_string(random_domain()) + ' ' + options + " -- " +
+                           (robot_options.find("--serve-limit") == std::string::npos
+                                ? "--serve-limit 1000 "  // sanitizers are slow
+                                : "") +
+                           robot_options);
   if (run.result.exit_code == 0) run.json = read_json(json);
   return run;
 }

@@ -48,9 +48,10 @@ struct PairRun {
   TeamRun team = {};
   LinksTable links = {};
 
-  PairRun(const SplitGraph& graph, const std::string& script) {
+  PairRun(const SplitGraph& graph, const std::string& script, const std::string& options = {}) {
     const std::string file = folder.write("links.yaml", script).string();
-    team = run_team(write_team(graph, folder, kSettings), folder.path(), folder, "--links " + file);
+    team = run_team(write_team(graph, folder, kSettings), folder.path(), folder, "--links " + file,
+                    options);
     links = read_links_table(folder);
   }
   [[nodiscard]] RunSummary summary(int robot) const {
@@ -100,7 +101,9 @@ TEST_CASE("A team that loses a fifth of all frames loses nothing else", "[system
 
 TEST_CASE("A team in two parts ends in two frames and its table of links gives the reason",
           "[system][namespaces]") {
-  const PairRun run(pair_of_robots(), "partitions:\n  - {groups: [[robot0], [robot1]]}\n");
+  // Each waits for the other one up to the limit.
+  const PairRun run(pair_of_robots(), "partitions:\n  - {groups: [[robot0], [robot1]]}\n",
+                    "--serve-limit 20");
   CAPTURE(run.team.result.output);
   if (!had_own_networks(run.team.result.output)) return;
   REQUIRE(run.team.result.exit_code == 0);

@@ -28,7 +28,8 @@ TEST_CASE("Two robots end with the same map of their team", "[system]") {
         words_of(euroc_robot(robot,
                              part + " --dataset " + dataset->string() + " --output " + output +
                                  " --rate max --serve-limit 200 --set mapping.mode=metric --set "
-                                 "map.team=full --set map.max_bytes_per_s=1e7",
+                                 "map.team=full --set map.max_bytes_per_s=1e7 --set "
+                                 "semantic_mapping.voxel_size_m=0.05",
                              domain)));
   };
   const auto a = start(0, "--from 0 --to 6"), b = start(1, "--from 2 --to 8");

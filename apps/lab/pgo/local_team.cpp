@@ -36,6 +36,7 @@ LocalTeam::LocalTeam(const TeamGraph& graph)
     : tree_(breadth_first_tree(neighbours_in(graph))), depth_(graph.robots(), 0) {
   for (std::size_t k = 0; k < graph.robots(); ++k) {
     parts_.push_back(part_of(graph, k));
+    std::erase_if(parts_[k].own, is_unknown_step);  // no measurement of this robot
     upright_ = upright_ && !parts_[k].verticals.empty();
     try {
       blocks_.push_back(lift(start_of(parts_[k], graph.poses_of(k)), kRank));

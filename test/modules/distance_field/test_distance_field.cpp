@@ -165,6 +165,7 @@ TEST_CASE("The mapper reports space from which distances to a wall follow", "[di
   SemanticMappingConfig config;
   config.voxel_size_m = kVoxel_m;
   config.window_m = 3.0;
+  config.min_views = 1;
   SemanticMapper mapper(config, camera);
   mapper.track_space(true);
   DistanceField field(1.0, kVoxel_m);
