@@ -141,7 +141,7 @@ std::optional<double> stated_voxel_m(const std::vector<PlacedChunk>& chunks) {
   std::vector<float> sizes;
   for (const auto& [robot, size] : of_robot) sizes.push_back(size);
   std::ranges::sort(sizes);
-  return static_cast<double>(sizes[sizes.size() / 2]);  // of two, the coarser
+  return static_cast<double>(sizes[sizes.size() / 2]);  // the coarser of two
 }
 
 // The anchor of most chunks; the lowest of several.
