@@ -52,12 +52,6 @@ class ArchiveWriter {
   void fixed(std::uint16_t value) { out_.u16(value); }
   void fixed(std::int32_t value) { out_.u32(static_cast<std::uint32_t>(value)); }
   void fixed(std::uint64_t value) { out_.u64(value); }
-  /// A pose in single precision: quaternion and position.
-  void single(const SE3& T) {
-    const Eigen::Quaterniond q(T.linear());
-    for (const double value : {q.x(), q.y(), q.z(), q.w()}) out_.f32(static_cast<float>(value));
-    for (const double value : T.translation()) out_.f32(static_cast<float>(value));
-  }
   /// An enumerator from 0 to `last`.
   template <typename Enum>
   void choice(Enum value, Enum /*last*/) {
@@ -158,17 +152,6 @@ class ArchiveReader {
   void fixed(std::uint16_t& value) { value = in_.u16(); }
   void fixed(std::int32_t& value) { value = static_cast<std::int32_t>(in_.u32()); }
   void fixed(std::uint64_t& value) { value = in_.u64(); }
-  void single(SE3& T) {
-    constexpr double kUnitTolerance = 1e-3, kMaxTranslation_m = 1e7;
-    float x = 0, y = 0, z = 0, w = 0;
-    Eigen::Vector3f t;
-    (*this)(x, y, z, w, t);
-    const Eigen::Quaterniond q = Eigen::Quaternionf(w, x, y, z).cast<double>();
-    const bool is_pose = std::abs(q.norm() - 1.0) <= kUnitTolerance &&
-                         static_cast<double>(t.cwiseAbs().maxCoeff()) <= kMaxTranslation_m;
-    require(is_pose);
-    T = is_pose ? make_pose(q.normalized().toRotationMatrix(), t.cast<double>()) : SE3::Identity();
-  }
   template <typename Enum>
   void choice(Enum& value, Enum last) {
     value = static_cast<Enum>(in_.u8());

@@ -12,6 +12,13 @@ namespace km {
 /// a nanometre.
 inline constexpr Bounds<double> kStep_m{-1e6, 1e6};
 
+/// Largest coordinate of a pose in a message [m]: no robot is farther from the origin of a frame.
+inline constexpr double kMaxTranslation_m = 1e7;
+
+/// Largest deviation of a quaternion or a direction from unit length, in messages and files: some
+/// round to 6 digits. Every user normalises it.
+inline constexpr double kUnitTolerance = 1e-3;
+
 /// Each coordinate of an estimated pose [m], in a frame that may be that of a country.
 inline constexpr Bounds<double> kPosition_m{-1e8, 1e8};
 

@@ -31,9 +31,8 @@ EdgeSetId identify(std::uint32_t version, const std::vector<PoseEdge>& edges) {
 }
 
 VerticalPrior vertical_prior(const KeyframeId& keyframe, const Vertical& vertical) {
-  constexpr double kUnit = 1e-3;
   const double norm = vertical.up_body.norm();
-  if (!(std::abs(norm - 1.0) < kUnit) || !kTiltSigma_rad.contains(vertical.sigma_rad))
+  if (!(std::abs(norm - 1.0) <= kUnitTolerance) || !kTiltSigma_rad.contains(vertical.sigma_rad))
     throw std::invalid_argument("OwnGraph: the vertical of keyframe " + to_string(keyframe) +
                                 " is not a direction with a usable sigma");
   return {Eigen::Index{keyframe.index}, vertical.up_body / norm,

@@ -15,8 +15,8 @@
 #include "modules/core/ids.hpp"
 #include "modules/core/precision.hpp"
 #include "modules/core/robot_identity.hpp"
+#include "modules/core/single_pose.hpp"
 #include "modules/pose_graph/pgo_method.hpp"
-#include "modules/pose_graph/single_pose.hpp"
 
 namespace km {
 

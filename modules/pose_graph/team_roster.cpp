@@ -14,14 +14,10 @@ bool is_well_formed(const MemberPoses& poses) {
   const auto ascending = [](const std::vector<KeyframeIndex>& indices) {
     return std::ranges::adjacent_find(indices, std::greater_equal<>()) == indices.end();
   };
-  const auto finite = [](const SinglePose& T) {
-    constexpr float kUnit = 1e-3F;
-    return std::abs(T.q.norm() - 1.0F) < kUnit && T.t.allFinite();
-  };
   const Precision& step = poses.step_precision;
   return !keyframes.empty() && keyframes.front() == 0 && ascending(keyframes) &&
          ascending(poses.later_runs) && poses.T_frame_kf.size() == keyframes.size() &&
-         std::all_of(poses.T_frame_kf.begin(), poses.T_frame_kf.end(), finite) &&
+         std::ranges::all_of(poses.T_frame_kf, [](const SinglePose& T) { return is_valid(T); }) &&
          step.kappa > 0.0 && step.tau > 0.0 && std::isfinite(step.kappa + step.tau);
 }
 

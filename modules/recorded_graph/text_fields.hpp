@@ -13,9 +13,6 @@
 
 namespace km {
 
-/// Tolerance of the length of a quaternion or a direction in a file: some files round to 6 digits.
-inline constexpr double kUnitTolerance = 1e-3;
-
 /// Reads the fields of one row in order. Every failure throws std::runtime_error that begins with
 /// "file:line: ". Borrows the row and the name of the file.
 class TextFields {

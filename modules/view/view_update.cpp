@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "modules/core/byte_archive.hpp"
+#include "modules/core/single_pose.hpp"
 
 namespace km {
 namespace {
@@ -22,15 +23,25 @@ bool is_value(RasterKind kind, std::uint8_t value) {
   return value <= most || value == ViewRaster::kUnknown;
 }
 
+void describe_single(auto& archive, As<SE3> auto& T) {
+  if constexpr (kReads<decltype(archive)>) {
+    SinglePose single;
+    archive(single);
+    T = is_valid(single) ? single.pose() : SE3::Identity();
+  } else {
+    archive(SinglePose::of(T));
+  }
+}
+
 void describe(auto& archive, As<ViewPose> auto& pose) {
   archive(pose.stamp);
-  archive.single(pose.T_odom_body);
+  describe_single(archive, pose.T_odom_body);
 }
 
 void describe(auto& archive, As<ViewKeyframes> auto& keyframes) {
   archive(keyframes.optimized, keyframes.anchor, keyframes.first);
   archive.list(keyframes.T_world_kf, kMaxViewBytes, kPoseBytes,
-               [&](auto& T) { archive.single(T); });
+               [&](auto& T) { describe_single(archive, T); });
   if (keyframes.optimized) return;
   archive.list(keyframes.stamps, kMaxViewBytes, sizeof(Stamp),
                [&](auto& stamp) { archive(stamp); });

@@ -11,18 +11,13 @@
 #include "modules/core/geometry.hpp"
 #include "modules/core/ids.hpp"
 #include "modules/core/keyframe.hpp"
+#include "modules/core/measurement_limits.hpp"
 
 namespace km {
 
 // Conversions between the parts of idl/common.idl and core types, for all codecs. from_wire()
 // treats its input as untrusted: nullopt if a number is not finite or does not have the meaning of
 // its field.
-
-/// A quaternion from the wire may be this far from unit length; it is normalised.
-inline constexpr double kUnitQuaternionTolerance = 1e-3;
-
-/// No robot is farther than this from the origin of a frame [m]; a larger number is refused.
-inline constexpr double kMaxWireTranslation_m = 1e7;
 
 /// Largest magnitude of an element of an accepted covariance [rad^2, m^2].
 inline constexpr double kMaxWireVariance = 1e14;
@@ -45,8 +40,8 @@ inline std::optional<SE3> from_wire(const km_wire_Pose& wire) {
   const Eigen::Quaterniond q(Eigen::Vector4d(wire.q[0], wire.q[1], wire.q[2], wire.q[3]));
   const Eigen::Vector3d t(wire.t[0], wire.t[1], wire.t[2]);
   // Written so that NaN fails.
-  if (!(std::abs(q.norm() - 1.0) <= kUnitQuaternionTolerance)) return std::nullopt;
-  if (!(t.cwiseAbs().maxCoeff() <= kMaxWireTranslation_m) || !t.allFinite()) return std::nullopt;
+  if (!(std::abs(q.norm() - 1.0) <= kUnitTolerance)) return std::nullopt;
+  if (!(t.cwiseAbs().maxCoeff() <= kMaxTranslation_m) || !t.allFinite()) return std::nullopt;
   return make_pose(q.normalized().toRotationMatrix(), t);
 }
 

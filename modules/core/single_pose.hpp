@@ -5,6 +5,7 @@
 
 #include "modules/core/byte_archive.hpp"
 #include "modules/core/geometry.hpp"
+#include "modules/core/measurement_limits.hpp"
 
 namespace km {
 
@@ -22,12 +23,15 @@ struct SinglePose {
   }
 };
 
-/// Largest deviation of a received quaternion from unit length; every user normalises it.
-inline constexpr double kUnitTolerance = 1e-3;
+/// True if the quaternion has unit length, and the position is not too far away.
+[[nodiscard]] inline bool is_valid(const SinglePose& pose) {
+  return std::abs(pose.q.cast<double>().norm() - 1.0) <= kUnitTolerance && pose.t.allFinite() &&
+         static_cast<double>(pose.t.cwiseAbs().maxCoeff()) <= kMaxTranslation_m;
+}
 
 void describe(auto& archive, As<SinglePose> auto& pose) {
   archive(pose.q.coeffs(), pose.t);
-  archive.require(std::abs(pose.q.template cast<double>().norm() - 1.0) <= kUnitTolerance);
+  archive.require(is_valid(pose));
 }
 
 }  // namespace km
