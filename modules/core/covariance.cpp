@@ -16,6 +16,10 @@ Matrix6 swapped_blocks(const Eigen::Matrix3d& R) {
 
 }  // namespace
 
+UncertainPose exact(const UncertainPose& T_a_b) {
+  return {T_a_b.T, Matrix6::Zero()};
+}
+
 UncertainPose compose(const UncertainPose& T_a_b, const UncertainPose& T_b_c) {
   const Matrix6 Ad_c_b = adjoint(T_b_c.T.inverse());
   return {T_a_b.T * T_b_c.T, Ad_c_b * T_a_b.Sigma * Ad_c_b.transpose() + T_b_c.Sigma};

@@ -16,6 +16,9 @@ struct UncertainPose {
   Matrix6 Sigma = Matrix6::Zero();
 };
 
+/// The same transform without noise.
+[[nodiscard]] UncertainPose exact(const UncertainPose& T_a_b);
+
 /// T_a_b * T_b_c of independent factors: Sigma_ac = Ad(T_b_c^-1) Sigma_ab Ad(T_b_c^-1)^T +
 /// Sigma_bc.
 [[nodiscard]] UncertainPose compose(const UncertainPose& T_a_b, const UncertainPose& T_b_c);

@@ -12,8 +12,6 @@
 namespace km {
 namespace {
 
-constexpr double kFactorWidth = 1.0986;    // log 3, prior of log s
-constexpr double kOddsAgainstUsual = 6.9;  // log of odds of 1000 to 1
 // Odometry may be this many times noisier than expected before its errors count as evidence against
 // closures. Sensitivity: METHOD.md.
 constexpr double kNoisyOdometry = 1.5;
@@ -66,7 +64,7 @@ Posterior posterior_of(std::span<const NoiseCycle> cycles, std::span<const doubl
                        double s, double usual, double odometry) {
   std::vector<double> log_ratio;
   for (const NoiseCycle& cycle : cycles) log_ratio.push_back(log_ratio_of(cycle, s, odometry));
-  const double away = std::log(s / usual) / kFactorWidth;
+  const double away = std::log(s / usual) / kNoiseFactorWidth;
   const double log_likelihood = fit_cycle_mixture(log_ratio, weights).log_likelihood;
   const double total = weights.front() * static_cast<double>(weights.size());
   return {log_likelihood - std::log1p(away * away), log_likelihood / total};
@@ -178,9 +176,9 @@ double factor_of(std::span<const NoiseCycle> cycles, double observations, double
     return usual;
   const Estimate found = estimate(cycles, observations, usual, odometry, kDistinct);
   const bool likely =
-      found.log_odds >= kOddsAgainstUsual &&
+      found.log_odds >= kThousandToOne &&
       estimate(cycles, observations, usual, kNoisyOdometry * odometry, 0.0).log_odds >=
-          kOddsAgainstUsual;
+          kThousandToOne;
   if (!likely) return usual;
   const std::vector<double> weights = weights_of(cycles, observations);
   const bool other_length = log_odds_of_length(cycles, weights, usual, odometry) > found.log_odds;
@@ -230,7 +228,7 @@ bool excludes_noise(const PairCycles& cycles, double excluded, double factor) {
   const auto log_density = [&](double s) {
     return posterior_of(cycles.between, weights, s, s, 1.0).log_density;
   };
-  return log_density(factor) - log_density(excluded) >= kOddsAgainstUsual;
+  return log_density(factor) - log_density(excluded) >= kThousandToOne;
 }
 
 double estimate_closure_noise(const PairCycles& cycles, double usual) {

@@ -25,7 +25,6 @@ constexpr double kLonger = 0.01;  // relative step of numeric derivatives by len
 // Largest standard deviation of the rotation of odometry in a cycle between two places. Errors of
 // cycles with a larger one are not normally distributed.
 constexpr double kLargestTurnSigma_rad = 0.5;
-constexpr double kLeastBoxSide_m = 1.0;  // least side of the volume for false closures
 
 }  // namespace
 
@@ -126,19 +125,13 @@ NoiseCycle Corroboration::noise_cycle(const Upward& one, const Upward& other, do
                         {by_length(&TwoClosureCycle::below), by_length(&TwoClosureCycle::above)});
 }
 
-// The volume in which a false closure may end. Each side is the sum of the sides of the bounding
-// boxes of the lower and of the upper ends, plus twice the length of the longest closure.
 double Corroboration::volume() const {
-  Eigen::AlignedBox3d below, above;
-  double reach_m = 0.0;
+  ClosureVolume volume;
   for (const Upward& c : closures_) {
-    below.extend(pose_(c.lower).translation());
-    above.extend(pose_(c.upper).translation());
-    reach_m = std::max(reach_m, c.T_lower_upper.translation().norm());
+    volume.add_ends(pose_(c.lower).translation(), pose_(c.upper).translation());
+    volume.add_length(c.T_lower_upper.translation().norm());
   }
-  const Eigen::Array3d sides =
-      below.sizes().array() + above.sizes().array() + 2.0 * reach_m + kLeastBoxSide_m;
-  return sides.head(dimension_).prod();
+  return volume.of(dimension_);
 }
 
 // Standard deviation of the rotation of the odometry between two closures, on each axis.

@@ -8,6 +8,7 @@ namespace km {
 namespace {
 
 constexpr int kShareSteps = 5;
+constexpr double kLeastSide_m = 1.0;  // of the volume for false closures
 constexpr double kLeastShare = 0.02;
 // exp() of a larger log density ratio overflows.
 constexpr double kLargestLogRatio = 600.0;
@@ -46,6 +47,21 @@ double log_density_if_false(const Vector6& error, double volume, int dimension) 
   const double det_J = angle < 1e-3 ? 1.0 : 2.0 * (1.0 - std::cos(angle)) / (angle * angle);
   constexpr double kRotations = 8.0 * std::numbers::pi * std::numbers::pi;
   return 2.0 * std::log(det_J) - std::log(kRotations) - std::log(volume);
+}
+
+void ClosureVolume::add_ends(const Eigen::Vector3d& lower, const Eigen::Vector3d& upper) {
+  below_.extend(lower);
+  above_.extend(upper);
+}
+
+void ClosureVolume::add_length(double length_m) {
+  reach_m_ = std::max(reach_m_, length_m);
+}
+
+double ClosureVolume::of(int dimension) const {
+  const Eigen::Array3d sides =
+      below_.sizes().array() + above_.sizes().array() + 2.0 * reach_m_ + kLeastSide_m;
+  return sides.head(dimension).prod();
 }
 
 }  // namespace km

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Geometry>
 #include <span>
 
 #include "modules/core/geometry.hpp"
@@ -27,5 +28,24 @@ struct CycleMixture {
 /// [m^2]). det J = 2 (1 - cos |w|) / |w|^2 is the determinant of the Jacobian of the exponential
 /// map of rotations; that of poses has it squared.
 [[nodiscard]] double log_density_if_false(const Vector6& error, double volume, int dimension = 3);
+
+/// The volume in which a false closure may end. Each side is the sum of the sides of the bounding
+/// boxes of the lower and of the upper ends, plus twice the length of the longest closure.
+class ClosureVolume {
+ public:
+  /// Positions [m] where the ends of a closure are, or may be.
+  void add_ends(const Eigen::Vector3d& lower, const Eigen::Vector3d& upper);
+  void add_length(double length_m);
+  /// [m^3]; `dimension` 2: the area [m^2].
+  [[nodiscard]] double of(int dimension) const;
+
+ private:
+  Eigen::AlignedBox3d below_, above_;
+  double reach_m_ = 0.0;
+};
+
+// Priors that fits of noise share.
+inline constexpr double kNoiseFactorWidth = 1.0986;  ///< Log 3, of the log of a factor of noise.
+inline constexpr double kThousandToOne = 6.9;        ///< Log of odds against an unusual noise.
 
 }  // namespace km

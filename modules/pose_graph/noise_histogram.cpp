@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "modules/pose_graph/cycle_mixture.hpp"
+
 namespace km {
 namespace {
 
@@ -28,8 +30,7 @@ constexpr double kSuspicious = 10.0;
 // Least ratio of the sizes of false cycles and noise. One population whose lengths are not exactly
 // those of normal vectors would otherwise count as two.
 constexpr double kFarApart = 4.0;
-constexpr double kTwoOdds = 6.9;  // odds of two populations against one: 1000 to 1
-constexpr double kCoarse = 4.0;   // steps of the sizes of false cycles, in bins
+constexpr double kCoarse = 4.0;  // steps of the sizes of false cycles, in bins
 
 std::uint16_t bin_of(double length) {
   return static_cast<std::uint16_t>(std::log(std::clamp(length, kLeast, kGreatest) / kLeast) /
@@ -146,7 +147,7 @@ std::optional<NoiseScale> shorter_population(const NoiseHistogram& histogram, do
         if (found.log_likelihood > best.log_likelihood) best = found;
       }
     }
-  if (!(two - one >= kTwoOdds)) return std::nullopt;
+  if (!(two - one >= kThousandToOne)) return std::nullopt;
   return nearest_to_stated(fits);
 }
 

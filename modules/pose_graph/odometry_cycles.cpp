@@ -2,17 +2,14 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 #include <type_traits>
 
 #include "modules/core/lie.hpp"
 
 namespace km {
 namespace {
-
-UncertainPose exact(UncertainPose pose) {
-  pose.Sigma.setZero();
-  return pose;
-}
 
 Matrix6 covariance_of_part(const Precision& precision, OdometryCycle::Component part,
                            int dimension) {
@@ -42,6 +39,12 @@ MahalanobisLength mahalanobis_length(const Vector6& error, const Matrix6& Sigma,
   const Eigen::Vector3d planar = error.segment<3>(2);
   const Eigen::Matrix3d block = Sigma.block<3, 3>(2, 2);
   return length(planar, block);
+}
+
+double log_density_if_true(const Vector6& error, const Matrix6& Sigma, int dimension) {
+  const MahalanobisLength length = mahalanobis_length(error, Sigma, dimension);
+  const double axes = dimension == 2 ? 3.0 : 6.0;
+  return -0.5 * length.squared - length.log_root - 0.5 * axes * std::log(2.0 * std::numbers::pi);
 }
 
 Matrix6 TwoClosureCycle::covariance() const {

@@ -27,6 +27,9 @@ struct MahalanobisLength {
 [[nodiscard]] MahalanobisLength mahalanobis_length(const Vector6& error, const Matrix6& Sigma,
                                                    int dimension);
 
+/// Log density of an error with this covariance.
+[[nodiscard]] double log_density_if_true(const Vector6& error, const Matrix6& Sigma, int dimension);
+
 /// The cycle up along one closure, along odometry, down along another closure, and back along
 /// odometry. It begins and ends at the lower end of the first closure. Without noise, T() is the
 /// identity.

@@ -1,7 +1,5 @@
 #include "modules/pose_graph/odometry_evidence.hpp"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -27,13 +25,10 @@ constexpr std::size_t kPlacesBeside = 8;   // places before and after, among whi
 constexpr std::size_t kMostPlaces = 60;    // bounds the time
 constexpr std::size_t kEnoughPlaces = 3;
 constexpr std::size_t kClosureLevels = 4;
-constexpr double kNoiseWidth = 1.0986;   // log 3, prior of the log of a factor
-constexpr double kNoiseLogOdds = 6.9;    // 1000 to 1
 constexpr double kLeastTrueShare = 0.5;  // least share of true cycles
-constexpr double kLeastExtent_m = 1.0;   // least side of the volume for false closures
 
 double log_prior(double level) {
-  const double away = level * std::numbers::ln2 / kNoiseWidth;
+  const double away = level * std::numbers::ln2 / kNoiseFactorWidth;
   return -std::log1p(away * away);
 }
 
@@ -80,8 +75,8 @@ struct PlaceClosure {
 };
 
 struct PairCycle {
-  Eigen::VectorXd error;
-  std::array<Eigen::MatrixXd, 3> Sigma;  // odometry of a, odometry of b, closures
+  Vector6 error;
+  std::array<Matrix6, 3> Sigma;  // odometry of a, odometry of b, closures
   double log_if_false = 0.0;
 };
 
@@ -133,30 +128,11 @@ std::set<std::pair<std::size_t, std::size_t>> near_places(const std::vector<Plac
   return pairs;
 }
 
-double volume_of(const std::vector<PlaceClosure>& places,
-                 const std::function<SE3(const KeyframeId&)>& pose, int dimension) {
-  Eigen::AlignedBox3d below, above;
-  double reach_m = 0.0;
-  for (const PlaceClosure& c : places) {
-    below.extend(pose(c.lower).translation());
-    above.extend(pose(c.upper).translation());
-    reach_m = std::max(reach_m, c.T.T.translation().norm());
-  }
-  const Eigen::Array3d sides =
-      below.sizes().array() + above.sizes().array() + 2.0 * reach_m + kLeastExtent_m;
-  return sides.head(dimension).prod();
-}
-
-double log_ratio_with(const PairCycle& cycle, double noise_a, double noise_b, double noise_c) {
-  const Eigen::MatrixXd Sigma = noise_a * noise_a * cycle.Sigma[0] +
-                                noise_b * noise_b * cycle.Sigma[1] +
-                                noise_c * noise_c * cycle.Sigma[2];
-  const Eigen::LLT<Eigen::MatrixXd> factor(Sigma);
-  const double squared = factor.matrixL().solve(cycle.error).squaredNorm();
-  const double log_root = factor.matrixLLT().diagonal().array().log().sum();
-  return -0.5 * squared - log_root -
-         0.5 * static_cast<double>(cycle.error.size()) * std::log(2.0 * std::numbers::pi) -
-         cycle.log_if_false;
+double log_ratio_with(const PairCycle& cycle, double noise_a, double noise_b, double noise_c,
+                      int dimension) {
+  const Matrix6 Sigma = noise_a * noise_a * cycle.Sigma[0] + noise_b * noise_b * cycle.Sigma[1] +
+                        noise_c * noise_c * cycle.Sigma[2];
+  return log_density_if_true(cycle.error, Sigma, dimension) - cycle.log_if_false;
 }
 
 std::vector<PairCycle> pair_cycles(const std::vector<PlaceClosure>& places,
@@ -171,12 +147,11 @@ std::vector<PairCycle> pair_cycles(const std::vector<PlaceClosure>& places,
     return covariance_in(step.at(ends.begin()->robot), dimension);
   };
   const PublicChain below(lower, pose, noise(lower)), above(upper, pose, noise(upper));
-  const auto exact = [](UncertainPose T) {
-    T.Sigma.setZero();
-    return T;
-  };
-  const double volume = volume_of(places, pose, dimension);
-  const Eigen::Index first = dimension == 2 ? 2 : 0, size = dimension == 2 ? 3 : 6;
+  ClosureVolume volume;
+  for (const PlaceClosure& c : places) {
+    volume.add_ends(pose(c.lower).translation(), pose(c.upper).translation());
+    volume.add_length(c.T.T.translation().norm());
+  }
   std::vector<PairCycle> cycles;
   for (const auto& [k, l] : near_places(places)) {
     const PlaceClosure &one = places[k], &other = places[l];
@@ -187,13 +162,9 @@ std::vector<PairCycle> pair_cycles(const std::vector<PlaceClosure>& places,
     const TwoClosureCycle along_b{exact(around.up), around.above, exact(around.down),
                                   exact(around.below)};
     const Vector6 error = se3_log(around.T());
-    const auto part = [&](const Matrix6& Sigma) -> Eigen::MatrixXd {
-      return Sigma.block(first, first, size, size);
-    };
-    cycles.push_back({error.segment(first, size),
-                      {part(along_a.covariance()), part(along_b.covariance()),
-                       part(around.covariance_of_closures())},
-                      log_density_if_false(error, volume, dimension)});
+    cycles.push_back({error,
+                      {along_a.covariance(), along_b.covariance(), around.covariance_of_closures()},
+                      log_density_if_false(error, volume.of(dimension), dimension)});
   }
   return cycles;
 }
@@ -248,7 +219,7 @@ bool rests_on_one_pair(std::span<const PairVote> votes, const Levels& levels, Ro
 // The robot whose noise is the least likely one, if the odds are below 1000 to 1.
 std::optional<RobotId> least_likely(std::span<const PairVote> votes,
                                     const std::set<RobotId>& honest, const Levels& levels) {
-  double least = kNoiseLogOdds;
+  double least = kThousandToOne;
   std::optional<RobotId> doubtful;
   const double most = log_posterior_of(votes, levels);
   for (const auto& [robot, level] : levels) {
@@ -303,7 +274,7 @@ std::vector<float> odometry_evidence(std::span<const PoseEdge> closures,
         for (const PairCycle& cycle : cycles)
           ratios.push_back(log_ratio_with(cycle, std::ldexp(1.0, static_cast<int>(i)),
                                           std::ldexp(1.0, static_cast<int>(j)),
-                                          std::ldexp(1.0, static_cast<int>(c))));
+                                          std::ldexp(1.0, static_cast<int>(c)), dimension));
         const CycleMixture mixture = fit_cycle_mixture(ratios, weights);
         const double found = mixture.log_likelihood + log_prior(static_cast<double>(c));
         best = std::max(best, found);

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <numbers>
 #include <vector>
 
 #include "modules/pose_graph/closure_places.hpp"
@@ -19,16 +18,12 @@ namespace {
 constexpr std::size_t kMostCycles = 200;
 // Largest number of steps in a cycle of two closures.
 constexpr std::uint32_t kMaxShortCycleSteps = 10;
-constexpr double kPriorSigma = 1.0986;  // log 3, prior of log sqrt(v)
 // Largest standard deviation of the rotation of odometry in a cycle of one closure, on each axis.
 // Errors of cycles with a larger one are not normally distributed.
 constexpr double kLargestTurnSigma_rad = 0.7;
 // Weight of a cycle of two closures. Each closure is in two such cycles.
 constexpr double kShortCycleWeight = 0.5;
-constexpr double kLeastSide_m = 1.0;    // least side of the volume for false closures
 constexpr double kRatioSigma = 0.6931;  // log 2, prior of log sqrt(v_R / v_t)
-// Log of the odds from which on odometry counts as noisier than it claims: 1000 to 1.
-constexpr double kLeastLogOdds = 6.9;
 constexpr int kSweeps = 4;
 
 using Cycle = OdometryCycle;
@@ -81,16 +76,13 @@ std::vector<Cycle> short_cycles(const OdometryChain& chain, std::span<const Pose
   return cycles;
 }
 
-// The volume [m^3] in which a false closure may end, in the plane the area [m^2]. It is twice the
-// bounding box of the trajectory, enlarged on every side by the length of the longest closure.
+// A closure may join any two places of the trajectory.
 double volume_of(const OdometryChain& chain, std::span<const PoseEdge> closures, int dimension) {
-  Eigen::AlignedBox3d box;
-  for (const SE3& T : chain.T_first_kf) box.extend(T.translation());
-  double reach_m = 0.0;
+  ClosureVolume volume;
+  for (const SE3& T : chain.T_first_kf) volume.add_ends(T.translation(), T.translation());
   for (const PoseEdge& closure : closures)
-    reach_m = std::max(reach_m, closure.T_from_to.translation().norm());
-  const Eigen::Array3d sides = 2.0 * box.sizes().array() + 2.0 * reach_m + kLeastSide_m;
-  return sides.head(dimension).prod();
+    volume.add_length(closure.T_from_to.translation().norm());
+  return volume.of(dimension);
 }
 
 // Cycles, and their log densities if they are false.
@@ -106,18 +98,14 @@ struct Cycles {
   }
 };
 
-double log_density_if_true(const Cycle& cycle, const Factors& v, int dimension) {
-  Matrix6 Sigma = Matrix6::Zero();
-  for (std::size_t f = 0; f < kComponents; ++f) Sigma += v[f] * cycle.covariance[f];
-  const MahalanobisLength length = mahalanobis_length(cycle.error, Sigma, dimension);
-  const double axes = dimension == 2 ? 3.0 : 6.0;
-  return -0.5 * length.squared - length.log_root - 0.5 * axes * std::log(2.0 * std::numbers::pi);
-}
-
 std::vector<double> log_ratios(const Cycles& all, const Factors& v) {
   std::vector<double> ratios;
-  for (std::size_t k = 0; k < all.cycles.size(); ++k)
-    ratios.push_back(log_density_if_true(all.cycles[k], v, all.dimension) - all.if_false[k]);
+  for (std::size_t k = 0; k < all.cycles.size(); ++k) {
+    const Cycle& cycle = all.cycles[k];
+    Matrix6 Sigma = Matrix6::Zero();
+    for (std::size_t f = 0; f < kComponents; ++f) Sigma += v[f] * cycle.covariance[f];
+    ratios.push_back(log_density_if_true(cycle.error, Sigma, all.dimension) - all.if_false[k]);
+  }
   return ratios;
 }
 
@@ -134,7 +122,7 @@ double log_posterior(const Cycles& all, const Factors& v) {
   const auto prior = [](double log_root, double sigma) {
     return -0.5 * log_root * log_root / (sigma * sigma);
   };
-  for (const double factor : v) log_sum += prior(0.5 * std::log(factor), kPriorSigma);
+  for (const double factor : v) log_sum += prior(0.5 * std::log(factor), kNoiseFactorWidth);
   return log_sum + prior(0.5 * std::log(v[kRotation] / v[kTranslation]), kRatioSigma);
 }
 
@@ -248,7 +236,7 @@ OdometryNoise estimate_odometry_noise(std::span<const PoseEdge> steps,
   if (cycles.empty()) return noise;
   const double volume = volume_of(chain, closures, dimension);
   Fit fit = fit_factors({cycles, volume, dimension});
-  if (!(fit.log_odds >= kLeastLogOdds)) return noise;
+  if (!(fit.log_odds >= kThousandToOne)) return noise;
   const std::vector<Cycle> near = short_cycles(chain, closures);
   std::vector<Cycle> normal = with_normal_errors(cycles, fit.factors, dimension);
   // If most cycles of one closure are left out, noise of closures alone may explain the cycles of
@@ -257,10 +245,10 @@ OdometryNoise estimate_odometry_noise(std::span<const PoseEdge> steps,
   normal.insert(normal.end(), near.begin(), near.end());
   const Fit refined = fit_factors({normal, volume, dimension});
   const Fit common = fit_factors({in_common(normal), volume, dimension});
-  noise.of_closures = common.log_posterior - refined.log_posterior >= kLeastLogOdds;
+  noise.of_closures = common.log_posterior - refined.log_posterior >= kThousandToOne;
   if (noise.of_closures)
     fit = common;
-  else if (refined.log_odds >= kLeastLogOdds)
+  else if (refined.log_odds >= kThousandToOne)
     fit = refined;
   else if (!few_are_long)
     return noise;
