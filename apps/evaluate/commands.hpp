@@ -13,7 +13,6 @@ void add_consistency(CLI::App& app);
 void add_mesh(CLI::App& app);
 void add_render(CLI::App& app);
 void add_objects(CLI::App& app);
-void add_colmap(CLI::App& app);
 void add_glb(CLI::App& app);
 
 }  // namespace km

@@ -8,7 +8,6 @@
 
 #include "modules/mesh/mesh_file.hpp"
 #include "test/modules/evaluation/mesh/shapes.hpp"
-#include "test/modules/sensors/euroc_folder.hpp"
 #include "test/support/command.hpp"
 #include "test/support/image_file.hpp"
 #include "test/support/temporary_folder.hpp"
@@ -182,29 +181,6 @@ TEST_CASE("objects compares objects in the frame of the truth", "[evaluate]") {
              Contains("all       0      0    0.00"));
   run.folder.write("true.json", "{}");
   CHECK_THAT(run(command).output, Contains("true.json"));
-}
-
-TEST_CASE("colmap writes the keyframes of a run that have images", "[evaluate]") {
-  const EurocFolder dataset;
-  const Meshes run;
-  // Keyframes at images 1 and 3, and one without an image.
-  run.folder.write("alice/optimized_keyframes.tum",
-                   "10.050000000 1 2 3 0 0 0 1\n10.150000000 1 2 4 0 0 0 1\n10.99 0 0 0 0 0 0 1\n");
-  const std::string command =
-      "colmap --results alice --output out --max-points 100 --mesh world.ply --dataset " +
-      dataset.root().string();
-  const auto result = run(command);
-  CAPTURE(result.output);
-  REQUIRE(result.exit_code == 0);
-  CHECK_THAT(result.output, Contains("2 of 3 keyframes have an image"));
-  const auto images = run.folder.path() / "out/images/alice";
-  CHECK(read_pixels(images / "10050000000.png", DecodedPixels::kGray).at<std::uint8_t>(5, 5) == 20);
-  CHECK(std::filesystem::exists(images / "10150000000.png"));
-  CHECK_THAT(run.folder.read("out/sparse/0/images.txt"), Contains("1 alice/10050000000.png\n\n2 "));
-  CHECK_THAT(run.folder.read("out/sparse/0/cameras.txt"), Contains(" 32 24 "));
-  CHECK_THAT(run.folder.read("out/sparse/0/points3D.txt"), Contains("\n1 "));
-  run.folder.write("alice/optimized_keyframes.tum", "99.0 1 2 3 0 0 0 1\n");
-  CHECK_THAT(run(command).output, Contains("is it the recording of this run?"));
 }
 
 }  // namespace km
