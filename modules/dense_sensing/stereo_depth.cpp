@@ -5,9 +5,9 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
-#include <string>
 #include <utility>
 #include <vector>
 
@@ -142,29 +142,49 @@ StereoDepthConfig checked_depths(StereoDepthConfig config) {
   return config;
 }
 
+int whole_units(double disparity_px) {
+  return kDisparityUnit * static_cast<int>(std::ceil((disparity_px + 1.0) / kDisparityUnit));
+}
+
 int disparity_count(const StereoRectification& rectification, const StereoDepthConfig& config) {
-  const double largest_px =
+  const double nearest_px =
       rectification.camera().fx * rectification.baseline_m() / config.min_depth_m;
-  const int units = static_cast<int>(std::ceil((largest_px + 1.0) / kDisparityUnit));
-  if (units * kDisparityUnit >= rectification.camera().width)
-    throw ConfigError("stereo_depth.min_depth_m = " + std::to_string(config.min_depth_m) +
-                      ": the disparity there, " + std::to_string(std::lround(largest_px)) +
-                      " px, is as wide as the image");
-  return units * kDisparityUnit;
+  return whole_units(std::min(nearest_px, 0.5 * rectification.camera().width));
 }
 
 // The smoothness penalties are those that OpenCV's documentation proposes, for one channel.
-cv::Ptr<cv::StereoSGBM> make_matcher(int disparities) {
+cv::Ptr<cv::StereoSGBM> make_matcher(int disparities, int speckle_px) {
   constexpr int kBlock_px = 5;         // side of the compared blocks, odd
   constexpr int kMaxLeftRight_px = 1;  // from the disparity matched from the right image
   constexpr int kPrefilterCap = 31;
   constexpr int kUniqueness_percent = 8;  // margin of the best match over all others
-  constexpr int kSpeckle_px = 300;        // smaller areas of similar depth are wrong matches
   constexpr int kSpeckleStep_px = 1;
   constexpr int kArea = kBlock_px * kBlock_px;
   return cv::StereoSGBM::create(0, disparities, kBlock_px, 8 * kArea, 32 * kArea, kMaxLeftRight_px,
-                                kPrefilterCap, kUniqueness_percent, kSpeckle_px, kSpeckleStep_px,
+                                kPrefilterCap, kUniqueness_percent, speckle_px, kSpeckleStep_px,
                                 cv::StereoSGBM::MODE_SGBM_3WAY);
+}
+
+constexpr int kSpeckle_px = 300;  // smaller areas of similar depth are wrong matches
+constexpr int kPreviewScale = 4;
+
+// The matcher's disparities also for the left columns, where it has none because it does not
+// compare what is outside the right image: the images get as many columns as it searches
+// disparities.
+cv::Mat matched(const cv::Mat& left, const cv::Mat& right, cv::StereoSGBM& matcher) {
+  const int columns = matcher.getNumDisparities();
+  std::array<cv::Mat, 2> wide;
+  cv::copyMakeBorder(left, wide[0], 0, 0, columns, 0, cv::BORDER_REPLICATE);
+  cv::copyMakeBorder(right, wide[1], 0, 0, columns, 0, cv::BORDER_REPLICATE);
+  cv::Mat steps;
+  matcher.compute(wide[0], wide[1], steps);
+  steps = steps.colRange(columns, steps.cols);
+  for (int y = 0; y < steps.rows; ++y) {
+    auto* row = steps.ptr<std::int16_t>(y);
+    for (int x = 0; x < std::min(columns, steps.cols); ++x)
+      if (row[x] > kSteps * x) row[x] = 0;
+  }
+  return steps;
 }
 
 }  // namespace
@@ -220,13 +240,31 @@ StereoDepth::StereoDepth(const StereoRig& rig, const StereoDepthConfig& config)
     : config_(checked_depths(config)),
       rectification_(rig, config_.downscale),
       disparities_(disparity_count(rectification_, config_)),
-      matcher_(make_matcher(disparities_)) {}
+      matcher_(make_matcher(disparities_, kSpeckle_px)),
+      preview_(make_matcher(whole_units(disparities_ / kPreviewScale),
+                            kSpeckle_px / (kPreviewScale * kPreviewScale))) {}
+
+int StereoDepth::largest_disparity(const cv::Mat& left, const cv::Mat& right) const {
+  constexpr std::size_t kPixels = 30;  // with a larger disparity
+  std::array<cv::Mat, 2> small;
+  const cv::Size size(left.cols / kPreviewScale, left.rows / kPreviewScale);
+  cv::resize(left, small[0], size, 0.0, 0.0, cv::INTER_AREA);
+  cv::resize(right, small[1], size, 0.0, 0.0, cv::INTER_AREA);
+  const cv::Mat steps = matched(small[0], small[1], *preview_);
+  std::vector<std::int16_t> sorted(steps.begin<std::int16_t>(), steps.end<std::int16_t>());
+  if (sorted.size() <= kPixels) return disparities_;
+  const auto largest = sorted.begin() + kPixels;
+  std::ranges::nth_element(sorted, largest, std::greater());
+  return kPreviewScale * std::max<int>(*largest, 0) / kSteps;
+}
 
 DepthImage StereoDepth::compute(const GrayImage& left, const GrayImage& right) {
   const cv::Mat rectified_left = rectification_.rectified(left, 0);
   const cv::Mat rectified_right = rectification_.rectified(right, 1);
-  cv::Mat steps;
-  matcher_->compute(rectified_left, rectified_right, steps);
+  constexpr double kMargin_px = 2.0 * kPreviewScale;
+  const double wanted = largest_disparity(rectified_left, rectified_right) + kMargin_px;
+  matcher_->setNumDisparities(std::clamp(whole_units(wanted), kDisparityUnit, disparities_));
+  const cv::Mat steps = matched(rectified_left, rectified_right, *matcher_);
   DepthImage depth{camera().width, camera().height, {}};
   fill(refined_disparities(rectified_left, rectified_right, steps), depth);
   return depth;

@@ -53,7 +53,7 @@ class StereoRectification {
 /// Depth of every pixel from a stereo pair, by semi-global matching (Hirschmueller, "Stereo
 /// Processing by Semiglobal Matching and Mutual Information", PAMI 2008) in OpenCV's variant, on
 /// rectified images. A pixel has a depth if its match is unique, agrees with the match from right
-/// to left, is no speckle, and is within range.
+/// to left, is no speckle, is in both images, and is within range.
 ///
 /// The matcher's fractions of a pixel are biased towards whole numbers by up to a quarter. One step
 /// of image alignment (Lucas and Kanade, "An Iterative Image Registration Technique with an
@@ -69,19 +69,22 @@ class StereoDepth {
   [[nodiscard]] const Camera& camera() const { return rectification_.camera(); }
   [[nodiscard]] const StereoRectification& rectification() const { return rectification_; }
 
-  /// Number of searched disparities, from 0 on [px].
+  /// Largest number of searched disparities, from 0 on [px]: min_depth_m has the largest one, at
+  /// most half of the image's width.
   [[nodiscard]] int disparities() const { return disparities_; }
 
   /// Precondition: both images have their camera's size.
   [[nodiscard]] DepthImage compute(const GrayImage& left, const GrayImage& right);
 
  private:
+  // The largest disparity that images of a quarter of the size show [px]. No more are searched.
+  [[nodiscard]] int largest_disparity(const cv::Mat& left, const cv::Mat& right) const;
   void fill(const cv::Mat& disparities_px, DepthImage& depth) const;
 
   StereoDepthConfig config_;
   StereoRectification rectification_;
   int disparities_;
-  cv::Ptr<cv::StereoSGBM> matcher_;
+  cv::Ptr<cv::StereoSGBM> matcher_, preview_;
 };
 
 }  // namespace km
