@@ -6,7 +6,7 @@ include(CMakePackageConfigHelpers)
 set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME library)
 set(config_dir ${CMAKE_INSTALL_LIBDIR}/cmake/kimera_multi)
 
-set(modules core images vio_frontend vio place_recognition loop_closure outlier_rejection pose_graph
+set(modules core images vio_frontend vio place_recognition loop_closure outlier_rejection tree_newton robust session
   rbcd recorded_graph mesh semantic_mapping mesh_deformation team_map recordings sensors charts evaluation)
 # sensors_node reads calibrations, program and heap are parts of every program. The others are libraries of these.
 set(KM_EXPORTED ${modules} sensors_node program heap runtime security idl opencv chart_files)

@@ -13,9 +13,9 @@
 #include <utility>
 #include <vector>
 
-#include "modules/pose_graph/chordal.hpp"
-#include "modules/pose_graph/tree_newton.hpp"
 #include "modules/recorded_graph/g2o_io.hpp"
+#include "modules/robust/tree_newton.hpp"
+#include "modules/tree_newton/chordal.hpp"
 #include "tum_row.hpp"
 
 namespace km {

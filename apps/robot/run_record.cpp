@@ -7,8 +7,8 @@
 #include "modules/core/median_depth.hpp"
 #include "modules/core/odometry_correction.hpp"
 #include "modules/mesh/mesh_chunks.hpp"
-#include "modules/pose_graph/own_graph.hpp"
-#include "modules/pose_graph/pose_edge.hpp"
+#include "modules/session/own_graph.hpp"
+#include "modules/tree_newton/pose_edge.hpp"
 
 namespace km {
 namespace {

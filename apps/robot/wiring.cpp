@@ -20,11 +20,11 @@
 #include "modules/place_recognition/node/place_recognition_codec.hpp"
 #include "modules/place_recognition/node/place_recognition_node.hpp"
 #include "modules/place_recognition/vocabulary_file.hpp"
-#include "modules/pose_graph/node/team_codec.hpp"
-#include "modules/pose_graph/node/team_node.hpp"
 #include "modules/rbcd/solver_choice.hpp"
 #include "modules/ros_dds/node/live_topics.hpp"
 #include "modules/ros_dds/ros_sink.hpp"
+#include "modules/session/node/team_codec.hpp"
+#include "modules/session/node/team_node.hpp"
 #include "modules/vio/node/vio_node.hpp"
 #include "runtime/dds/robot_status.hpp"
 

@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "modules/core/bytes.hpp"
-#include "modules/pose_graph/member_solver.hpp"
-#include "modules/pose_graph/session_graph.hpp"
 #include "modules/rbcd/quadratic_problem.hpp"
+#include "modules/robust/member_solver.hpp"
+#include "modules/robust/session_graph.hpp"
 
 namespace km {
 

@@ -5,10 +5,10 @@
 #include <vector>
 
 #include "modules/core/geometry.hpp"
-#include "modules/pose_graph/block_edge.hpp"
-#include "modules/pose_graph/vertical_prior.hpp"
 #include "modules/rbcd/block_cholesky.hpp"
 #include "modules/rbcd/stiefel.hpp"
+#include "modules/tree_newton/block_edge.hpp"
+#include "modules/tree_newton/vertical_prior.hpp"
 
 namespace km {
 

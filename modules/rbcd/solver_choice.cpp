@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "modules/pose_graph/tree_newton.hpp"
+#include "modules/robust/tree_newton.hpp"
 
 namespace km {
 

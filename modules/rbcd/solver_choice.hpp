@@ -1,9 +1,9 @@
 #pragma once
 
-#include "modules/pose_graph/pose_graph_config.hpp"
-#include "modules/pose_graph/session_part.hpp"
-#include "modules/pose_graph/tree_root.hpp"
 #include "modules/rbcd/member_rbcd.hpp"
+#include "modules/robust/tree_root.hpp"
+#include "modules/session/pose_graph_config.hpp"
+#include "modules/session/session_part.hpp"
 
 namespace km {
 

@@ -2,7 +2,7 @@
 
 #include "apps/robot/results.hpp"
 #include "apps/robot/run_record.hpp"
-#include "modules/pose_graph/own_graph.hpp"
+#include "modules/session/own_graph.hpp"
 #include "test/support/temporary_folder.hpp"
 
 namespace km {

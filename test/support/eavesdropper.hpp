@@ -10,10 +10,10 @@
 #include <vector>
 
 #include "apps/lab/pgo/member_team.hpp"
-#include "modules/pose_graph/chordal.hpp"
-#include "modules/pose_graph/member_solver.hpp"
-#include "modules/pose_graph/tree_messages.hpp"
-#include "modules/pose_graph/tree_newton.hpp"
+#include "modules/robust/member_solver.hpp"
+#include "modules/robust/tree_messages.hpp"
+#include "modules/robust/tree_newton.hpp"
+#include "modules/tree_newton/chordal.hpp"
 
 namespace km {
 

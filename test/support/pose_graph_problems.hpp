@@ -8,9 +8,9 @@
 
 #include "modules/core/lie.hpp"
 #include "modules/core/precision.hpp"
-#include "modules/pose_graph/chordal.hpp"
 #include "modules/rbcd/truncated_newton.hpp"
 #include "modules/recorded_graph/g2o_io.hpp"
+#include "modules/tree_newton/chordal.hpp"
 #include "test/support/random_pose.hpp"
 
 namespace km {

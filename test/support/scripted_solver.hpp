@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "modules/pose_graph/member_solver.hpp"
-#include "modules/pose_graph/tree_newton.hpp"
+#include "modules/robust/member_solver.hpp"
+#include "modules/robust/tree_newton.hpp"
 
 namespace km {
 

@@ -14,12 +14,12 @@
 #include <vector>
 
 #include "modules/core/lie.hpp"
-#include "modules/pose_graph/chordal.hpp"
-#include "modules/pose_graph/member_solver.hpp"
-#include "modules/pose_graph/session_graph.hpp"
-#include "modules/pose_graph/team_messages.hpp"
 #include "modules/rbcd/truncated_newton.hpp"
 #include "modules/recorded_graph/g2o_io.hpp"
+#include "modules/robust/member_solver.hpp"
+#include "modules/robust/session_graph.hpp"
+#include "modules/session/team_messages.hpp"
+#include "modules/tree_newton/chordal.hpp"
 #include "test/support/random_pose.hpp"
 
 namespace km {

@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "modules/core/precision.hpp"
-#include "modules/pose_graph/node/team_codec.hpp"
-#include "modules/pose_graph/team_agent.hpp"
+#include "modules/session/node/team_codec.hpp"
+#include "modules/session/team_agent.hpp"
 #include "runtime/overlay/overlay.hpp"
 #include "runtime/overlay/overlay_codec.hpp"
 #include "test/support/solver_team.hpp"

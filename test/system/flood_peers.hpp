@@ -8,7 +8,7 @@
 #include "modules/mesh/node/mesh_codec.hpp"
 #include "modules/outlier_rejection/node/outlier_rejection_codec.hpp"
 #include "modules/place_recognition/node/place_recognition_codec.hpp"
-#include "modules/pose_graph/node/team_codec.hpp"
+#include "modules/session/node/team_codec.hpp"
 #include "runtime/overlay/endorsement.hpp"
 #include "test/runtime/dds/dds_fixture.hpp"
 

@@ -13,11 +13,11 @@
 #include <utility>
 
 #include "modules/outlier_rejection/witnessed_pair.hpp"
-#include "modules/pose_graph/odometry_cycles.hpp"
-#include "modules/pose_graph/team_agent.hpp"
-#include "modules/pose_graph/team_message_bytes.hpp"
 #include "modules/rbcd/solver_choice.hpp"
 #include "modules/recorded_graph/recorded_graph.hpp"
+#include "modules/robust/odometry_cycles.hpp"
+#include "modules/session/team_agent.hpp"
+#include "modules/session/team_message_bytes.hpp"
 
 namespace km {
 namespace {

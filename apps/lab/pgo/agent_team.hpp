@@ -9,8 +9,8 @@
 #include "apps/lab/pgo/team_graph.hpp"
 #include "modules/core/pose_graph.hpp"
 #include "modules/outlier_rejection/pcm_config.hpp"
-#include "modules/pose_graph/member_solver.hpp"
-#include "modules/pose_graph/pose_graph_config.hpp"
+#include "modules/robust/member_solver.hpp"
+#include "modules/session/pose_graph_config.hpp"
 
 namespace km {
 

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "apps/lab/pgo/certificate.hpp"
-#include "modules/pose_graph/tree_newton.hpp"
 #include "modules/rbcd/truncated_newton.hpp"
+#include "modules/robust/tree_newton.hpp"
 
 namespace km {
 

@@ -4,8 +4,8 @@
 #include <stdexcept>
 #include <string>
 
-#include "modules/pose_graph/chordal.hpp"
 #include "modules/rbcd/truncated_newton.hpp"
+#include "modules/tree_newton/chordal.hpp"
 
 namespace km {
 namespace {

@@ -5,8 +5,8 @@
 #include <stdexcept>
 #include <utility>
 
-#include "modules/pose_graph/pose_edge.hpp"
-#include "modules/pose_graph/team_plan.hpp"
+#include "modules/session/team_plan.hpp"
+#include "modules/tree_newton/pose_edge.hpp"
 
 namespace km {
 

@@ -7,8 +7,8 @@
 
 #include "apps/lab/pgo/team_graph.hpp"
 #include "apps/lab/pgo/team_solver.hpp"
-#include "modules/pose_graph/member_solver.hpp"
-#include "modules/pose_graph/session_graph.hpp"
+#include "modules/robust/member_solver.hpp"
+#include "modules/robust/session_graph.hpp"
 
 namespace km {
 

@@ -12,11 +12,11 @@
 #include "modules/evaluation/trajectory_error.hpp"
 #include "modules/outlier_rejection/chi_squared.hpp"
 #include "modules/outlier_rejection/pcm.hpp"
-#include "modules/pose_graph/chordal.hpp"
-#include "modules/pose_graph/lone_solution.hpp"
-#include "modules/pose_graph/robust_schedule.hpp"
-#include "modules/pose_graph/tree_front.hpp"
 #include "modules/rbcd/stiefel.hpp"
+#include "modules/robust/lone_solution.hpp"
+#include "modules/robust/robust_schedule.hpp"
+#include "modules/tree_newton/chordal.hpp"
+#include "modules/tree_newton/tree_front.hpp"
 
 namespace km {
 namespace {

@@ -11,10 +11,10 @@
 #include "apps/lab/pgo/gauss_seidel_team.hpp"
 #include "apps/lab/pgo/local_team.hpp"
 #include "modules/core/symmetric_eigen.hpp"
-#include "modules/pose_graph/chordal.hpp"
-#include "modules/pose_graph/tree_newton.hpp"
 #include "modules/rbcd/solver_choice.hpp"
 #include "modules/rbcd/stiefel.hpp"
+#include "modules/robust/tree_newton.hpp"
+#include "modules/tree_newton/chordal.hpp"
 
 namespace km {
 namespace {

@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "modules/core/ids.hpp"
-#include "modules/pose_graph/session_graph.hpp"
 #include "modules/rbcd/quadratic_problem.hpp"
+#include "modules/robust/session_graph.hpp"
 
 namespace km {
 

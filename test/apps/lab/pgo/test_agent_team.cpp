@@ -8,8 +8,8 @@
 #include "apps/lab/pgo/agent_team.hpp"
 #include "apps/lab/pgo/central_solver.hpp"
 #include "modules/core/lie.hpp"
-#include "modules/pose_graph/chordal.hpp"
 #include "modules/rbcd/stiefel.hpp"
+#include "modules/tree_newton/chordal.hpp"
 #include "test/support/team_graphs.hpp"
 
 namespace km {

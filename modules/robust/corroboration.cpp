@@ -1,0 +1,226 @@
+#include "modules/robust/corroboration.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "modules/core/covariance.hpp"
+#include "modules/core/lie.hpp"
+#include "modules/robust/closure_places.hpp"
+#include "modules/robust/cycle_mixture.hpp"
+#include "modules/robust/odometry_cycles.hpp"
+
+namespace km {
+namespace {
+
+constexpr std::uint32_t kSteps = 10;  // largest number of steps of odometry in a cycle
+constexpr std::uint32_t kBeside = 5;  // largest distance of near closures, at both ends [keyframes]
+constexpr double kLargestTurn = 0.25 * std::numbers::pi;
+// Largest number of steps of odometry in a cycle between two places. The noise of more steps would
+// hide the noise of the closures.
+constexpr std::uint32_t kStepsBetweenPlaces = 60;
+constexpr double kLonger = 0.01;  // relative step of numeric derivatives by length
+// Largest standard deviation of the rotation of odometry in a cycle between two places. Errors of
+// cycles with a larger one are not normally distributed.
+constexpr double kLargestTurnSigma_rad = 0.5;
+
+}  // namespace
+
+Corroboration::Corroboration(std::span<const PoseEdge> closures, const PoseOf& pose,
+                             const std::map<RobotId, Precision>& step, int dimension,
+                             LaterRuns later_runs)
+    : pose_(pose),
+      step_(step),
+      dimension_(dimension),
+      later_runs_(std::move(later_runs)),
+      edges_(closures) {
+  for (std::size_t k = 0; k < closures.size(); ++k) {
+    const PoseEdge& e = closures[k];
+    const bool up = e.from < e.to;
+    closures_.push_back({k, up ? e.from : e.to, up ? e.to : e.from,
+                         up ? e.T_from_to : e.T_from_to.inverse(), e.precision});
+  }
+  std::stable_sort(closures_.begin(), closures_.end(), [](const Upward& a, const Upward& b) {
+    return std::pair(a.lower, a.upper) < std::pair(b.lower, b.upper);
+  });
+}
+
+// False if a step between the lower or between the upper ends is unknown.
+bool Corroboration::same_runs(const Upward& one, const Upward& other) const {
+  const auto run_of = [this](const KeyframeId& id) {
+    const auto runs = later_runs_.find(id.robot);
+    return runs == later_runs_.end()
+               ? std::ptrdiff_t{0}
+               : std::ranges::upper_bound(runs->second, id.index) - runs->second.begin();
+  };
+  return run_of(one.lower) == run_of(other.lower) && run_of(one.upper) == run_of(other.upper);
+}
+
+double Corroboration::cycle_length(const Upward& one, const Upward& other) const {
+  const auto chain = [&](const KeyframeId& from, const KeyframeId& to) {
+    const auto step = step_.find(from.robot);
+    const Precision precision = step == step_.end() ? Precision{} : step->second;
+    return UncertainPose{pose_(from).inverse() * pose_(to),
+                         steps_between(from, to) * covariance_in(precision, dimension_)};
+  };
+  const auto measured = [&](const Upward& c) {
+    return UncertainPose{c.T_lower_upper, covariance_in(c.precision, dimension_)};
+  };
+  const TwoClosureCycle cycle{measured(one), chain(one.upper, other.upper),
+                              inverse(measured(other)), chain(other.lower, one.lower)};
+  const SE3 T = cycle.T();
+  if (!(angle_of(T.linear()) <= kLargestTurn)) return std::numeric_limits<double>::infinity();
+  return std::sqrt(mahalanobis_length(se3_log(T), cycle.covariance(), dimension_).squared);
+}
+
+void Corroboration::count_lengths(NoiseHistogram& histogram, std::size_t most) const {
+  struct Cycle {
+    std::uint32_t steps;
+    std::size_t a;
+    std::size_t b;
+  };
+  std::vector<Cycle> cycles;
+  for (std::size_t a = 0; a < closures_.size(); ++a)
+    for (std::size_t b = a + 1; b < closures_.size(); ++b) {
+      if (steps_between(closures_[a].lower, closures_[b].lower) > kSteps) break;
+      const std::uint32_t steps = steps_between(closures_[a].lower, closures_[b].lower) +
+                                  steps_between(closures_[a].upper, closures_[b].upper);
+      if (steps <= kSteps && same_runs(closures_[a], closures_[b])) cycles.push_back({steps, a, b});
+    }
+  std::stable_sort(cycles.begin(), cycles.end(),
+                   [](const Cycle& x, const Cycle& y) { return x.steps < y.steps; });
+  if (cycles.size() > most) cycles.resize(most);
+  for (const Cycle& c : cycles)
+    count_length(histogram, cycle_length(closures_[c.a], closures_[c.b]));
+}
+
+NoiseCycle Corroboration::noise_cycle(const Upward& one, const Upward& other, double volume) const {
+  const auto chain = [&](const KeyframeId& from, const KeyframeId& to) {
+    const auto step = step_.find(from.robot);
+    const SE3 T = pose_(from).inverse() * pose_(to);
+    const double steps = steps_between(from, to);
+    Matrix6 Sigma =
+        steps * covariance_in(step == step_.end() ? Precision{} : step->second, dimension_);
+    const double lever = Sigma(2, 2) * T.translation().squaredNorm() / 3.0;
+    Sigma.diagonal().segment<2>(3).array() += lever;
+    if (dimension_ == 3) Sigma(5, 5) += lever;
+    return UncertainPose{T, Sigma};
+  };
+  const auto measured = [&](const Upward& c) {
+    return UncertainPose{c.T_lower_upper, covariance_in(c.precision, dimension_)};
+  };
+  const TwoClosureCycle cycle{measured(one), chain(one.upper, other.upper),
+                              inverse(measured(other)), chain(other.lower, one.lower)};
+  const Vector6 error = se3_log(cycle.T());
+  // Derivative of the error by the relative length of one chain of odometry.
+  const auto by_length = [&](UncertainPose TwoClosureCycle::*chain_of) {
+    TwoClosureCycle longer = cycle;
+    (longer.*chain_of).T.translation() *= 1.0 + kLonger;
+    return Vector6((se3_log(longer.T()) - error) / kLonger);
+  };
+  return NoiseCycle::of(error, cycle.covariance_of_odometry(), cycle.covariance_of_closures(),
+                        log_density_if_false(error, volume, dimension_), dimension_,
+                        {by_length(&TwoClosureCycle::below), by_length(&TwoClosureCycle::above)});
+}
+
+double Corroboration::volume() const {
+  ClosureVolume volume;
+  for (const Upward& c : closures_) {
+    volume.add_ends(pose_(c.lower).translation(), pose_(c.upper).translation());
+    volume.add_length(c.T_lower_upper.translation().norm());
+  }
+  return volume.of(dimension_);
+}
+
+// Standard deviation of the rotation of the odometry between two closures, on each axis.
+double Corroboration::turn_rad(const Upward& one, const Upward& other) const {
+  double variance = 0.0;
+  for (const auto& [from, to] : {std::pair(one.lower, other.lower), {one.upper, other.upper}}) {
+    const auto step = step_.find(from.robot);
+    const Precision precision = step == step_.end() ? Precision{} : step->second;
+    variance += steps_between(from, to) * covariance_in(precision, dimension_)(2, 2);
+  }
+  return std::sqrt(variance);
+}
+
+void Corroboration::count_cycles(PairCycles& cycles) const {
+  if (closures_.size() < 2) return;
+  struct Pair {
+    std::uint32_t steps;
+    std::size_t a;
+    std::size_t b;
+  };
+  const ClosurePlaces places = find_places(edges_);
+  std::vector<bool> is_first;  // the closure is the first one of its place
+  std::vector<bool> seen(places.sizes.size(), false);
+  for (const Upward& c : closures_) {
+    const std::size_t place = places.place_of[c.index];
+    is_first.push_back(!seen[place]);
+    seen[place] = true;
+  }
+  std::vector<Pair> inside, between;
+  for (std::size_t a = 0; a < closures_.size(); ++a)
+    for (std::size_t b = a + 1; b < closures_.size(); ++b) {
+      const std::uint32_t lower = steps_between(closures_[a].lower, closures_[b].lower);
+      if (lower > kStepsBetweenPlaces || closures_[a].lower.robot != closures_[b].lower.robot)
+        break;
+      const std::uint32_t steps = lower + steps_between(closures_[a].upper, closures_[b].upper);
+      if (steps == 0) continue;  // no odometry between them
+      if (!same_runs(closures_[a], closures_[b])) continue;
+      const bool same = places.place_of[closures_[a].index] == places.place_of[closures_[b].index];
+      if (same && steps <= kSteps) inside.push_back({steps, a, b});
+      if (!same && is_first[a] && is_first[b] && steps <= kStepsBetweenPlaces &&
+          turn_rad(closures_[a], closures_[b]) <= kLargestTurnSigma_rad)
+        between.push_back({steps, a, b});
+    }
+  const double room = volume();
+  const auto count = [&](std::vector<Pair>& pairs, std::vector<NoiseCycle>& counted) {
+    std::ranges::stable_sort(pairs, {}, &Pair::steps);
+    for (const Pair& pair : pairs) {
+      if (counted.size() >= kMostNoiseCycles) break;
+      counted.push_back(noise_cycle(closures_[pair.a], closures_[pair.b], room));
+    }
+  };
+  count(inside, cycles.inside);
+  count(between, cycles.between);
+  cycles.places += static_cast<double>(places.sizes.size());
+}
+
+bool Corroboration::agree(const Upward& one, const Upward& other, double barc) const {
+  if (steps_between(one.upper, other.upper) > kBeside || !same_runs(one, other)) return false;
+  const SE3 T = pose_(one.lower).inverse() * pose_(other.lower) * other.T_lower_upper *
+                pose_(other.upper).inverse() * pose_(one.upper);
+  const SE3& measured = one.T_lower_upper;
+  const auto& [kappa, tau] = one.precision;
+  const double turned = kappa * (T.linear() - measured.linear()).squaredNorm();
+  const double moved = tau * (T.translation() - measured.translation()).squaredNorm();
+  // Variances of the cycle, in multiples of the variance of a closure: those of both closures and
+  // of every step. A step counts as at least as noisy as a closure. A rotation also moves the far
+  // end of a closure.
+  double turn = 2.0, shift = 2.0;
+  for (const auto& [from, to] : {std::pair(one.lower, other.lower), {one.upper, other.upper}}) {
+    const auto step = step_.find(from.robot);
+    const Precision precision = step == step_.end() ? one.precision : step->second;
+    turn += steps_between(from, to) * std::max(1.0, kappa / precision.kappa);
+    shift += steps_between(from, to) * std::max(1.0, tau / precision.tau);
+  }
+  const double lever = tau / kappa * measured.translation().squaredNorm();
+  return turned <= barc * barc * turn && moved <= barc * barc * (shift + turn * lever);
+}
+
+std::vector<bool> Corroboration::isolated(double barc) const {
+  std::vector<bool> isolated(closures_.size(), true);
+  for (std::size_t a = 0; a < closures_.size(); ++a)
+    for (std::size_t b = a + 1; b < closures_.size(); ++b) {
+      if (steps_between(closures_[a].lower, closures_[b].lower) > kBeside) break;
+      // Either direction suffices, because the lever arms of near closures may differ.
+      if (!agree(closures_[a], closures_[b], barc) && !agree(closures_[b], closures_[a], barc))
+        continue;
+      isolated[closures_[a].index] = isolated[closures_[b].index] = false;
+    }
+  return isolated;
+}
+
+}  // namespace km

@@ -1,0 +1,67 @@
+#include "modules/robust/cycle_mixture.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace km {
+namespace {
+
+constexpr int kShareSteps = 5;
+constexpr double kLeastSide_m = 1.0;  // side of the volume for false closures
+constexpr double kLeastShare = 0.02;
+// exp() of a larger log density ratio overflows.
+constexpr double kLargestLogRatio = 600.0;
+
+double ratio_of(double log_ratio) {
+  return std::exp(std::clamp(log_ratio, -kLargestLogRatio, kLargestLogRatio));
+}
+
+}  // namespace
+
+double CycleMixture::true_probability(double log_ratio) const {
+  const double ratio = ratio_of(log_ratio);
+  return share * ratio / (share * ratio + 1.0 - share);
+}
+
+CycleMixture fit_cycle_mixture(std::span<const double> log_ratio, std::span<const double> weight) {
+  CycleMixture mixture;
+  double total = 0.0;
+  for (const double w : weight) total += w;
+  if (!(total > 0.0)) return mixture;
+  for (int i = 0; i < kShareSteps; ++i) {
+    double sum = 0.0;
+    for (std::size_t k = 0; k < log_ratio.size(); ++k)
+      sum += weight[k] * mixture.true_probability(log_ratio[k]);
+    mixture.share = std::clamp(sum / total, kLeastShare, 1.0 - kLeastShare);
+  }
+  for (std::size_t k = 0; k < log_ratio.size(); ++k)
+    mixture.log_likelihood +=
+        weight[k] * std::log(mixture.share * ratio_of(log_ratio[k]) + 1.0 - mixture.share);
+  return mixture;
+}
+
+double log_density_if_false(const Vector6& error, double volume, int dimension) {
+  if (dimension == 2) return -std::log(2.0 * std::numbers::pi) - std::log(volume);
+  const double angle = error.head<3>().norm();
+  const double det_J = angle < 1e-3 ? 1.0 : 2.0 * (1.0 - std::cos(angle)) / (angle * angle);
+  constexpr double kRotations = 8.0 * std::numbers::pi * std::numbers::pi;
+  return 2.0 * std::log(det_J) - std::log(kRotations) - std::log(volume);
+}
+
+void ClosureVolume::add_ends(const Eigen::Vector3d& lower, const Eigen::Vector3d& upper) {
+  below_.extend(lower);
+  above_.extend(upper);
+}
+
+void ClosureVolume::add_length(double length_m) {
+  reach_m_ = std::max(reach_m_, length_m);
+}
+
+double ClosureVolume::of(int dimension) const {
+  const Eigen::Array3d sides =
+      below_.sizes().array() + above_.sizes().array() + 2.0 * reach_m_ + kLeastSide_m;
+  return sides.head(dimension).prod();
+}
+
+}  // namespace km

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "modules/core/geometry.hpp"
+#include "modules/tree_newton/pose_edge.hpp"
+
+namespace km {
+
+/// A wrong step of odometry, as after a loss of tracking, and its correction by closures.
+struct OdometryBreak {
+  std::size_t step = 0;      ///< From keyframe `step` to the next one.
+  SE3 T_from_to;             ///< The step on which the closures agree.
+  Precision precision = {};  ///< One standard deviation is the size of the jump.
+  double jump_rad = 0.0;     ///< Rotation between the claimed step and T_from_to.
+  double jump_m = 0.0;       ///< Translation between the claimed step and T_from_to.
+  std::size_t places = 0;    ///< Number of places that agree.
+};
+
+/// Finds wrong steps of the odometry of one robot from the closures inside it. `steps[k]` is from
+/// keyframe k to keyframe k + 1, and some closures may be false.
+///
+/// A wrong step makes every cycle of odometry and a closure that contains it inconsistent, and each
+/// of these cycles yields the jump that would close it. A step is wrong if the cycles of at least
+/// three places agree on the jump, and if at most 10 % of the cycles that contain the step are
+/// consistent. At least three places must have cycles without the step, for comparison. The correct
+/// step must be a possible motion of the robot: at most three times as fast as 95 % of its steps.
+/// Rows of closures between two parts of the environment that look alike agree on a jump, too, but
+/// such a jump hardly ever leaves a possible step.
+///
+/// Cycles are consistent, and jumps agree, up to the 99.9 % quantile of chi-squared at the claimed
+/// noise. The limit is larger if the median error of the cycles without the step exceeds the
+/// claimed noise, because noisy odometry increases the errors of all cycles. If successive steps
+/// are in the same cycles, the one with the slowest correct step is taken. `seconds`: duration of
+/// each step; if it is empty or has a value that is not positive, all steps last equally long.
+/// `dimension` 2: poses are planar.
+[[nodiscard]] std::vector<OdometryBreak> find_odometry_breaks(std::span<const PoseEdge> steps,
+                                                              std::span<const PoseEdge> closures,
+                                                              int dimension,
+                                                              std::span<const double> seconds = {});
+
+/// Replaces the wrong steps.
+void correct_breaks(std::span<PoseEdge> steps, std::span<const OdometryBreak> breaks);
+
+}  // namespace km

@@ -1,0 +1,171 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "modules/robust/member_solver.hpp"
+#include "modules/robust/session_graph.hpp"
+#include "modules/session/own_graph.hpp"
+#include "modules/session/reliable_channel.hpp"
+#include "modules/session/team_messages.hpp"
+
+namespace km {
+
+/// The contribution of a robot to a session, frozen when it joins.
+struct FrozenPart {
+  /// `public_poses` has the poses of absent robots only. `step_precision` and `later_runs` have
+  /// the entry of this robot only. The other members of the session send theirs. The agent sets
+  /// `start`, and the decisions on closures to absent robots.
+  SessionGraph graph = {};
+  TreePlace place = {};
+  bool in_frame = false;  ///< `start` is already in the frame of the session.
+  /// Closures may be false (pose_graph.robust with Newton's method). The trajectory is then not
+  /// deformed to fit closures, and claimed precisions are limited.
+  bool closures_may_be_false = true;
+  std::vector<KeyframeIndex> public_keyframes = {};  ///< Ascending, 0 first.
+};
+
+/// The measurements of robot `self` in `session`, of which it is a member. `peers` are the robots
+/// that it knows; closures to absent ones are tied to their poses in `results`. nullopt if `graph`
+/// does not have the edges() by which the plan of the session names the closures of a pair.
+[[nodiscard]] std::optional<FrozenPart> freeze_part(const Session& session, RobotId self,
+                                                    const OwnGraph& graph,
+                                                    std::span<const RobotId> peers,
+                                                    const PublicPoses& results);
+
+/// Creates the solver of one robot for a session, which also enforces max_rounds of the session.
+using MemberSolverFactory = std::function<std::unique_ptr<MemberSolver>(
+    const Session& session, SessionGraph graph, TreePlace place)>;
+
+/// The part of one robot in one session, from joining it to its end, in stages.
+///
+/// First the robot enters the frame of the session. If it is in another frame, it waits for its
+/// neighbours that precede it in the order of the session, and is aligned to them. Its public poses
+/// are then rounded to single precision and ready to be sent. Once the public poses of all members
+/// have arrived, its solver begins. Members exchange messages until the solver is done or fails.
+///
+/// If the solver has deferred closures, a second look follows. All members send their poses and
+/// verdicts, and another solver begins there. It weighs the rejected and deferred closures whose
+/// residual is at most kSecondLook times the largest one of an inlier, together with all other
+/// closures of their pairs. Deterministic; not thread-safe.
+class SessionPart {
+ public:
+  SessionPart(Session session, TeamPeer self, FrozenPart part, MemberSolverFactory factory,
+              double now_s);
+
+  /// Does one piece of work, if there is any, and returns the messages to send.
+  [[nodiscard]] std::vector<ReliableMessage> advance(const PublicPoses& published, double now_s);
+  /// True if the last advance() has changed anything; there may then be more to do.
+  [[nodiscard]] bool worked() const { return worked_; }
+
+  /// Processes a message of a member. It is acknowledged once the solver has taken it. Messages
+  /// that arrive before there is a solver are kept if there is room. Otherwise the sender repeats
+  /// them. False if the sender is not a member, or if the solver cannot use the message at present.
+  bool receive(const ReliableMessage& message, double now_s);
+  /// Returns the senders of early messages that the solver then refused, and removes them from the
+  /// list.
+  [[nodiscard]] std::vector<RobotId> take_refused() { return std::exchange(refused_, {}); }
+  void reachable_again(RobotId robot) { channel_.reachable_again(robot); }
+
+  /// Takes the newest message of the coordinator. True if it ends the session.
+  bool follow(const Session& session);
+  /// Frees the solver and the graph, which take most of the memory of a session. Call once all
+  /// members have the solution. Afterwards this part only reports the results. Precondition:
+  /// stage() is kSolved.
+  void keep_only_results();
+
+  /// nullopt before the robot has entered the frame.
+  [[nodiscard]] std::optional<MemberStage> stage() const { return stage_; }
+  [[nodiscard]] const std::string& failure() const { return failure_; }
+  /// Poses that a member has sent in this session at `stage` or later; nullptr if there are none.
+  [[nodiscard]] const MemberPoses* poses_of(const PublicPoses& published, RobotId robot,
+                                            MemberStage stage) const;
+  /// True if all members, including this one, have sent their part of the solution.
+  [[nodiscard]] bool all_solved(const PublicPoses& published) const;
+  /// True if `closure` is between this robot and another member.
+  [[nodiscard]] bool joins_members(const ClosureId& closure) const;
+
+  [[nodiscard]] Session& session() { return session_; }
+  [[nodiscard]] const Session& session() const { return session_; }
+  [[nodiscard]] const std::vector<KeyframeIndex>& public_keyframes() const { return public_; }
+  /// The poses of public_keyframes() as other robots receive them. Before the stage kSolved they
+  /// are the poses with which the solver of this robot begins, to the last bit.
+  [[nodiscard]] std::vector<SinglePose> public_poses() const;
+  [[nodiscard]] const std::vector<RobotId>& members() const { return place_.members; }
+  /// State of the solver; zeros before there is one.
+  [[nodiscard]] SolverState state() const;
+  /// The last verdicts of a solver on all closures that this robot weighs.
+  [[nodiscard]] ClosureVerdicts verdicts() const;
+  [[nodiscard]] ClosureNoiseRecord noise() const;
+  /// The poses that the solver has last accepted. Before there is a solver: the start. In the
+  /// frame of the session once there is a stage.
+  [[nodiscard]] const std::vector<SE3>& poses() const;
+  /// Covariances of poses() once the session is solved; empty if the solver computes none.
+  [[nodiscard]] std::vector<Matrix6> covariances() const;
+  /// Time of the last activity or message of the session [s].
+  [[nodiscard]] double last_activity_s() const { return last_activity_s_; }
+  void note_activity(double now_s) { last_activity_s_ = now_s; }
+  [[nodiscard]] double started_s() const { return started_s_; }
+  /// Bytes of all messages of the session that this robot has sent or forwarded. A message counts
+  /// once for each neighbour that receives it.
+  [[nodiscard]] std::uint64_t sent_bytes() const { return sent_bytes_; }
+  void count_sent(std::size_t bytes) { sent_bytes_ += bytes; }
+
+ private:
+  [[nodiscard]] bool enter(const PublicPoses& published);
+  void round_public_poses();
+  [[nodiscard]] bool align(const PublicPoses& published);
+  [[nodiscard]] bool gather(const PublicPoses& published);
+  void start_solver(double now_s);
+  void look_again();
+  void reopen_closures();
+  [[nodiscard]] bool pass_to_solver(const ReliableMessage& message, double now_s);
+  void store_early(const ReliableMessage& message);
+  void solve(double now_s);
+  void fail(const std::string& why);
+
+  // Results of a solver that has been freed.
+  struct Results {
+    SolverState state;
+    ClosureVerdicts verdicts;
+    ClosureNoiseRecord noise;
+    std::vector<Matrix6> covariances;
+    std::vector<SE3> poses;
+  };
+  [[nodiscard]] Results results_of_solver() const;
+
+  Session session_;
+  TeamPeer self_;
+  SessionGraph graph_;
+  TreePlace place_;
+  bool in_frame_;
+  bool closures_may_be_false_;
+  std::vector<KeyframeIndex> public_;
+  std::vector<SinglePose> entered_;  // poses of public_ with which the solver begins
+  std::vector<ClosureId> between_;   // to other members, ascending
+  MemberSolverFactory factory_;
+  std::map<RobotId, std::uint64_t> boot_of_;  // members
+  ReliableChannel channel_;
+  std::map<std::pair<RobotId, std::uint32_t>, ReliableMessage> early_;  // before there is a solver
+  std::size_t early_bytes_ = 0;
+  std::vector<RobotId> refused_;  // senders of early messages that the solver refused
+  std::vector<ReliableMessage> to_send_;
+  std::unique_ptr<MemberSolver> solver_;
+  std::optional<Results> results_;  // results of the first look, then of the session
+  std::optional<MemberStage> stage_;
+  std::string failure_;
+  bool worked_ = false;
+  double started_s_;
+  double last_activity_s_;
+  std::uint64_t sent_bytes_ = 0;
+};
+
+}  // namespace km

@@ -1,0 +1,94 @@
+#include "modules/session/team_roster.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <utility>
+
+#include "modules/tree_newton/vertical_prior.hpp"
+
+namespace km {
+
+bool is_well_formed(const MemberPoses& poses) {
+  const auto& keyframes = poses.keyframes;
+  const auto ascending = [](const std::vector<KeyframeIndex>& indices) {
+    return std::ranges::adjacent_find(indices, std::greater_equal<>()) == indices.end();
+  };
+  const Precision& step = poses.step_precision;
+  return !keyframes.empty() && keyframes.front() == 0 && ascending(keyframes) &&
+         ascending(poses.later_runs) && poses.T_frame_kf.size() == keyframes.size() &&
+         std::ranges::all_of(poses.T_frame_kf, [](const SinglePose& T) { return is_valid(T); }) &&
+         step.kappa > 0.0 && step.tau > 0.0 && std::isfinite(step.kappa + step.tau);
+}
+
+bool is_well_formed(const TeamStatus& status) {
+  const auto by_peer = [](const EdgeSetOffer& a, const EdgeSetOffer& b) { return a.peer < b.peer; };
+  return std::is_sorted(status.offers.begin(), status.offers.end(), by_peer) &&
+         status.T_odom_first.matrix().allFinite();
+}
+
+TeamRoster::Meeting TeamRoster::meet(const TeamPeer& peer) {
+  const auto [entry, added] = peers_.try_emplace(peer.robot, Peer{.boot = peer.boot});
+  if (added) return Meeting::kNew;
+  const std::uint64_t before = entry->second.boot;
+  if (before == peer.boot) return Meeting::kKnown;
+  public_poses_.erase(peer.robot);
+  results_.erase(peer.robot);
+  entry->second = Peer{.boot = peer.boot};
+  return is_same_incarnation(before, peer.boot) ? Meeting::kOtherProcess
+                                                : Meeting::kOtherIncarnation;
+}
+
+void TeamRoster::take(const TeamStatus& status) {
+  Peer& peer = at(status.sender.robot);
+  peer.other_method = status.method != method_;
+  peer.status = status;
+}
+
+void TeamRoster::take(const Session& session) {
+  at(session.id.coordinator.robot).session = session;
+}
+
+const TeamRoster::Peer* TeamRoster::find(RobotId robot) const {
+  const auto known = peers_.find(robot);
+  return known == peers_.end() ? nullptr : &known->second;
+}
+
+bool TeamRoster::in_reach(const TeamPeer& peer) const {
+  if (peer == self_) return true;
+  const Peer* known = find(peer.robot);
+  return known != nullptr && known->boot == peer.boot && component_.contains(peer.robot);
+}
+
+std::map<RobotId, TeamStatus> TeamRoster::statuses(TeamStatus own) const {
+  std::map<RobotId, TeamStatus> statuses;
+  statuses.emplace(self_.robot, std::move(own));
+  for (const auto& [robot, peer] : peers_) {
+    if (!peer.status || peer.other_method || !in_reach(peer.status->sender)) continue;
+    statuses.emplace(robot, *peer.status);
+  }
+  return statuses;
+}
+
+void OwnFrame::enter(const TeamFrame& frame) {
+  if (frame_ == frame) return;
+  frame_ = frame;
+  world_.reset();
+}
+
+std::optional<World> OwnFrame::world_of(RobotId anchor, const TeamRoster& roster,
+                                        const SE3& T_odom_first, bool upright) const {
+  const auto poses = roster.results().find(anchor);
+  if (poses == roster.results().end() || poses->second.frame != frame_) return std::nullopt;
+  const TeamRoster::Peer* peer = roster.find(anchor);
+  const bool own = anchor == self_.robot;
+  if (!own && (peer == nullptr || !peer->status)) return std::nullopt;
+  const SE3& T_odom_kf = own ? T_odom_first : peer->status->T_odom_first;
+  const SE3 T_frame_world = poses->second.T_frame_kf.front().pose() * T_odom_kf.inverse();
+  if (!upright) return World{anchor, T_frame_world};
+  const Eigen::MatrixXd turned =
+      level(T_frame_world.matrix().topRows<3>(), T_odom_kf.translation());
+  return World{anchor, make_pose(turned.leftCols<3>(), turned.col(3))};
+}
+
+}  // namespace km

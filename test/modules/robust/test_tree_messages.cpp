@@ -1,0 +1,415 @@
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include <sys/resource.h>
+
+#include <random>
+#include <string>
+#include <vector>
+
+#include "modules/core/bytes.hpp"
+#include "modules/robust/tree_messages.hpp"
+#include "test/support/random_pose.hpp"
+
+namespace km {
+namespace {
+
+using Eigen::Index;
+using Bytes = std::vector<std::uint8_t>;
+
+TreeSums some_sums() {
+  TreeSums sums{.base_cost = 1.0 / 3.0,
+                .cost = 17.25,
+                .decrement = 1e-300,
+                .largest = 4.5F,
+                .open = 300,
+                .changed = 7,
+                .fractional = 1,
+                .kept = 5,
+                .rejected = 900,
+                .isolated = 2,
+                .fixed = 0,
+                .poses = 4'000'000'000U,
+                .lengths = {{0, 1}, {90, 1'000'000}, {65535, 3}}};
+  sums.votes = {{.a = 1,
+                 .b = 2,
+                 .used = 12,
+                 .motion = {.T = {.t = {1.0F, 2.0F, 3.0F}},
+                            .centre = {4.0, 5.0, 1.0 / 3.0},
+                            .radius_m = 6.0,
+                            .spread_m = 0.7,
+                            .strength = {.kappa = 8.5, .tau = 1e-3}},
+                 .noise = 1.75F},
+                {.a = 1, .b = 60000, .used = 0},
+                {.a = 3, .b = 9, .used = 70000}};
+  return sums;
+}
+
+Eigen::VectorXd some_numbers(std::mt19937& rng, Index count) {
+  std::normal_distribution<double> normal;
+  Eigen::VectorXd values(count);
+  for (double& x : values) x = normal(rng);
+  return values;
+}
+
+// Four poses of three robots. Only edges in TreeSystem::edges end on the last pose and add to one
+// of the couplings, so that their blocks are zero.
+TreeSystem some_system(std::mt19937& rng, Index block) {
+  TreeSystem system;
+  system.variables = {{{2, 0}, 1, 1}, {{2, 300}, 1, 2}, {{7, 5}, 2, 0}, {{60000, 1}, 1, 0}};
+  system.pairs = {{0, 1}, {0, 2}, {2, 3}};
+  system.schur = BlockMatrix::zero(block, 4, 3);
+  for (int v = 0; v < 3; ++v) {
+    const Eigen::VectorXd x = some_numbers(rng, block);
+    system.schur.at(v) = x * x.transpose();
+  }
+  for (int p = 0; p < 2; ++p) system.schur.between(p).reshaped() = some_numbers(rng, block * block);
+  for (const Curvature curvature : {Curvature::kGaussNewton, Curvature::kFull})
+    for (const bool transposed : {false, true}) {
+      SentEdge edge{.pair = 2,
+                    .transposed = transposed,
+                    .curvature = curvature,
+                    .kappa = 123.5F,
+                    .tau = 1e-3F,
+                    .weight = transposed ? 0.25F : 1.0F,
+                    .present = SinglePose::of(random_pose(rng)),
+                    .measured = {}};
+      if (curvature == Curvature::kFull) edge.measured = SinglePose::of(random_pose(rng));
+      system.edges.push_back(edge);
+    }
+  return system;
+}
+
+UpMessage some_up_message(Index block, bool with_system) {
+  std::mt19937 rng(5);
+  UpMessage message{.round = 70000, .sums = some_sums(), .failed = false};
+  message.reduced = some_numbers(rng, 4 * block);
+  if (with_system)
+    message.system = some_system(rng, block);
+  else
+    message.weights = {{0, 1.0F}, {300, 0.0F}, {4'000'000'000U, 0.125F}};
+  return message;
+}
+
+DownMessage some_down_message(TreeVerdict::Next next, TreeVerdict::Weighing weighing) {
+  std::mt19937 rng(6);
+  DownMessage message;
+  message.verdict = {.round = 70000,
+                     .next = next,
+                     .accept = true,
+                     .full = false,
+                     .deferred = true,
+                     .free = false,
+                     .weigh_all = true,
+                     .weighing = weighing,
+                     .scale = 0.25,
+                     .mu = 1e30,
+                     .barc = 5.28,
+                     .noise_scale = 1.0 / 3.0,
+                     .usual_noise = 2.5,
+                     .moves = {{7, {.t = {1.0F, 2.0F, 3.0F}}}, {9, {}}},
+                     .odometry = {{1, 2.5}, {4, 1.0}},
+                     .usual_pair = {.kappa = 12.5, .tau = 1e-7},
+                     .cost = 1687.0,
+                     .gradient = 1e-9,
+                     .drift = {1.0, -2.0, 3.0, 0.0, 1e-200, 6.0}};
+  message.step = some_numbers(rng, 12).cast<float>().cast<double>();
+  message.inverse = {.diagonal = {1.5F, 0.0F, 1e-3F}, .correlations = {-32767, 0, 5, 32767}};
+  return message;
+}
+
+UpMessage up_again(const UpMessage& message) {
+  auto received = decode_up(encode(message));
+  REQUIRE(received);
+  return std::move(*received);
+}
+
+// Every field of these messages has a value of its own. Equal bytes after decoding and encoding
+// therefore mean that decoding restores every field.
+TEST_CASE("Decoding restores a message up the tree", "[pose_graph]") {
+  UpMessage empty_system{.round = 1, .sums = {}};
+  empty_system.system.emplace().schur = BlockMatrix::zero(6, 0, 0);
+  for (const UpMessage& sent :
+       {some_up_message(3, true), some_up_message(6, true), some_up_message(6, false), empty_system,
+        UpMessage{.round = 3, .sums = {}, .failed = true}}) {
+    const UpMessage received = up_again(sent);
+    CHECK(encode(received) == encode(sent));
+    CHECK(received.system.has_value() == sent.system.has_value());
+    CHECK(is_up_message(encode(sent)));
+    CHECK_FALSE(decode_down(encode(sent)));
+  }
+}
+
+TEST_CASE("Couplings are rounded to 2^-26 of the geometric mean of their diagonal entries",
+          "[pose_graph]") {
+  const TreeSystem sent = *some_up_message(GENERATE(3, 6), true).system;
+  const TreeSystem received = *up_again({.sums = {}, .system = sent}).system;
+  CHECK(received.schur.diagonal == sent.schur.diagonal);
+  for (std::size_t p = 0; p < sent.pairs.size(); ++p) {
+    const auto [i, j] = sent.pairs[p];
+    const Eigen::MatrixXd a = received.schur.between(static_cast<int>(p));
+    const Eigen::MatrixXd b = sent.schur.between(static_cast<int>(p));
+    for (Index row = 0; row < a.rows(); ++row)
+      for (Index c = 0; c < a.cols(); ++c)
+        CHECK(std::abs(a(row, c) - b(row, c)) <=
+              0x1p-27 * std::sqrt(sent.schur.at(i)(row, row) * sent.schur.at(j)(c, c)) *
+                  (1.0 + 1e-9));
+  }
+}
+
+TEST_CASE("A zero block costs one bit", "[pose_graph]") {
+  UpMessage dense = some_up_message(6, true), sparse = dense;
+  sparse.system->schur = BlockMatrix::zero(6, 4, 3);
+  sparse.system->schur.diagonal = dense.system->schur.diagonal;
+  const std::size_t size = encode(dense).size();
+  CHECK(size - encode(sparse).size() >= 2 * 36);
+  CHECK(size - encode(sparse).size() <= 5 * 2 * 36);
+  dense.system->schur.between(0).setConstant(1e-12);  // rounds to zero
+  CHECK(size - encode(dense).size() >= 36);
+  sparse.system->schur = BlockMatrix::zero(6, 4, 3);
+  CHECK(size - encode(sparse).size() >= 8 * 3 * 21 + 2 * 36);
+}
+
+TEST_CASE("A coupling that no diagonal entry explains is bounded", "[pose_graph]") {
+  UpMessage sent = some_up_message(6, true);
+  BlockMatrix& schur = sent.system->schur;
+  schur.at(0)(1, 1) = 0.0;
+  schur.between(0)(1, 2) = 1.0;
+  schur.between(0)(2, 3) = -1e300;
+  schur.between(0)(2, 4) = INFINITY;
+  schur.between(0)(3, 3) = std::nan("");
+  const UpMessage received = up_again(sent);
+  CHECK(received.system->schur.between(0)(1, 2) == 0.0);
+  CHECK(received.system->schur.between(0)(2, 3) > -1e10);
+  CHECK(received.system->schur.between(0)(2, 4) < 1e10);
+  CHECK(encode(received) == encode(sent));
+}
+
+TEST_CASE("Decoding restores a message down the tree", "[pose_graph]") {
+  using Next = TreeVerdict::Next;
+  using Weighing = TreeVerdict::Weighing;
+  const Next next = GENERATE(Next::kStep, Next::kShorten, Next::kRefresh, Next::kStart,
+                             Next::kCount, Next::kDone, Next::kStop);
+  const Weighing weighing = GENERATE(Weighing::kWeigh, Weighing::kHold, Weighing::kDecided);
+  const DownMessage sent = some_down_message(next, weighing);
+  const auto received = decode_down(encode(sent));
+  REQUIRE(received);
+  CHECK(received->verdict.next == next);
+  CHECK(received->verdict.weighing == weighing);
+  CHECK(encode(*received) == encode(sent));
+  CHECK_FALSE(is_up_message(encode(sent)));
+  CHECK_FALSE(decode_up(encode(sent)));
+}
+
+std::vector<Bytes> one_of_each() {
+  return {encode(some_up_message(6, true)), encode(some_up_message(3, true)),
+          encode(some_up_message(6, false)),
+          encode(some_down_message(TreeVerdict::Next::kStep, TreeVerdict::Weighing::kWeigh))};
+}
+
+// Memory of a decoded message [bytes].
+std::size_t held_by(const UpMessage& message) {
+  std::size_t bytes = sizeof(message) + 64 * message.sums.lengths.size() +
+                      sizeof(PairVote) * message.sums.votes.capacity() +
+                      sizeof(NewWeight) * message.weights.capacity() +
+                      sizeof(double) * static_cast<std::size_t>(message.reduced.size());
+  if (!message.system) return bytes;
+  const TreeSystem& s = *message.system;
+  return bytes + sizeof(TreeVariable) * s.variables.capacity() +
+         sizeof(NodePair) * s.pairs.capacity() + sizeof(SentEdge) * s.edges.capacity() +
+         sizeof(double) *
+             static_cast<std::size_t>(s.schur.diagonal.size() + s.schur.coupling.size());
+}
+
+std::size_t held_by(const DownMessage& message) {
+  return sizeof(message) + sizeof(message.verdict.moves[0]) * message.verdict.moves.capacity() +
+         sizeof(double) * static_cast<std::size_t>(message.step.size());
+}
+
+// A coupling of two bytes may result in a block of 36 numbers.
+constexpr std::size_t kMostPerByte = 160;
+
+// Checks that decoding fails, or gives a message that encode() writes as equal bytes, within the
+// memory limit.
+void check_harmless(const Bytes& bytes) {
+  std::size_t held = 0;
+  bool same = true;
+  if (const auto up = decode_up(bytes)) {
+    same = encode(*up) == bytes;
+    held = held_by(*up);
+  }
+  if (const auto down = decode_down(bytes)) {
+    same = same && encode(*down) == bytes;
+    held = held_by(*down);
+  }
+  if (!same || held > 10000 + kMostPerByte * bytes.size()) {
+    CAPTURE(held, bytes.size());
+    CHECK(same);
+    CHECK(held <= 10000 + kMostPerByte * bytes.size());
+  }
+}
+
+TEST_CASE("A message truncated anywhere is refused", "[pose_graph]") {
+  for (const Bytes& bytes : one_of_each()) {
+    for (std::size_t size = 0; size < bytes.size(); ++size) {
+      const std::span<const std::uint8_t> cut(bytes.data(), size);
+      if (!decode_up(cut) && !decode_down(cut)) continue;
+      CAPTURE(size, bytes.size());
+      FAIL_CHECK("was read");
+    }
+    Bytes longer = bytes;
+    longer.push_back(0);
+    CHECK_FALSE(decode_up(longer));
+    CHECK_FALSE(decode_down(longer));
+  }
+}
+
+std::size_t largest_resident_kb() {
+  rusage usage{};
+  REQUIRE(getrusage(RUSAGE_SELF, &usage) == 0);
+  return static_cast<std::size_t>(usage.ru_maxrss);
+}
+
+TEST_CASE("A message with a wrong byte is refused, or is another valid message", "[pose_graph]") {
+  std::mt19937 rng(7);
+  const std::vector<Bytes> messages = one_of_each();
+  constexpr int kChanges = 100000;
+  const std::size_t before_kb = largest_resident_kb();
+  for (int n = 0; n < kChanges; ++n) {
+    Bytes bytes = messages[static_cast<std::size_t>(n) % messages.size()];
+    const std::size_t at = std::uniform_int_distribution<std::size_t>(0, bytes.size() - 1)(rng);
+    bytes[at] = static_cast<std::uint8_t>(std::uniform_int_distribution<int>(0, 255)(rng));
+    CAPTURE(n, at);
+    check_harmless(bytes);
+  }
+  // The limit includes memory that a sanitizer retains.
+  CHECK(largest_resident_kb() - before_kb < 512 * 1024);
+}
+
+// A message without its last `bytes`, which are zeros.
+ByteWriter without_zeros(Bytes message, std::size_t bytes) {
+  REQUIRE(std::all_of(message.end() - static_cast<std::ptrdiff_t>(bytes), message.end(),
+                      [](std::uint8_t byte) { return byte == 0; }));
+  message.resize(message.size() - bytes);
+  ByteWriter w;
+  w.bytes(message);
+  return w;
+}
+
+// The beginning of a message up, before the number of lengths. The numbers of lengths, votes, and
+// rows, the flag of the system and the number of weights follow it.
+ByteWriter up_to_lengths() {
+  return without_zeros(encode(UpMessage{.round = 1, .sums = {}}), 5);
+}
+
+// The beginning of a message up, before the number of variables.
+ByteWriter up_to_variables(std::uint8_t block) {
+  ByteWriter w = up_to_lengths();
+  for (int k = 0; k < 3; ++k) w.varint(0);  // lengths, votes, right-hand side
+  w.u8(1);
+  w.u8(block);
+  return w;
+}
+
+void variables(ByteWriter& w, std::uint64_t count) {
+  w.varint(count);
+  for (std::uint64_t k = 0; k < count; ++k)
+    for (const std::uint64_t x : {std::uint64_t{1}, k, std::uint64_t{1}, std::uint64_t{1}})
+      w.varint(x);
+}
+
+Bytes with_zeros(ByteWriter& w) {
+  w.bytes(Bytes(1000, 0));
+  return w.release();
+}
+
+TEST_CASE("Counts beyond the size of the message are refused", "[pose_graph]") {
+  const std::uint64_t count =
+      GENERATE(std::uint64_t{2000}, std::uint64_t{1} << 24U, std::uint64_t{1} << 32U,
+               std::uint64_t{1} << 61U, ~std::uint64_t{0});
+  CAPTURE(count);
+  const std::size_t before_kb = largest_resident_kb();
+  for (int field = 0; field < 7; ++field) {
+    CAPTURE(field);
+    ByteWriter w = field < 3 ? up_to_lengths() : up_to_variables(6);
+    if (field < 3) {
+      for (int k = 0; k < field; ++k) w.varint(0);  // lengths, votes, right-hand side
+    } else if (field == 4 || field == 5) {
+      variables(w, 2);  // couplings; edges
+      if (field == 5) {
+        w.varint(0);
+        w.u8(0);
+      }
+    } else if (field == 6) {  // new weights
+      w = up_to_lengths();
+      for (int k = 0; k < 3; ++k) w.varint(0);
+      w.u8(0);
+    }
+    w.varint(count);
+    CHECK_FALSE(decode_up(with_zeros(w)));
+  }
+  for (int field = 0; field < 4; ++field) {
+    // The numbers of moves, of rows of the step, and of entries of the inverse follow.
+    ByteWriter w = without_zeros(encode(DownMessage{}), 4);
+    for (int k = 0; k < field; ++k) w.varint(0);
+    w.varint(count);
+    CHECK_FALSE(decode_down(with_zeros(w)));
+  }
+  CHECK(largest_resident_kb() - before_kb < 64 * 1024);
+}
+
+TEST_CASE("Verdicts with numbers out of range are refused", "[pose_graph]") {
+  const auto with = [](auto&& change) {
+    DownMessage message =
+        some_down_message(TreeVerdict::Next::kStep, TreeVerdict::Weighing::kWeigh);
+    change(message.verdict);
+    return decode_down(encode(message)).has_value();
+  };
+  CHECK(with([](TreeVerdict&) {}));
+  CHECK_FALSE(with([](TreeVerdict& v) { v.scale = 1.5; }));
+  CHECK_FALSE(with([](TreeVerdict& v) { v.scale = 0.0; }));
+  CHECK_FALSE(with([](TreeVerdict& v) { v.mu = -1.0; }));
+  CHECK_FALSE(with([](TreeVerdict& v) { v.barc = -1.0; }));
+  CHECK_FALSE(with([](TreeVerdict& v) { v.noise_scale = 0.0; }));
+  CHECK_FALSE(with([](TreeVerdict& v) { v.usual_pair.kappa = 0.0; }));
+  CHECK_FALSE(with([](TreeVerdict& v) { v.usual_noise = 0.5; }));
+  CHECK_FALSE(with([](TreeVerdict& v) { v.usual_pair.tau = -1.0; }));
+  CHECK_FALSE(with([](TreeVerdict& v) { v.gradient = -1.0; }));
+  CHECK_FALSE(with([](TreeVerdict& v) { v.cost = INFINITY; }));
+}
+
+TEST_CASE("Inconsistent systems are refused", "[pose_graph]") {
+  const auto with = [](auto&& change) {
+    UpMessage message = some_up_message(6, true);
+    change(*message.system);
+    return decode_up(encode(message)).has_value();
+  };
+  CHECK(with([](TreeSystem&) {}));
+  CHECK_FALSE(with([](TreeSystem& s) { s.edges[0].pair = 3; }));
+  CHECK_FALSE(with([](TreeSystem& s) { s.edges[0].kappa = 0.0F; }));
+  CHECK_FALSE(with([](TreeSystem& s) { s.edges[0].tau = -1.0F; }));
+  CHECK_FALSE(with([](TreeSystem& s) { s.edges[0].weight = 1.5F; }));
+  CHECK_FALSE(with([](TreeSystem& s) { s.edges[0].present.q.coeffs() *= 2.0F; }));
+  CHECK_FALSE(with([](TreeSystem& s) { s.edges[0].present.t.x() = std::nanf(""); }));
+  CHECK_FALSE(with([](TreeSystem& s) { s.schur.at(0)(0, 0) = std::nan(""); }));
+  // The encoder needs pairs of existing variables, so these are changed in the bytes.
+  const auto with_first_pair = [](std::uint8_t i, std::uint8_t j) {
+    Bytes bytes = encode(some_up_message(6, true));
+    const Bytes pairs{3, 0, 1, 0, 2, 2, 3};
+    const auto found = std::search(bytes.begin(), bytes.end(), pairs.begin(), pairs.end());
+    REQUIRE(found != bytes.end());
+    found[1] = i;
+    found[2] = j;
+    return decode_up(bytes).has_value();
+  };
+  CHECK(with_first_pair(0, 1));
+  CHECK_FALSE(with_first_pair(0, 4));
+  CHECK_FALSE(with_first_pair(0, 0));
+  const auto block = GENERATE(as<std::uint8_t>(), 0, 1, 4, 7, 255);
+  ByteWriter w = up_to_variables(block);
+  for (int k = 0; k < 4; ++k) w.varint(0);
+  CHECK_FALSE(decode_up(w.release()));
+}
+
+}  // namespace
+}  // namespace km

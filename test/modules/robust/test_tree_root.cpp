@@ -1,0 +1,63 @@
+#include <catch2/catch.hpp>
+#include <cstdint>
+#include <vector>
+
+#include "modules/robust/tree_root.hpp"
+
+namespace km {
+namespace {
+
+// The decision of the root at the start of a team of four, whose pairs have these noise factors.
+TreeVerdict start_with(const std::vector<float>& noise) {
+  TreeRoot root({0, 1, 2, 3}, {}, false);
+  TreeSums sums{.open = 100, .poses = 100};
+  NoiseHistogram consistent;
+  for (const double length : {2.0, 2.2, 2.4, 2.6, 2.8})
+    for (int k = 0; k < 50; ++k) count_length(consistent, length);
+  sums.lengths = consistent;
+  REQUIRE(root.decide_start(sums, 0).verdict.next == TreeVerdict::Next::kCount);
+  const std::vector<std::pair<RobotId, RobotId>> pairs{{0, 1}, {0, 2}, {0, 3},
+                                                       {1, 2}, {1, 3}, {2, 3}};
+  for (std::size_t k = 0; k < noise.size(); ++k)
+    sums.votes.push_back({.a = pairs[k].first, .b = pairs[k].second, .noise = noise[k]});
+  const DownMessage message = root.decide_start(sums, 1);
+  REQUIRE(message.verdict.next == TreeVerdict::Next::kStart);
+  return message.verdict;
+}
+
+// The start of a team of two with `open` closures, of which robots have decided `alone` alone.
+TreeVerdict start_after(std::uint32_t open, std::uint32_t alone) {
+  TreeRoot root({0, 1}, {}, false);
+  REQUIRE(root.decide_start({.open = open, .poses = 100}, 0).verdict.next ==
+          TreeVerdict::Next::kCount);
+  const DownMessage message = root.decide_start({.open = open - alone, .poses = 100}, 1);
+  REQUIRE(message.verdict.next == TreeVerdict::Next::kStart);
+  return message.verdict;
+}
+
+}  // namespace
+
+TEST_CASE("Robots decide closures alone if these are a tenth of all", "[tree_root]") {
+  CHECK_FALSE(start_after(100, 100).weigh_all);
+  CHECK_FALSE(start_after(100, 10).weigh_all);
+  CHECK(start_after(100, 9).weigh_all);
+  CHECK(start_after(100, 0).weigh_all);
+}
+
+TEST_CASE("A robot alone, or a team that trusts closures, starts at once", "[tree_root]") {
+  TreeRoot alone({3}, {}, false), trusting({0, 1}, {.robust = false}, false);
+  for (TreeRoot* root : {&alone, &trusting})
+    CHECK(root->decide_start({.open = 100, .poses = 100}, 0).verdict.next ==
+          TreeVerdict::Next::kStart);
+}
+
+TEST_CASE("The usual noise of a pair is reached by most pairs", "[tree_root]") {
+  CHECK(start_with({3.0F, 2.5F, 2.0F, 1.0F, 1.0F}).usual_noise == 2.0);
+  CHECK(start_with({3.0F, 3.0F, 3.0F, 1.0F, 1.0F, 1.0F}).usual_noise == 1.0);
+  // Pairs without an estimate count as 1, and two pairs are no majority.
+  CHECK(start_with({3.0F, 3.0F, 3.0F, 0.0F, 0.0F, 0.0F}).usual_noise == 1.0);
+  CHECK(start_with({3.0F, 3.0F}).usual_noise == 1.0);
+  CHECK(start_with({0.5F, 0.5F, 0.5F}).usual_noise == 1.0);
+}
+
+}  // namespace km
