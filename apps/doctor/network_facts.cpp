@@ -29,30 +29,35 @@ void examine_interface(const NetworkFacts& facts, Examination& result) {
   }
   const NetworkInterface& chosen = *facts.chosen;
   result.figure("interface", chosen.name + ", " + chosen.address + ", MTU " +
-                                 (facts.mtu ? std::to_string(*facts.mtu) : "unknown"));
-  const auto outward = std::ranges::count(facts.interfaces, false, &NetworkInterface::loopback);
-  if (facts.config.interface.empty() && outward > 1)
-    result.add(kNote, "network.several_interfaces",
-               std::to_string(outward) + " interfaces are up, " + chosen.name + " is used",
+                                 (chosen.mtu > 0 ? std::to_string(chosen.mtu) : "unknown") +
+                                 ", datagrams of at most " +
+                                 std::to_string(largest_datagram(facts.config, chosen)) + " B");
+  const bool is_chosen = facts.config.interface.empty();  // by this program
+  const OtherInterfaces others = others_than(chosen, facts.interfaces);
+  if (is_chosen && !chosen.loopback && !others.reasons.empty())
+    result.add(others.is_clear ? kNote : kWarning, "network.several_interfaces",
+               chosen.name + " is used: " + others.reasons,
                "robots that are only on another interface are not received",
                "choose the interface with --interface");
+  if (!chosen.carrier)
+    result.add(kError, "network.no_carrier", chosen.name + " has no carrier",
+               "nothing is connected to it: no cable, or no radio network",
+               "connect it, or name another --interface");
+  const auto outward = std::ranges::count(facts.interfaces, false, &NetworkInterface::loopback);
   if (chosen.loopback)
     result.add(kWarning, "network.loopback",
-               outward > 0 ? chosen.name + " is loopback" : std::string("only loopback is up"),
+               outward == 0
+                   ? std::string("only loopback is up")
+                   : chosen.name + " is loopback" +
+                         (!is_chosen || others.reasons.empty() ? "" : ": " + others.reasons),
                "robots on other hosts are out of reach",
                outward > 0 ? "name another --interface; robots on one host need none"
                            : "connect the host; robots on one host need no network");
   constexpr int kLeastMtu = 1280;
-  const bool is_wireless = chosen.name.starts_with("wl");
-  if (facts.mtu && *facts.mtu < kLeastMtu)
-    result.add(kWarning, "network.mtu", "an MTU of " + std::to_string(*facts.mtu) + " B",
+  if (chosen.mtu > 0 && chosen.mtu < kLeastMtu)
+    result.add(kWarning, "network.mtu", "an MTU of " + std::to_string(chosen.mtu) + " B",
                "every message is split into many packets",
                "find out why the MTU is so low, for example because of a tunnel");
-  if (facts.mtu && is_wireless && facts.config.max_message_bytes > *facts.mtu)
-    result.add(kWarning, "network.mtu",
-               "messages of up to " + std::to_string(facts.config.max_message_bytes) +
-                   " B on a radio link with an MTU of " + std::to_string(*facts.mtu) + " B",
-               "a message is lost if one of its up to 45 packets is lost", "use --link wifi");
 }
 
 void examine_own_traffic(const NetworkFacts& facts, Examination& result) {
@@ -112,13 +117,19 @@ void examine_ids(const std::vector<DiscoveredRobot>& robots, Examination& result
   }
 }
 
-void examine_other_domains(const NetworkFacts& facts, bool is_alone, Examination& result) {
+void examine_elsewhere(const NetworkFacts& facts, bool is_alone, Examination& result) {
   const std::string domain = std::to_string(facts.config.domain);
-  for (const auto& [other, addresses] : facts.other_domains)
-    if (is_alone)
+  for (const auto& [where, addresses] : facts.elsewhere)
+    if (where.domain == facts.config.domain)
+      result.add(kWarning, "network.other_interface",
+                 "programs at " + joined(addresses) + " use DDS domain " + domain + " on " +
+                     where.interface + ", but " + facts.chosen->name + " is used",
+                 "robots that are only on " + where.interface + " are not received",
+                 "choose the interface with --interface");
+    else if (is_alone)
       result.add(
           kWarning, "network.other_domain",
-          "programs at " + joined(addresses) + " use DDS domain " + std::to_string(other) +
+          "programs at " + joined(addresses) + " use DDS domain " + std::to_string(where.domain) +
               ", not " + domain,
           "robots of different domains do not receive each other; ROS 2 uses domain 0 by default",
           "give all robots of the team the same --domain");
@@ -130,11 +141,23 @@ void examine_other_domains(const NetworkFacts& facts, bool is_alone, Examination
                "give the team a domain of its own");
 }
 
+void examine_silence(const DiscoveredRobot& robot, Examination& result) {
+  constexpr double kAnswers_s = 1.5;  // two robots that hear each other need less than a second
+  if (robot.unanswered_s > kAnswers_s)
+    result.add(kError, "network.one_sided",
+               name_of(robot) + " at " + robot.address +
+                   " is heard but does not hear this host: no answer in " +
+                   fixed(robot.unanswered_s, 1) + " s",
+               "a firewall or NAT drops what is sent there: the robots do not meet",
+               "open its UDP ports from 7400 + 250 * domain upwards; across NAT use a VPN");
+}
+
 void examine_robots(const NetworkFacts& facts, Examination& result) {
   std::set<std::string> names;
   for (const DiscoveredRobot& robot : facts.robots) {
     if (robot.identity && robot.identity->protocol == kProtocolVersion) {
       names.insert(name_of(robot));
+      examine_silence(robot, result);
       continue;
     }
     result.add(kError, "network.protocol",
@@ -150,7 +173,7 @@ void examine_robots(const NetworkFacts& facts, Examination& result) {
                                        fixed(facts.listened_s, 1) + " s");
   examine_ids(facts.robots, result);
   const bool is_alone = facts.robots.empty();
-  examine_other_domains(facts, is_alone, result);
+  examine_elsewhere(facts, is_alone, result);
   if (is_alone)
     result.add(facts.config.peers.empty() ? kNote : kWarning, "network.no_peers",
                "no robot of team " + facts.config.team + " is received in " +
@@ -182,6 +205,14 @@ void examine_echo(const PeerEcho& peer, Examination& result) {
                fixed(100.0 * loss, 0) + " % of the echoes of " + peer.host + " are lost",
                "lost messages have to be sent again",
                "use --link wifi or intermittent, and a budget");
+  if (peer.passing_bytes < peer.packet_bytes)
+    result.add(kError, "network.path_mtu",
+               peer.host + " answers packets of up to " + std::to_string(peer.passing_bytes) +
+                   " B, but none of " + std::to_string(peer.packet_bytes) + " B",
+               "statuses arrive, keyframes and closures do not: the robots meet and never join",
+               "set dds.max_message_bytes to " + std::to_string(peer.passing_bytes - 28) +
+                   " on all robots, or the MTU of their interfaces to " +
+                   std::to_string(peer.passing_bytes));
   if (peer.received > 0 && peer.median_s > kSlow_s)
     result.add(kWarning, "network.slow",
                "a round trip of " + fixed(1e3 * peer.median_s, 0) + " ms to " + peer.host,

@@ -19,6 +19,7 @@ namespace km {
 struct DiscoveredRobot {
   std::string address = {};                    ///< As DDS states it: "udp/10.0.0.2:7411".
   std::optional<RobotIdentity> identity = {};  ///< Absent if its announcement is not readable.
+  double unanswered_s = 0.0;  ///< Time for which it was heard, without an answer; 0: it answers.
 };
 
 /// Result of echo requests to a peer.
@@ -27,6 +28,8 @@ struct PeerEcho {
   std::size_t sent = 0, received = 0;
   double median_s = 0.0, worst_s = 0.0;  ///< Round trip time; NaN without a reply.
   bool may_send_icmp = true;             ///< False if this user has no permission for ICMP.
+  int packet_bytes = 0;   ///< Largest packet that robots send to the peer [B]; 0: not tried.
+  int passing_bytes = 0;  ///< Largest packet, up to this one, that the peer answers [B].
 };
 
 /// Offset of the wall clock of a robot from the clock of this host. It is the least difference over
@@ -36,21 +39,29 @@ struct ClockDifference {
   double ahead_s = 0.0;  ///< Positive if the clock of the robot is ahead [s].
 };
 
+/// Source of announcements that this host's robots do not receive.
+struct Elsewhere {
+  int domain = 0;
+  std::string interface;
+
+  auto operator<=>(const Elsewhere&) const = default;
+};
+
 /// Facts about the network that are found without taking part in a session.
 struct NetworkFacts {
   DdsConfig config = {};
   std::vector<NetworkInterface> interfaces = {};
   std::optional<NetworkInterface> chosen = {};
   std::string no_interface = {};  ///< Reason why no interface was chosen.
-  std::optional<int> mtu = {};
   /// Reason why a test datagram to the group of discovery was not received.
   std::optional<std::string> no_multicast = {};
   /// Reason why a test datagram to the own address was not received.
   std::optional<std::string> no_unicast = {};
   std::optional<long> largest_receive_buffer = {};  ///< net.core.rmem_max [B].
   std::vector<DiscoveredRobot> robots = {};  ///< Found on the domain and in the team of `config`.
-  /// Addresses that announce themselves to DDS discovery on other domains up to kLastQuietDomain.
-  std::map<int, std::set<std::string>> other_domains = {};
+  /// Addresses that announce themselves to DDS discovery on other domains up to kLastQuietDomain,
+  /// or on the own one on another interface.
+  std::map<Elsewhere, std::set<std::string>> elsewhere = {};
   std::size_t ros_topics = 0;  ///< Topics of ROS 2 on the domain of `config`.
   double listened_s = 0.0;
   std::vector<PeerEcho> echoes = {};

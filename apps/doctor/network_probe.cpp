@@ -1,10 +1,8 @@
 #include <arpa/inet.h>
 #include <envelope.h>
-#include <net/if.h>
 #include <netdb.h>
 #include <netinet/in.h>
 #include <poll.h>
-#include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -174,14 +172,6 @@ std::uint16_t discovery_port(int domain) {
   return static_cast<std::uint16_t>(7400 + 250 * domain);
 }
 
-std::optional<int> mtu_of(const std::string& interface) {
-  ifreq request{};
-  std::strncpy(request.ifr_name, interface.c_str(), IFNAMSIZ - 1);
-  const DatagramSocket any = DatagramSocket::udp(0);
-  if (ioctl(any.handle(), SIOCGIFMTU, &request) != 0) return std::nullopt;
-  return request.ifr_mtu;
-}
-
 std::optional<long> largest_receive_buffer() {
   try {
     const std::string text = read_input_file("/proc/sys/net/core/rmem_max");
@@ -192,11 +182,12 @@ std::optional<long> largest_receive_buffer() {
   }
 }
 
-// Random bytes that no other program sends, and that DDS drops as invalid.
-std::vector<std::uint8_t> own_bytes() {
+// Random bytes that no other program sends, and that DDS drops as invalid, with zeros up to `size`.
+std::vector<std::uint8_t> own_bytes(std::size_t size = 16) {
   std::vector<std::uint8_t> bytes = {'K', 'M', 'D', 'R'};
   std::random_device device;
   for (int k = 0; k < 12; ++k) bytes.push_back(static_cast<std::uint8_t>(device()));
+  bytes.resize(std::max(bytes.size(), size));
   return bytes;
 }
 
@@ -225,24 +216,21 @@ std::optional<std::string> try_unicast(const NetworkInterface& chosen) {
   return echo_to(socket, chosen.address);
 }
 
-// Receives multicast announcements of other domains. Their contents are not read.
-class DomainListener {
+// Receives multicast announcements of other domains, and those of the own domain on other
+// interfaces. Their contents are not read.
+class ElsewhereListener {
  public:
-  DomainListener(int own_domain, const NetworkInterface& chosen) {
-    for (int domain = 0; domain <= static_cast<int>(kLastQuietDomain); ++domain) {
-      if (domain == own_domain) continue;
-      try {
-        DatagramSocket socket = DatagramSocket::udp(discovery_port(domain));
-        if (!socket.join(kGroup, chosen.address)) sockets_.emplace_back(domain, std::move(socket));
-      } catch (const std::system_error&) {  // the port belongs to another program
-      }
-    }
+  ElsewhereListener(int own_domain, const NetworkFacts& facts) {
+    for (int domain = 0; domain <= static_cast<int>(kLastQuietDomain); ++domain)
+      if (domain != own_domain) add(domain, *facts.chosen);
+    for (const NetworkInterface& interface : facts.interfaces)
+      if (interface.name != facts.chosen->name && !interface.loopback) add(own_domain, interface);
   }
 
-  // Adds the addresses of senders to those of their domains.
-  void listen(milliseconds patience, std::map<int, std::set<std::string>>& senders) {
+  // Adds the addresses of senders.
+  void listen(milliseconds patience, std::map<Elsewhere, std::set<std::string>>& senders) {
     std::vector<pollfd> waiting;
-    for (const auto& [domain, socket] : sockets_)
+    for (const auto& [where, socket] : sockets_)
       waiting.push_back({.fd = socket.handle(), .events = POLLIN, .revents = 0});
     if (poll(waiting.data(), waiting.size(), static_cast<int>(patience.count())) <= 0) return;
     constexpr std::array<std::uint8_t, 4> kRtps = {'R', 'T', 'P', 'S'};  // begins a packet of DDS
@@ -255,7 +243,16 @@ class DomainListener {
   }
 
  private:
-  std::vector<std::pair<int, DatagramSocket>> sockets_;
+  void add(int domain, const NetworkInterface& interface) try {
+    DatagramSocket socket = DatagramSocket::udp(discovery_port(domain));
+    // Otherwise the socket also receives what comes to groups of other sockets.
+    if (!set_option(socket.handle(), IPPROTO_IP, IP_MULTICAST_ALL, 0)) return;
+    if (!socket.join(kGroup, interface.address))
+      sockets_.emplace_back(Elsewhere{domain, interface.name}, std::move(socket));
+  } catch (const std::system_error&) {  // the port belongs to another program
+  }
+
+  std::vector<std::pair<Elsewhere, DatagramSocket>> sockets_;
 };
 
 // The addresses of a participant, as DDS states them. Untrusted.
@@ -295,11 +292,25 @@ class DiscoveryObserver {
       if (!claims_to_be_a_robot(user_data)) return;
       DiscoveredRobot& robot = robots.emplace_back();
       robot.address = addresses_of(found.qos);
+      heard_.push_back({info.instance_handle, steady_now_s()});
       if (const auto announcement = parse_user_data(user_data).value) {
         robot.identity = announcement->identity;
         of_participant_[info.instance_handle] = to_string(*robot.identity);
       }
     });
+  }
+
+  // States for how long robots have been heard without an answer. `robots`: all that take() added.
+  void note_silence(std::vector<DiscoveredRobot>& robots) const {
+    std::vector<dds_instance_handle_t> writers(1024);
+    const dds_return_t count =
+        dds_get_matched_publications(statuses_.handle(), writers.data(), writers.size());
+    writers.resize(static_cast<std::size_t>(std::clamp(count, 0, 1024)));
+    std::set<dds_instance_handle_t> answering;
+    for (const dds_instance_handle_t writer : writers) answering.insert(participant_of(writer));
+    for (std::size_t k = 0; k < robots.size(); ++k)
+      robots[k].unanswered_s =
+          answering.contains(heard_[k].participant) ? 0.0 : steady_now_s() - heard_[k].since_s;
   }
 
   // For each writer of statuses, keeps the least offset of its stamps from the clock of this host.
@@ -335,16 +346,27 @@ class DiscoveryObserver {
   }
 
   [[nodiscard]] std::string name_of(dds_instance_handle_t writer) const {
+    const auto participant = of_participant_.find(participant_of(writer));
+    return participant != of_participant_.end() ? participant->second : "a robot";
+  }
+
+  // DDS_HANDLE_NIL if it is gone.
+  [[nodiscard]] dds_instance_handle_t participant_of(dds_instance_handle_t writer) const {
     dds_builtintopic_endpoint_t* const endpoint =
         dds_get_matched_publication_data(statuses_.handle(), writer);
-    if (endpoint == nullptr) return "a robot that is gone";
-    const auto participant = of_participant_.find(endpoint->participant_instance_handle);
+    if (endpoint == nullptr) return DDS_HANDLE_NIL;
+    const dds_instance_handle_t participant = endpoint->participant_instance_handle;
     dds_builtintopic_free_endpoint(endpoint);
-    return participant != of_participant_.end() ? participant->second : "a robot";
+    return participant;
   }
 
   DdsDomain domain_;
   DdsEntity participant_, participants_, topic_, statuses_;
+  struct Heard {
+    dds_instance_handle_t participant = DDS_HANDLE_NIL;
+    double since_s = 0.0;
+  };
+  std::vector<Heard> heard_;  // in the order of take()
   std::map<dds_instance_handle_t, std::string> of_participant_;
   std::map<dds_instance_handle_t, double> ahead_s_;
 };
@@ -377,8 +399,39 @@ bool is_echo(const std::vector<std::uint8_t>& bytes, const std::vector<std::uint
          std::equal(data.begin(), data.end(), bytes.begin() + 8);
 }
 
-// Sends echo requests one after the other, and waits for each reply.
-PeerEcho ask(const std::string& host) {
+// Time until a request with `data` is answered.
+std::optional<double> echo_s(DatagramSocket& socket, const std::string& address,
+                             const std::vector<std::uint8_t>& data) {
+  const double start_s = steady_now_s();
+  if (socket.send(address, 0, echo_request(data))) return std::nullopt;
+  while (steady_now_s() - start_s < 0.5) {
+    const auto answer = socket.receive(milliseconds(100));
+    if (answer && is_echo(answer->bytes, data)) return steady_now_s() - start_s;
+  }
+  return std::nullopt;
+}
+
+// The largest packet that passes [B], if one of `packet_bytes` does not.
+int largest_passing(DatagramSocket& socket, const std::string& address, int packet_bytes) {
+  constexpr int kHeaders_bytes = 20 + 8, kTries = 3, kStep_bytes = 4;
+  const auto passes = [&](int bytes) {
+    for (int k = 0; k < kTries; ++k)
+      if (echo_s(socket, address, own_bytes(static_cast<std::size_t>(bytes - kHeaders_bytes))))
+        return true;
+    return false;
+  };
+  if (passes(packet_bytes)) return packet_bytes;
+  int low = 44, high = packet_bytes;  // the usual echo passes
+  while (high - low > kStep_bytes) {
+    const int middle = (low + high) / 4 * 2;  // even, because of the checksum
+    (passes(middle) ? low : high) = middle;
+  }
+  return low;
+}
+
+// Sends echo requests one after the other, and waits for each reply. `packet_bytes`: the largest
+// packet that robots send.
+PeerEcho ask(const std::string& host, int packet_bytes) {
   PeerEcho echo{.host = host,
                 .median_s = std::numeric_limits<double>::quiet_NaN(),
                 .worst_s = std::numeric_limits<double>::quiet_NaN()};
@@ -388,38 +441,32 @@ PeerEcho ask(const std::string& host) {
   if (!socket || !address) return echo;
   std::vector<double> times_s;
   const auto is_silent = [&] { return times_s.empty() && echo.sent >= kEchoesUnanswered; };
-  for (; echo.sent < kEchoes && !is_silent(); ++echo.sent) {
-    const std::vector<std::uint8_t> data = own_bytes();
-    const double start_s = steady_now_s();
-    if (socket->send(*address, 0, echo_request(data))) continue;
-    while (steady_now_s() - start_s < 0.5) {
-      const auto answer = socket->receive(milliseconds(100));
-      if (!answer || !is_echo(answer->bytes, data)) continue;
-      times_s.push_back(steady_now_s() - start_s);
-      break;
-    }
-  }
+  for (; echo.sent < kEchoes && !is_silent(); ++echo.sent)
+    if (const auto time_s = echo_s(*socket, *address, own_bytes())) times_s.push_back(*time_s);
   echo.received = times_s.size();
   if (times_s.empty()) return echo;
   std::ranges::sort(times_s);
   echo.median_s = times_s[times_s.size() / 2];
   echo.worst_s = times_s.back();
+  echo.packet_bytes = packet_bytes / 2 * 2;
+  echo.passing_bytes = largest_passing(*socket, *address, echo.packet_bytes);
   return echo;
 }
 
 void listen(const DdsConfig& config, double listen_s, const ReportProgress& report_progress,
             NetworkFacts& facts) {
-  DomainListener other_domains(config.domain, *facts.chosen);
+  ElsewhereListener elsewhere(config.domain, facts);
   DiscoveryObserver observer(config);
   const RosNetwork ros({.domain = config.domain, .interface = facts.chosen->name});
   RosDiscovery ros_topics(ros);
   const double start_s = steady_now_s();
   while (steady_now_s() - start_s < listen_s) {
     report_progress("listening", (steady_now_s() - start_s) / listen_s);
-    other_domains.listen(milliseconds(20), facts.other_domains);
+    elsewhere.listen(milliseconds(20), facts.elsewhere);
     observer.take(facts.robots);
     observer.take_clocks();
   }
+  observer.note_silence(facts.robots);
   facts.listened_s = listen_s;
   std::set<std::string> topics;
   for (const TopicPublisher& publisher : ros_topics.publishers()) topics.insert(publisher.topic);
@@ -431,20 +478,19 @@ void listen(const DdsConfig& config, double listen_s, const ReportProgress& repo
 
 NetworkFacts probe_network(const DdsConfig& config, double listen_s,
                            const ReportProgress& report_progress) {
-  NetworkFacts facts{.config = checked(config), .interfaces = network_interfaces()};
+  NetworkFacts facts{.config = checked(config), .interfaces = network_interfaces(config.peers)};
   try {
     facts.chosen = select_interface(facts.interfaces, config.interface);
   } catch (const ConfigError& error) {
     facts.no_interface = error.what();
     return facts;
   }
-  facts.mtu = mtu_of(facts.chosen->name);
   facts.largest_receive_buffer = largest_receive_buffer();
   facts.no_multicast = try_multicast(config, *facts.chosen);
   facts.no_unicast = try_unicast(*facts.chosen);
   for (const std::string& peer : config.peers) {
     report_progress("asking " + peer, 0.0);
-    facts.echoes.push_back(ask(peer));
+    facts.echoes.push_back(ask(peer, largest_datagram(config, *facts.chosen) + 28));
   }
   listen(config, listen_s, report_progress, facts);
   return facts;

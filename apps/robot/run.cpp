@@ -86,8 +86,9 @@ void log_network(const RobotConfig& config, const NetworkInterface& interface) {
   const char* const discovery =
       config.dds.discovery == Discovery::kMulticast ? "multicast" : "address";
   log::info("dds") << "domain " << config.dds.domain << " on " << interface.name << " ("
-                   << interface.address << "), link " << config.run.link << ", peers by "
-                   << discovery;
+                   << interface.address << "), link " << config.run.link
+                   << ", datagrams of at most " << largest_datagram(config.dds, interface)
+                   << " B, peers by " << discovery;
 }
 
 // Work beside the modules while they run: phase, status line, traffic and memory over time.

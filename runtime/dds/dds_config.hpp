@@ -81,7 +81,8 @@ struct DdsConfig {
     visitor.field("liveliness_s", liveliness_s, {0.2, 60.0},
                   "[s] silence after which a peer counts as lost");
     visitor.field("max_message_bytes", max_message_bytes, {1200, 65500},
-                  "[B] maximum size of a UDP datagram; 1400 on radio");
+                  "[B] maximum size of a UDP datagram; never more than fits into a packet of the "
+                  "interface");
     visitor.field("fragment_bytes", fragment_bytes, {1000, 65000},
                   "[B] larger samples are sent in fragments of this; below max_message_bytes");
     visitor.field("max_rexmit_bytes", max_rexmit_bytes, {1024, 1 << 26},

@@ -4,13 +4,16 @@
 #include <ifaddrs.h>
 #include <net/if.h>
 #include <netdb.h>
+#include <sys/ioctl.h>
 #include <sys/socket.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <cerrno>
 #include <chrono>
 #include <cmath>
+#include <cstring>
 #include <future>
 #include <memory>
 #include <sstream>
@@ -33,6 +36,7 @@ std::string why_unknown(const std::string& host) {
   const std::size_t colon = host.find(':');
   const std::string name = host.substr(0, colon);
   const std::string port = colon != host.npos ? host.substr(colon + 1) : "0";
+  if (std::ranges::count(host, ':') > 1) return "an IPv6 address: robots use IPv4";
   addrinfo hints{};
   hints.ai_family = AF_INET;
   hints.ai_socktype = SOCK_DGRAM;
@@ -44,19 +48,86 @@ std::string why_unknown(const std::string& host) {
   return {};
 }
 
+// A socket that sends nothing, to ask the kernel.
+class QuerySocket {
+ public:
+  QuerySocket() : socket_(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {}
+  ~QuerySocket() { close(socket_); }
+  QuerySocket(const QuerySocket&) = delete;
+  QuerySocket& operator=(const QuerySocket&) = delete;
+
+  // 0 if unknown.
+  [[nodiscard]] int mtu_of(const char* interface) const {
+    ifreq request{};
+    std::strncpy(request.ifr_name, interface, IFNAMSIZ - 1);
+    return ioctl(socket_, SIOCGIFMTU, &request) == 0 ? request.ifr_mtu : 0;
+  }
+
+  struct Route {
+    std::string own_address;  // dotted; empty: no route
+    int mtu = 0;
+  };
+  [[nodiscard]] Route route_to(in_addr host) const {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_port = htons(7400);
+    address.sin_addr = host;
+    socklen_t size = sizeof address, mtu_size = sizeof(int);
+    Route route;
+    if (connect(socket_, reinterpret_cast<const sockaddr*>(&address), size) != 0 ||
+        getsockname(socket_, reinterpret_cast<sockaddr*>(&address), &size) != 0 ||
+        getsockopt(socket_, IPPROTO_IP, IP_MTU, &route.mtu, &mtu_size) != 0)
+      return {};
+    route.own_address = dotted(address.sin_addr);
+    return route;
+  }
+
+  [[nodiscard]] static std::string dotted(in_addr address) {
+    std::array<char, INET_ADDRSTRLEN> text{};
+    inet_ntop(AF_INET, &address, text.data(), text.size());
+    return text.data();
+  }
+
+ private:
+  int socket_;
+};
+
+void add_routes(const std::vector<std::string>& hosts, std::vector<NetworkInterface>& interfaces) {
+  const auto add = [&interfaces](const std::string& host, bool needs_multicast) {
+    in_addr address{};
+    if (inet_pton(AF_INET, host.substr(0, host.find(':')).c_str(), &address) != 1) return false;
+    const QuerySocket::Route route = QuerySocket().route_to(address);
+    for (NetworkInterface& interface : interfaces)
+      if (interface.address == route.own_address && (interface.multicast || !needs_multicast)) {
+        ++interface.routes;
+        interface.mtu = std::min(interface.mtu, route.mtu);
+      }
+    return true;
+  };
+  std::size_t known = 0;
+  for (const std::string& host : hosts) known += add(host, false) ? 1 : 0;
+  constexpr const char* kGroup = "239.255.0.1";  // group of discovery (RTPS 2.5, Sec. 9.6.1.4)
+  if (known == 0) add(kGroup, true);
+}
+
 std::string milliseconds(double seconds) {
   return std::to_string(std::llround(seconds * 1e3)) + "ms";
 }
 
 void write_general(std::ostream& xml, const DdsConfig& config, const NetworkInterface& interface) {
+  constexpr int kRexmit_bytes = 1456;  // as DDS by default
+  constexpr int kFragmentHeaders_bytes = 100;
+  const int largest = largest_datagram(config, interface);
   const bool multicast = config.discovery == Discovery::kMulticast;
   xml << "<General><Interfaces><NetworkInterface name='" << xml_escaped(interface.name) << '\'';
   // Linux does not flag loopback as capable of multicast, yet it is.
   if (multicast && interface.loopback) xml << " multicast='true'";
   // Data use unicast: on radio, multicast runs at the base rate and without acknowledgement.
   xml << "/></Interfaces><AllowMulticast>" << (multicast ? "spdp" : "false")
-      << "</AllowMulticast><MaxMessageSize>" << config.max_message_bytes
-      << "B</MaxMessageSize><FragmentSize>" << config.fragment_bytes
+      << "</AllowMulticast><MaxMessageSize>" << largest
+      << "B</MaxMessageSize><MaxRexmitMessageSize>" << std::min(largest, kRexmit_bytes)
+      << "B</MaxRexmitMessageSize><FragmentSize>"
+      << std::min(config.fragment_bytes, largest - kFragmentHeaders_bytes)
       << "B</FragmentSize></General>";
 }
 
@@ -128,10 +199,19 @@ void log_line(void* /*argument*/, const dds_log_data_t* data) {
 NetworkInterface choose_interface(const DdsConfig& config,
                                   const std::vector<NetworkInterface>& interfaces) {
   NetworkInterface chosen = select_interface(interfaces, config.interface);
-  const auto outward = std::ranges::count(interfaces, false, &NetworkInterface::loopback);
-  if (config.interface.empty() && outward > 1)
-    log::warn("dds") << "several network interfaces are up: using " << chosen.name << " ("
-                     << chosen.address << "); set dds.interface to choose";
+  if (const auto others = others_than(chosen, interfaces);
+      config.interface.empty() && !others.reasons.empty()) {
+    const std::string text =
+        "using network interface " + chosen.name + " (" + chosen.address + "): " + others.reasons;
+    if (others.is_clear)
+      log::info("dds") << text;
+    else
+      log::warn("dds") << text << "; set dds.interface to choose";
+  }
+  if (!chosen.multicast && !chosen.loopback && config.discovery == Discovery::kMulticast &&
+      config.peers.empty())
+    log::warn("dds") << chosen.name
+                     << " carries no multicast: name the other robots' addresses in dds.peers";
   // Without a network, names of hosts cannot be looked up yet.
   if (!chosen.loopback || chosen.name == config.interface) check_hosts(config.peers);
   return chosen;
@@ -139,7 +219,7 @@ NetworkInterface choose_interface(const DdsConfig& config,
 
 // Loopback stands in for an interface that is not up.
 std::shared_ptr<const DdsDomain> make_domain(const DdsConfig& config) {
-  const auto up = network_interfaces();
+  const auto up = network_interfaces(config.peers);
   const bool is_up = config.interface.empty() ||
                      std::ranges::count(up, config.interface, &NetworkInterface::name) > 0;
   return std::make_shared<const DdsDomain>(
@@ -158,7 +238,7 @@ dds_entity_t create_participant(const DdsConfig& config, const RobotIdentity& id
 
 }  // namespace
 
-std::vector<NetworkInterface> network_interfaces() {
+std::vector<NetworkInterface> network_interfaces(const std::vector<std::string>& hosts) {
   ifaddrs* first = nullptr;
   if (getifaddrs(&first) != 0)
     throw std::system_error(errno, std::generic_category(), "cannot list the network interfaces");
@@ -169,14 +249,15 @@ std::vector<NetworkInterface> network_interfaces() {
     if (entry->ifa_addr == nullptr || entry->ifa_addr->sa_family != AF_INET) continue;
     if ((entry->ifa_flags & IFF_UP) == 0) continue;
     const auto* address = reinterpret_cast<const sockaddr_in*>(entry->ifa_addr);
-    std::array<char, INET_ADDRSTRLEN> text{};
-    inet_ntop(AF_INET, &address->sin_addr, text.data(), text.size());
     interfaces.push_back({.name = entry->ifa_name,
-                          .address = text.data(),
+                          .address = QuerySocket::dotted(address->sin_addr),
                           .multicast = (entry->ifa_flags & IFF_MULTICAST) != 0,
                           .loopback = (entry->ifa_flags & IFF_LOOPBACK) != 0,
-                          .index = if_nametoindex(entry->ifa_name)});
+                          .index = if_nametoindex(entry->ifa_name),
+                          .carrier = (entry->ifa_flags & IFF_RUNNING) != 0,
+                          .mtu = QuerySocket().mtu_of(entry->ifa_name)});
   }
+  add_routes(hosts, interfaces);
   return interfaces;
 }
 
@@ -186,6 +267,12 @@ void check_hosts(const std::vector<std::string>& hosts) {
     if (const std::string why = why_unknown(host); !why.empty())
       problems += (problems.empty() ? "" : "; ") + host + ": " + why;
   if (!problems.empty()) throw ConfigError("dds.peers: unknown host: " + problems);
+}
+
+int largest_datagram(const DdsConfig& config, const NetworkInterface& interface) {
+  constexpr int kHeaders_bytes = 20 + 8;  // IPv4 and UDP
+  return interface.mtu > 0 ? std::min(config.max_message_bytes, interface.mtu - kHeaders_bytes)
+                           : config.max_message_bytes;
 }
 
 std::string cyclone_xml(const DdsConfig& config, const NetworkInterface& interface) {
@@ -199,7 +286,8 @@ std::string cyclone_xml(const DdsConfig& config, const NetworkInterface& interfa
 }
 
 DdsDomain::DdsDomain(const DdsConfig& config)
-    : DdsDomain(checked(config), choose_interface(checked(config), network_interfaces())) {}
+    : DdsDomain(checked(config),
+                choose_interface(checked(config), network_interfaces(config.peers))) {}
 
 DdsDomain::DdsDomain(const DdsConfig& config, NetworkInterface interface)
     : config_(checked(config)), interface_(std::move(interface)) {
@@ -230,8 +318,9 @@ DdsParticipant::DdsParticipant(const DdsConfig& config, const RobotIdentity& ide
     : DdsParticipant(make_domain(config), identity, std::move(seal)) {
   choice_.emplace(config.interface, interface());
   if (choice_->waits())
-    log::warn("dds") << (config.interface.empty() ? "no network interface is up"
-                                                  : "interface " + config.interface + " is not up")
+    log::warn("dds") << (config.interface.empty()
+                             ? "no network interface has an IPv4 address and a carrier"
+                             : "interface " + config.interface + " has no IPv4 address or is down")
                      << ": waiting for it; until then this robot meets only robots on this host";
 }
 
@@ -265,11 +354,11 @@ std::optional<NetworkInterface> DdsParticipant::new_interface(double now_s) {
   if (!choice_ || now_s - looked_s_ < kPeriod_s) return std::nullopt;
   looked_s_ = now_s;
   const bool waited = choice_->waits();
-  const auto next = choice_->update(network_interfaces(), now_s);
+  const auto next = choice_->update(network_interfaces(config().peers), now_s);
   const NetworkInterface& used = interface();
   if (choice_->waits() && !waited)
     log::warn("dds") << "interface " << used.name << " (" << used.address
-                     << ") has gone: waiting for it";
+                     << ") has gone or has no carrier: waiting for it";
   if (waited && !choice_->waits() && !next)
     log::info("dds") << "interface " << used.name << " (" << used.address << ") is back";
   return next;

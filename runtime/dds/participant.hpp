@@ -14,12 +14,18 @@
 
 namespace km {
 
-/// IPv4 interfaces of this host that are up, in the kernel's order.
-std::vector<NetworkInterface> network_interfaces();
+/// IPv4 interfaces of this host that are up, in the kernel's order. Their routes are those to the
+/// IPv4 addresses (with or without ":port") in `hosts`; names are ignored. If there is none, it is
+/// the route of multicast, which is the default route on most hosts.
+std::vector<NetworkInterface> network_interfaces(const std::vector<std::string>& hosts = {});
 
 /// Looks up addresses or names of hosts, each with or without ":port". Throws ConfigError that
 /// names all unknown ones. May query a name server, and wait for it.
 void check_hosts(const std::vector<std::string>& hosts);
+
+/// Largest UDP datagram that robots send on `interface` [B]: fits into one packet, because some
+/// networks drop fragments of packets. At most dds.max_message_bytes.
+[[nodiscard]] int largest_datagram(const DdsConfig& config, const NetworkInterface& interface);
 
 /// Configuration document of Cyclone DDS 0.10 for `config` on `interface`.
 [[nodiscard]] std::string cyclone_xml(const DdsConfig& config, const NetworkInterface& interface);

@@ -116,6 +116,10 @@ void VirtualNetwork::add_interface(int n) {
   drop_what_cannot_be_answered(host(n));
 }
 
+void VirtualNetwork::set_path_mtu(int n, int bytes) {
+  ip(switch_, "link set port" + std::to_string(n) + " mtu " + std::to_string(bytes));
+}
+
 void VirtualNetwork::add_dead_interface(int n) {
   ip(host(n), "link add eth1 type veth peer name nowhere");
   ip(host(n), "addr add 10.99.0." + std::to_string(n) + "/24 dev eth1");

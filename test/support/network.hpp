@@ -40,7 +40,10 @@ class VirtualNetwork {
   /// Connects `host` again after remove_interface(); eth0 is another device now, without address.
   void add_interface(int host);
 
-  /// Gives `host` a second interface, "eth1", that leads nowhere.
+  /// Larger packets to `host` are dropped on the way, without a notice to the sender.
+  void set_path_mtu(int host, int bytes);
+
+  /// Gives `host` a second interface, "eth1", that leads nowhere: it has no carrier.
   void add_dead_interface(int host);
 
  private:

@@ -148,6 +148,12 @@ class Look {
       if (finding["severity"] != "note") found += finding["id"].get<std::string>() + ' ';
     return found;
   }
+  // Text of the first finding with this id.
+  [[nodiscard]] std::string what(const std::string& id) const {
+    for (const auto& finding : result_["findings"])
+      if (finding["id"] == id) return finding["what"];
+    return "";
+  }
   [[nodiscard]] std::string figure(const std::string& name) const {
     for (const auto& figure : result_["figures"])
       if (figure["name"] == name) return figure["value"];
@@ -184,6 +190,16 @@ TEST_CASE("The doctor finds that a peer is out of reach, or that no robot runs t
   const Look lost(network, {"--peers", peer});
   CHECK(lost.exit_code() == 1);
   CHECK_THAT(lost.ids(), Catch::Contains("network.unreachable"));
+}
+
+TEST_CASE("The doctor states the largest packet that a peer answers", "[doctor]") {
+  if (!VirtualNetwork::available()) return;
+  VirtualNetwork network(2);
+  network.set_path_mtu(2, 1280);
+  const Look look(network, {"--peers", VirtualNetwork::address(2)});
+  CHECK(look.ids() == "network.path_mtu network.no_peers ");
+  CHECK_THAT(look.what("network.path_mtu"),
+             Catch::Contains("of up to 128") || Catch::Contains("of up to 127"));
 }
 
 }  // namespace km

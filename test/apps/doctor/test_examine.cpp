@@ -163,7 +163,7 @@ TEST_CASE("Results with files that are missing or broken are examined as far as 
 namespace {
 
 const NetworkInterface kEthernet{
-    .name = "eth0", .address = "10.0.0.1", .multicast = true, .loopback = false};
+    .name = "eth0", .address = "10.0.0.1", .multicast = true, .loopback = false, .mtu = 1500};
 
 DiscoveredRobot robot(RobotId id, const std::string& name) {
   return {.address = "udp/10.0.0.2:7411",
@@ -176,7 +176,6 @@ NetworkFacts sound() {
   facts.config.domain = 42;
   facts.interfaces = {kEthernet};
   facts.chosen = kEthernet;
-  facts.mtu = 1500;
   facts.largest_receive_buffer = facts.config.receive_buffer_bytes;
   facts.robots = {robot(3, "carol")};
   facts.listened_s = 5.0;
@@ -195,7 +194,7 @@ std::string ids_of(const NetworkFacts& facts) {
 TEST_CASE("A sound network has no findings", "[doctor]") {
   NetworkFacts facts = sound();
   CHECK(ids_of(facts).empty());
-  facts.other_domains = {{0, {"10.0.0.9"}}};  // ROS 2, or another team
+  facts.elsewhere = {{{0, "eth0"}, {"10.0.0.9"}}};  // ROS 2, or another team
   facts.echoes = {
       {.host = "10.0.0.2", .sent = 20, .received = 20, .median_s = 2e-3, .worst_s = 9e-3}};
   facts.clocks = {{"alice (id 7)", -0.002}};
@@ -216,10 +215,25 @@ TEST_CASE("The reason that keeps robots apart on a network is named", "[doctor]"
   };
   const Case c = GENERATE_COPY(
       Case{"error network.interface ", [](auto& facts) { facts.chosen.reset(); }},
-      Case{"note network.several_interfaces ",
+      Case{"warning network.several_interfaces ",
            [](auto& facts) {
              facts.interfaces.push_back({"wlan0", "10.1.0.1", true, false});
            }},
+      Case{"note network.several_interfaces ",
+           [](auto& facts) {
+             facts.interfaces.push_back({"docker0", "172.17.0.1", true, false, 0, false});
+           }},
+      Case{"error network.no_carrier ", [](auto& facts) { facts.chosen->carrier = false; }},
+      Case{"warning network.other_interface ",
+           [](auto& facts) {
+             facts.elsewhere = {{{42, "wlan0"}, {"10.1.0.2"}}};
+           }},
+      Case{"error network.one_sided ", [](auto& facts) { facts.robots[0].unanswered_s = 4.0; }},
+      Case{"error network.path_mtu ", echo({.host = {},
+                                            .sent = 20,
+                                            .received = 20,
+                                            .packet_bytes = 1500,
+                                            .passing_bytes = 1280})},
       Case{"",
            [](auto& facts) {
              facts.interfaces.push_back({"wlan0", "10.1.0.1", true, false});
@@ -235,13 +249,7 @@ TEST_CASE("The reason that keeps robots apart on a network is named", "[doctor]"
       Case{"warning network.buffers ", [](auto& facts) { facts.largest_receive_buffer = 65536; }},
       Case{"note network.buffers ",  // Linux' usual: it works
            [](auto& facts) { facts.largest_receive_buffer = 212992; }},
-      Case{"warning network.mtu ", [](auto& facts) { facts.mtu = 576; }},
-      Case{"warning network.mtu ", [](auto& facts) { facts.chosen->name = "wlan0"; }},
-      Case{"",
-           [](auto& facts) {
-             facts.chosen->name = "wlan0";
-             facts.config.max_message_bytes = 1400;
-           }},
+      Case{"warning network.mtu ", [](auto& facts) { facts.chosen->mtu = 576; }},
       Case{"error network.protocol ",
            [](auto& facts) { facts.robots[0].identity->protocol = kProtocolVersion + 1; }},
       Case{"error network.protocol ", [](auto& facts) { facts.robots[0].identity.reset(); }},
@@ -269,7 +277,7 @@ TEST_CASE("The reason that keeps robots apart on a network is named", "[doctor]"
       Case{"warning network.other_domain note network.no_peers ",
            [](auto& facts) {
              facts.robots.clear();
-             facts.other_domains = {{43, {"10.0.0.2", "10.0.0.3"}}};
+             facts.elsewhere = {{{43, "eth0"}, {"10.0.0.2", "10.0.0.3"}}};
            }},
       Case{"note network.clock ", [](auto& facts) {
              facts.clocks = {{"alice", 3600.0}};
@@ -284,6 +292,7 @@ TEST_CASE("On loopback alone the finding depends on whether the host has another
           "[doctor]") {
   NetworkFacts facts = sound();
   facts.chosen = NetworkInterface{"lo", "127.0.0.1", true, true};
+  facts.config.interface = "lo";
   CHECK_THAT(examine_network(facts).findings.at(0).what, Catch::Equals("lo is loopback"));
   facts.interfaces = {*facts.chosen};
   CHECK_THAT(examine_network(facts).findings.at(0).what, Catch::Equals("only loopback is up"));

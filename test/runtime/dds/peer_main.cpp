@@ -1,6 +1,7 @@
 // A robot that only talks, as a process of its own: test_dds_peer ROBOT KEYS [SETTING...], where
 // KEYS is its folder of keys or empty. Lines on standard input drive it:
 //   ping FIRST LAST    events with these indices, to all
+//   large INDEX        an event of 60 kB, to all
 //   one ROBOT INDEX    to one robot
 //   quit
 // It prints what happens: "joined 7", "lost 7", ..., "ping 7 INDEX", "one 7 INDEX", and at the end
@@ -72,6 +73,7 @@ void obey(TestRobot& robot) {
     words >> command >> a >> b;
     if (command == "quit") return;
     if (command == "one") robot.ping_one(static_cast<RobotId>(a), b);
+    if (command == "large") robot.ping(a, std::vector<std::uint8_t>(60000));
     if (command == "ping")
       for (std::uint32_t i = a; i <= b; ++i) robot.ping(i, std::vector<std::uint8_t>(300));
   }

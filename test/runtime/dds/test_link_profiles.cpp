@@ -78,6 +78,35 @@ TEST_CASE("Text of a configuration cannot break out of the XML document", "[prof
              Contains("<Tag>a&lt;/Tag&gt;&lt;evil b=&apos;&quot;&amp;</Tag>"));
 }
 
+TEST_CASE("Datagrams, also repeated ones and fragments, fit into packets of the interface",
+          "[profiles]") {
+  NetworkInterface tunnel = kTunnel;
+  tunnel.mtu = 1280;
+  CHECK_THAT(cyclone_xml(profile(GENERATE("wired", "wifi"), {}), tunnel),
+             Contains("<MaxMessageSize>1252B<") && Contains("<MaxRexmitMessageSize>1252B<") &&
+                 Contains("<FragmentSize>1152B<"));
+  CHECK_THAT(cyclone_xml({}, kCable), Contains("<MaxMessageSize>65500B<"));  // MTU unknown
+}
+
+TEST_CASE("An interface without a carrier, or away from the peers, is not chosen", "[profiles]") {
+  NetworkInterface docker{"docker0", "172.17.0.1", true, false};
+  NetworkInterface tunnel = kTunnel;
+  const auto with = [&](bool has_carrier, int routes) {
+    docker.carrier = has_carrier;
+    tunnel.routes = routes;
+    return std::vector<NetworkInterface>{kLoopback, docker, tunnel};
+  };
+  CHECK(select_interface(with(true, 0), "").name == "docker0");
+  CHECK(others_than(kTunnel, with(true, 0)).reasons == "docker0 is as good");
+  CHECK(select_interface(with(false, 0), "").name == "tun0");
+  CHECK(others_than(tunnel, with(false, 0)).reasons == "docker0 has no carrier");
+  CHECK(select_interface(with(true, 1), "").name == "tun0");
+  CHECK(others_than(tunnel, with(true, 1)).reasons ==
+        "docker0 is not on the route to other robots");
+  CHECK(select_interface({kLoopback, with(false, 0)[1]}, "").name == "lo");
+  CHECK(select_interface(with(false, 0), "docker0").name == "docker0");
+}
+
 TEST_CASE("The interface is the one named, else the likeliest", "[profiles]") {
   CHECK(select_interface({kLoopback, kCable, kRadio}, "wlan0").name == "wlan0");
   CHECK(select_interface({kLoopback, kCable, kRadio}, "").name == "eth0");

@@ -1,4 +1,5 @@
 #include <catch2/catch.hpp>
+#include <fstream>
 #include <iostream>
 #include <sstream>
 
@@ -35,6 +36,18 @@ struct Pair {
   }
 };
 
+// Number of packets that the kernel split into fragments.
+long packets_split_by(pid_t host) {
+  std::ifstream file("/proc/" + std::to_string(host) + "/net/snmp");
+  std::string names, values, name;
+  std::getline(file, names);
+  std::getline(file, values);
+  std::istringstream columns(names), numbers(values);
+  for (std::string value; columns >> name && numbers >> value;)
+    if (name == "FragCreates") return std::stol(value);
+  return -1;
+}
+
 // The summary of a robot that quits: new messages, duplicates.
 std::vector<int> summary(Process& robot) {
   robot.send_line("quit");
@@ -54,6 +67,41 @@ TEST_CASE("On a host with several interfaces the robot uses the configured one",
   const Pair robots(network, own_team() + std::vector<std::string>{"interface=eth0"});
   CHECK(robots.a->wait_for("joined 4"));
   CHECK(robots.b->wait_for("joined 3"));
+}
+
+TEST_CASE("Without configuration a robot uses the interface with a carrier, and moves to it",
+          "[dds][namespaces]") {
+  if (!VirtualNetwork::available()) return;
+  const bool is_late = GENERATE(false, true);  // the cable is connected after the start
+  CAPTURE(is_late);
+  VirtualNetwork network(2);
+  network.remove_interface(1);
+  network.add_dead_interface(1);  // comes first in the kernel's order
+  network.add_interface(1);
+  network.set_address(1, VirtualNetwork::address(1) + "/24");
+  if (is_late) network.set_link(1, false);
+  const Pair robots(network, own_team());
+  if (is_late) {
+    robots.a->send_line("ping 0 1");
+    std::this_thread::sleep_for(std::chrono::seconds(2));  // the condition is time itself
+    network.set_link(1, true);
+  }
+  CHECK(robots.a->wait_for("joined 4"));
+  CHECK(robots.b->wait_for("joined 3"));
+}
+
+TEST_CASE("Large messages pass a network that drops fragments of packets", "[dds][namespaces]") {
+  if (!VirtualNetwork::available()) return;
+  VirtualNetwork network(2);
+  for (const int host : {1, 2}) {
+    network.set_path_mtu(host, 1280);
+    REQUIRE(Process({"ip", "link", "set", "eth0", "mtu", "1280"}, network.host(host)).wait() == 0);
+  }
+  const Pair robots(network, own_team(), std::make_unique<TeamOfTwo>());
+  REQUIRE(robots.a->wait_for("joined 4"));
+  robots.a->send_line("large 7");
+  CHECK(robots.b->wait_for("ping 3 7"));
+  CHECK(packets_split_by(network.host(1)) == 0);
 }
 
 TEST_CASE("On a host with only loopback robots meet without configuration", "[dds][namespaces]") {
