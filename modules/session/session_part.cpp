@@ -101,7 +101,7 @@ const MemberPoses* SessionPart::poses_of(const PublicPoses& published, RobotId r
 }
 
 bool SessionPart::all_solved(const PublicPoses& published) const {
-  return stage_ == MemberStage::kSolved &&
+  return stage() == MemberStage::kSolved &&
          std::all_of(boot_of_.begin(), boot_of_.end(), [&](const auto& member) {
            if (member.first == self_.robot) return true;
            const MemberPoses* poses = poses_of(published, member.first, MemberStage::kSolved);
@@ -115,12 +115,12 @@ bool SessionPart::joins_members(const ClosureId& closure) const {
 
 std::vector<ReliableMessage> SessionPart::advance(const PublicPoses& published, double now_s) {
   worked_ = false;
-  if (!stage_) {
+  if (state_ == SessionState::kEntering) {
     worked_ = enter(published);
-  } else if (*stage_ < MemberStage::kSolved && !solver_) {
+  } else if (state_ == SessionState::kGathering || state_ == SessionState::kLooking) {
     worked_ = gather(published);
     if (worked_) start_solver(now_s);
-  } else if (*stage_ < MemberStage::kSolved && (solver_->ready() || solver_->done())) {
+  } else if (solver_ && (solver_->ready() || solver_->done())) {
     worked_ = true;
     solve(now_s);
   }
@@ -133,16 +133,17 @@ std::vector<ReliableMessage> SessionPart::advance(const PublicPoses& published, 
 // quaternion is normalised in between. Copies of a pose on two robots that differ at all drift
 // apart: the same step of the solver moves them along different axes.
 std::vector<SinglePose> SessionPart::public_poses() const {
-  if (stage_ < MemberStage::kSolved) return entered_;
+  if (stage() != MemberStage::kSolved) return entered_;
   std::vector<SinglePose> rounded;
-  for (const KeyframeIndex keyframe : public_) rounded.push_back(SinglePose::of(poses()[keyframe]));
+  for (const KeyframeIndex keyframe : public_)
+    rounded.push_back(SinglePose::of(result_.poses[keyframe]));
   return rounded;
 }
 
 bool SessionPart::enter(const PublicPoses& published) {
   if (!in_frame_ && !align(published)) return false;
   round_public_poses();
-  stage_ = MemberStage::kEntered;
+  take(SessionEvent::kEntered);
   return true;
 }
 
@@ -185,10 +186,10 @@ bool SessionPart::align(const PublicPoses& published) {
 
 bool SessionPart::gather(const PublicPoses& published) {
   for (const auto& [robot, boot] : boot_of_)
-    if (robot != self_.robot && poses_of(published, robot, *stage_) == nullptr) return false;
+    if (robot != self_.robot && poses_of(published, robot, *stage()) == nullptr) return false;
   for (const auto& [robot, boot] : boot_of_) {
     if (robot == self_.robot) continue;
-    const MemberPoses& poses = *poses_of(published, robot, *stage_);
+    const MemberPoses& poses = *poses_of(published, robot, *stage());
     add_public_poses(poses, graph_.public_poses);
     if (!graph_.again) graph_.step_precision[robot] = poses.step_precision;
     graph_.later_runs[robot] = poses.later_runs;
@@ -199,13 +200,14 @@ bool SessionPart::gather(const PublicPoses& published) {
     reopen_closures();
   else if (closures_may_be_false_)
     limit_precisions(graph_);
+  take(SessionEvent::kGathered);
   return true;
 }
 
 // For a closure between robots, both robots use the poses and the verdict that are sent, and so
 // decide equally.
 void SessionPart::reopen_closures() {
-  const double limit = kSecondLook * results_->state.barc;
+  const double limit = kSecondLook * result_.state.barc;
   const auto pose = [this](const KeyframeId& id) {
     return id.robot == self_.robot ? graph_.start[id.index] : graph_.public_poses.at(id);
   };
@@ -246,26 +248,28 @@ void SessionPart::solve(double now_s) {
   if (!solver_->done()) return;
   const SolverState state = solver_->state();
   if (state.failed) return fail("the team's equations cannot be solved");
-  if (state.deferred && stage_ == MemberStage::kEntered) return look_again();
   // A second look without closures to weigh ends in its first round: the first one is the result.
-  if (stage_ == MemberStage::kLooked && state.round == 1) solver_.reset();
-  stage_ = MemberStage::kSolved;
+  if (state_ == SessionState::kSolving || state.round > 1)
+    result_ = {progress(), solver_->verdicts(), solver_->noise(), solver_->covariances(),
+               solver_->poses()};
+  solver_.reset();
+  if (state.deferred && state_ == SessionState::kSolving) return look_again();
+  take(SessionEvent::kConverged);
+  graph_ = {};
 }
 
 void SessionPart::look_again() {
-  results_ = results_of_solver();
-  solver_.reset();
   graph_.again = true;
-  graph_.start = results_->poses;
-  graph_.noise = results_->noise;
-  for (const auto& [id, kept] : results_->verdicts.closures) graph_.decided[id] = kept;
+  graph_.start = result_.poses;
+  graph_.noise = result_.noise;
+  for (const auto& [id, kept] : result_.verdicts.closures) graph_.decided[id] = kept;
   round_public_poses();
-  stage_ = MemberStage::kLooked;
+  take(SessionEvent::kDeferred);
 }
 
 void SessionPart::fail(const std::string& why) {
   failure_ = why;
-  stage_ = MemberStage::kFailed;
+  take(SessionEvent::kBroken);
 }
 
 bool SessionPart::receive(const ReliableMessage& message, double now_s) {
@@ -281,13 +285,14 @@ bool SessionPart::receive(const ReliableMessage& message, double now_s) {
     case ReliableArrival::kNew:
       break;
   }
-  if (solver_) return pass_to_solver(message, now_s);
+  if (solver_ || stage() == MemberStage::kSolved) return pass_to_solver(message, now_s);
   store_early(message);
   return true;
 }
 
+// Once there is a solution, messages are no longer needed.
 bool SessionPart::pass_to_solver(const ReliableMessage& message, double now_s) {
-  if (!solver_->receive(message.sender.robot, *message.bytes)) return false;
+  if (solver_ && !solver_->receive(message.sender.robot, *message.bytes)) return false;
   channel_.take(message);
   last_activity_s_ = now_s;
   return true;
@@ -310,43 +315,12 @@ bool SessionPart::follow(const Session& session) {
   return ends;
 }
 
-void SessionPart::keep_only_results() {
-  if (solver_) results_ = results_of_solver();
-  solver_.reset();
-  graph_ = {};
-}
-
-SessionPart::Results SessionPart::results_of_solver() const {
-  return {state(), solver_->verdicts(), solver_->noise(), solver_->covariances(), solver_->poses()};
-}
-
 // Rounds are those of both looks.
-SolverState SessionPart::state() const {
-  const SolverState before = results_ ? results_->state : SolverState();
-  if (!solver_) return before;
+SolverState SessionPart::progress() const {
+  if (!solver_) return result_.state;
   SolverState state = solver_->state();
-  state.round += before.round;
+  state.round += result_.state.round;
   return state;
-}
-
-ClosureNoiseRecord SessionPart::noise() const {
-  if (solver_) return solver_->noise();
-  return results_ ? results_->noise : ClosureNoiseRecord();
-}
-
-std::vector<Matrix6> SessionPart::covariances() const {
-  if (solver_) return solver_->covariances();
-  return results_ ? results_->covariances : std::vector<Matrix6>();
-}
-
-ClosureVerdicts SessionPart::verdicts() const {
-  if (solver_) return solver_->verdicts();
-  return results_ ? results_->verdicts : ClosureVerdicts();
-}
-
-const std::vector<SE3>& SessionPart::poses() const {
-  if (solver_) return solver_->poses();
-  return results_ ? results_->poses : graph_.start;
 }
 
 }  // namespace km

@@ -15,6 +15,7 @@
 #include "modules/robust/session_graph.hpp"
 #include "modules/session/own_graph.hpp"
 #include "modules/session/reliable_channel.hpp"
+#include "modules/session/session_state.hpp"
 #include "modules/session/team_messages.hpp"
 
 namespace km {
@@ -45,7 +46,16 @@ struct FrozenPart {
 using MemberSolverFactory = std::function<std::unique_ptr<MemberSolver>(
     const Session& session, SessionGraph graph, TreePlace place)>;
 
-/// The part of one robot in one session, from joining it to its end, in stages.
+/// The part of one robot in the solution of a session.
+struct SessionResult {
+  SolverState state = {};
+  ClosureVerdicts verdicts = {};  ///< On all closures that this robot weighs.
+  ClosureNoiseRecord noise = {};
+  std::vector<Matrix6> covariances = {};  ///< At `poses`; empty if the solver computes none.
+  std::vector<SE3> poses = {};
+};
+
+/// The part of one robot in one session, from joining it to its end: see SessionState.
 ///
 /// First the robot enters the frame of the session. If it is in another frame, it waits for its
 /// neighbours that precede it in the order of the session, and is aligned to them. Its public poses
@@ -77,13 +87,13 @@ class SessionPart {
 
   /// Takes the newest message of the coordinator. True if it ends the session.
   bool follow(const Session& session);
-  /// Frees the solver and the graph, which take most of the memory of a session. Call once all
-  /// members have the solution. Afterwards this part only reports the results. Precondition:
-  /// stage() is kSolved.
-  void keep_only_results();
+  /// The session ends for this robot: all members have the solution, or it is interrupted.
+  void end(bool completed) {
+    take(completed ? SessionEvent::kCompleted : SessionEvent::kInterrupted);
+  }
 
-  /// nullopt before the robot has entered the frame.
-  [[nodiscard]] std::optional<MemberStage> stage() const { return stage_; }
+  [[nodiscard]] SessionState state() const { return state_; }
+  [[nodiscard]] std::optional<MemberStage> stage() const { return stage_of(state_); }
   [[nodiscard]] const std::string& failure() const { return failure_; }
   /// Poses that a member has sent in this session at `stage` or later; nullptr if there are none.
   [[nodiscard]] const MemberPoses* poses_of(const PublicPoses& published, RobotId robot,
@@ -100,16 +110,10 @@ class SessionPart {
   /// are the poses with which the solver of this robot begins, to the last bit.
   [[nodiscard]] std::vector<SinglePose> public_poses() const;
   [[nodiscard]] const std::vector<RobotId>& members() const { return place_.members; }
-  /// State of the solver; zeros before there is one.
-  [[nodiscard]] SolverState state() const;
-  /// The last verdicts of a solver on all closures that this robot weighs.
-  [[nodiscard]] ClosureVerdicts verdicts() const;
-  [[nodiscard]] ClosureNoiseRecord noise() const;
-  /// The poses that the solver has last accepted. Before there is a solver: the start. In the
-  /// frame of the session once there is a stage.
-  [[nodiscard]] const std::vector<SE3>& poses() const;
-  /// Covariances of poses() once the session is solved; empty if the solver computes none.
-  [[nodiscard]] std::vector<Matrix6> covariances() const;
+  /// Progress of the solver; zeros before there is one.
+  [[nodiscard]] SolverState progress() const;
+  /// That of the last solver that has finished.
+  [[nodiscard]] const SessionResult& result() const { return result_; }
   /// Time of the last activity or message of the session [s].
   [[nodiscard]] double last_activity_s() const { return last_activity_s_; }
   void note_activity(double now_s) { last_activity_s_ = now_s; }
@@ -124,6 +128,7 @@ class SessionPart {
   void round_public_poses();
   [[nodiscard]] bool align(const PublicPoses& published);
   [[nodiscard]] bool gather(const PublicPoses& published);
+  void take(SessionEvent event) { state_ = next_state(state_, event); }
   void start_solver(double now_s);
   void look_again();
   void reopen_closures();
@@ -131,16 +136,6 @@ class SessionPart {
   void store_early(const ReliableMessage& message);
   void solve(double now_s);
   void fail(const std::string& why);
-
-  // Results of a solver that has been freed.
-  struct Results {
-    SolverState state;
-    ClosureVerdicts verdicts;
-    ClosureNoiseRecord noise;
-    std::vector<Matrix6> covariances;
-    std::vector<SE3> poses;
-  };
-  [[nodiscard]] Results results_of_solver() const;
 
   Session session_;
   TeamPeer self_;
@@ -159,8 +154,8 @@ class SessionPart {
   std::vector<RobotId> refused_;  // senders of early messages that the solver refused
   std::vector<ReliableMessage> to_send_;
   std::unique_ptr<MemberSolver> solver_;
-  std::optional<Results> results_;  // results of the first look, then of the session
-  std::optional<MemberStage> stage_;
+  SessionResult result_;
+  SessionState state_ = SessionState::kEntering;
   std::string failure_;
   bool worked_ = false;
   double started_s_;

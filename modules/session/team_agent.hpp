@@ -3,40 +3,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
-#include <optional>
-#include <span>
 #include <string>
-#include <utility>
 #include <vector>
 
-#include "modules/core/closure_verdicts.hpp"
-#include "modules/core/team_links.hpp"
 #include "modules/core/team_solution.hpp"
-#include "modules/robust/fix_placement.hpp"
-#include "modules/robust/lone_solution.hpp"
-#include "modules/session/closure_decisions.hpp"
-#include "modules/session/frame_ties.hpp"
-#include "modules/session/own_graph.hpp"
-#include "modules/session/own_poses.hpp"
-#include "modules/session/pose_graph_config.hpp"
-#include "modules/session/refinement_schedule.hpp"
-#include "modules/session/session_part.hpp"
-#include "modules/session/session_schedule.hpp"
-#include "modules/session/team_messages.hpp"
-#include "modules/session/team_notices.hpp"
-#include "modules/session/team_roster.hpp"
+#include "modules/session/agent_state.hpp"
 
 namespace km {
-
-/// Outputs of a step of the agent, to other robots and to its own robot.
-struct [[nodiscard]] TeamOutput {
-  std::vector<TeamMessage> messages = {};
-  std::optional<Trajectory> trajectory = {};
-  std::optional<OptimizerProgress> progress = {};
-  std::optional<ClosureVerdicts> verdicts = {};  ///< After a session.
-  std::vector<std::string> notices = {};         ///< Messages for a person.
-  bool more = false;  ///< The next step has work even without further input.
-};
 
 /// The part of one robot in the pose graph optimisation of the team, as a state machine without
 /// threads and clocks.
@@ -102,11 +75,11 @@ class TeamAgent {
 
   /// Keyframe 0 is the first keyframe of the finished map with this identity; 0: there is no such
   /// map. Call before all other inputs.
-  void begin_in_map(std::uint64_t map_id) { map_id_ = map_id; }
+  void begin_in_map(std::uint64_t map_id) { state_.map_id = map_id; }
 
   /// This robot begins or ceases to receive another robot directly.
   void peer_alive(TeamPeer peer);
-  void peer_lost(RobotId robot) { direct_.erase(robot); }
+  void peer_lost(RobotId robot) { state_.direct.erase(robot); }
   /// The links of the team have changed. An older report than the last one is ignored.
   void update_links(const LinksReport& links);
 
@@ -125,145 +98,22 @@ class TeamAgent {
   TeamOutput step(double now_s, std::uint64_t sent_bytes);
 
   /// Own poses in frame(): the last result, and odometry since.
-  [[nodiscard]] const std::vector<SE3>& poses() const { return poses_.T_frame_kf(); }
-  [[nodiscard]] const TeamFrame& frame() const { return frame_.frame(); }
+  [[nodiscard]] const std::vector<SE3>& poses() const { return state_.poses.T_frame_kf(); }
+  [[nodiscard]] const TeamFrame& frame() const { return state_.frame.frame(); }
   /// The present or last session of this robot.
-  [[nodiscard]] const SessionPart* part() const { return part_ ? &*part_ : nullptr; }
+  [[nodiscard]] const SessionPart* part() const { return state_.part ? &*state_.part : nullptr; }
   /// False if the session of part() has ended.
-  [[nodiscard]] bool in_session() const {
-    return state_ == SessionState::kRunning || state_ == SessionState::kDeserted;
+  [[nodiscard]] bool in_session() const { return state_.in_session(); }
+  [[nodiscard]] const std::map<ClosureId, bool>& decided() const {
+    return state_.decisions.decided();
   }
-  [[nodiscard]] const std::map<ClosureId, bool>& decided() const { return decisions_.decided(); }
   /// Number of refusals by reason.
   [[nodiscard]] const std::map<std::string, std::size_t>& refused() const {
-    return notices_.refused();
+    return state_.notices.refused();
   }
 
  private:
-  struct Objective {
-    double cost = 0.0;
-    double gradient = 0.0;
-  };
-
-  enum class SessionState {
-    kNone,  // there has been no session
-    kRunning,
-    kDeserted,   // it runs, and a member has joined another session
-    kAbandoned,  // it ended without a solution of all members
-    kSolved,     // it ended, and all members have its solution
-  };
-
-  // Other robots and their messages.
-  void meet(const TeamPeer& peer);
-  void forget_measured(RobotId robot);
-  bool take(const TeamPeer& sender, const TeamStatus& status);
-  bool take(const TeamPeer& sender, const Session& session);
-  bool take(const TeamPeer& sender, const MemberPoses& poses);
-  bool take(const TeamPeer& sender, const ReliableMessage& message);
-  bool refuse(const std::string& what) { return notices_.refuse(what); }
-  [[nodiscard]] TeamStatus make_status();
-  void send_status(TeamOutput& output);
-
-  // Plans and sessions that this robot coordinates.
-  void make_plan();
-  void coordinate(TeamOutput& output);
-  [[nodiscard]] bool all_upright(const SessionPlan& plan) const;
-  [[nodiscard]] bool has_moved_on() const;
-  [[nodiscard]] bool should_open() const;
-  [[nodiscard]] std::uint64_t price_bytes() const;
-  [[nodiscard]] bool is_next_due() const;
-  void open_session(TeamOutput& output);
-  [[nodiscard]] TeamFrame choose_frame(const Session& session) const;
-  void announce(TeamOutput& output);
-  [[nodiscard]] bool well_formed(const Session& session) const;
-  [[nodiscard]] bool accepts(const Session& session) const;
-  void consider(const Session& session);
-
-  // The session that this robot is in.
-  bool join(const Session& session);
-  [[nodiscard]] std::optional<FrozenPart> freeze(const Session& session) const;
-  void set_start(const Session& session, SessionGraph& graph);
-  [[nodiscard]] const DecidedSolution& relaxed_own_start(const Session& session,
-                                                         SessionGraph graph);
-  [[nodiscard]] bool expects_false() const {
-    return config_.robust && config_.method == PgoMethod::kNewton;
-  }
-  [[nodiscard]] std::size_t known_closures() const;
-  [[nodiscard]] std::size_t closures_inside() const;
-  void refine_alone();
-  void advance(TeamOutput& output);
-  void publish_poses(TeamOutput& output);
-  void conclude(TeamOutput& output);
-  void leave(bool with_solution);
-  // Poses that a member has sent in the session of part_ at `stage` or later.
-  [[nodiscard]] const MemberPoses* poses_of(RobotId robot, MemberStage stage) const {
-    return part_->poses_of(roster_.public_poses(), robot, stage);
-  }
-  [[nodiscard]] bool all_solved() const { return part_->all_solved(roster_.public_poses()); }
-  [[nodiscard]] bool misses_member(const SessionPlan& plan) const;
-  [[nodiscard]] bool has_failed() const;
-  void decide(const std::vector<WeighedClosure>& verdicts);
-  void decide_with(const MemberPoses& poses);
-
-  // Results.
-  [[nodiscard]] std::map<KeyframeId, SE3> held_poses(const SE3& T_world_frame) const;
-  [[nodiscard]] std::optional<World> world_of(RobotId anchor) const;
-  [[nodiscard]] std::optional<World> tied_world() const;
-  [[nodiscard]] bool is_located() const;
-  [[nodiscard]] bool is_tied_to_earlier_runs() const;
-  [[nodiscard]] std::uint64_t own_datum() const;
-  [[nodiscard]] std::uint64_t datum_of(RobotId robot) const;
-  [[nodiscard]] std::optional<RobotId> robot_in_datum() const;
-  [[nodiscard]] std::optional<World> world_of_datum() const;
-  [[nodiscard]] std::optional<FixesState> fixes_state() const;
-  void publish(TeamOutput& output);
-  [[nodiscard]] Objective objective() const;
-  [[nodiscard]] OptimizerProgress make_progress() const;
-  [[nodiscard]] bool holds_all(const SessionPlan& plan) const;
-
-  PoseGraphConfig config_;
-  TeamPeer self_;
-  MemberSolverFactory factory_;
-  OwnGraph graph_;
-  std::uint64_t map_id_ = 0;           // 0: the run does not begin in a finished map
-  std::size_t awaited_keyframes_ = 1;  // nothing is optimised before
-  LinksReport links_;
-  std::map<RobotId, std::uint64_t> direct_;  // boot ids of the robots that are received directly
-  TeamRoster roster_;
-  StatusSchedule status_schedule_;
-  TeamNotices notices_;
-
-  SessionPlan plan_;  // from the present knowledge
-  bool plan_outdated_ = true;
-  SessionSchedule schedule_;
-  FrameTies ties_;                     // between the members of the plan
-  std::optional<SessionPlan> solved_;  // plan of the last session of several robots with a solution
-
-  OwnFrame frame_;
-  OwnPoses poses_;
-  // The start of this robot in a session, and what it follows from.
-  struct Relaxed {
-    std::uint32_t revision = 0;
-    bool upright = false;
-    bool alone = false;  // in a session of one robot
-    DecidedSolution start = {};
-  };
-  std::optional<Relaxed> relaxed_;
-  std::optional<RobotId> solution_anchor_;  // anchor of the last session with a solution
-  FixPlacement placement_;                  // in the present or last session
-  ClosureDecisions decisions_;
-  RefinementSchedule refinement_;
-  std::optional<SessionPart> part_;
-  SessionState state_ = SessionState::kNone;  // state of the session of part_
-  Objective objective_before_;                // in the session before
-  std::uint32_t rounds_before_ = 0;           // rounds of earlier sessions
-  double optimising_s_ = 0.0;                 // in earlier sessions
-  std::uint64_t sent_bytes_ = 0;              // for sessions
-
-  bool publish_due_ = false;
-  std::optional<RobotId> published_anchor_;
-  double now_s_ = 0.0;
-  double session_sent_s_ = -1e9;
+  AgentState state_;
 };
 
 }  // namespace km

@@ -7,6 +7,7 @@
 
 #include "modules/core/byte_archive.hpp"
 #include "modules/core/team_links.hpp"
+#include "modules/session/team_plan.hpp"
 
 namespace km {
 namespace {
@@ -23,36 +24,6 @@ constexpr std::size_t kMemberBytes = kPeerBytes + 1 + 1 + 8;
 constexpr std::size_t kPairBytes = 1 + 1 + 1 + 8;
 constexpr std::size_t kPoseBytes = 1 + 7 * 4;
 constexpr std::size_t kVerdictBytes = 4;
-
-// True if every parent is a member and none is its own ancestor. `robots` are the members,
-// ascending.
-bool is_tree(const std::vector<SessionMember>& members, const std::vector<RobotId>& robots) {
-  constexpr auto kRoot = std::numeric_limits<std::size_t>::max();
-  const auto place_of = [&robots](RobotId robot) -> std::size_t {
-    const auto found = std::lower_bound(robots.begin(), robots.end(), robot);
-    const auto place = static_cast<std::size_t>(found - robots.begin());
-    return found != robots.end() && *found == robot ? place : robots.size();
-  };
-  std::vector<std::size_t> parent_of(robots.size(), kRoot);
-  for (const SessionMember& member : members) {
-    if (!member.parent) continue;
-    const std::size_t parent = place_of(*member.parent);
-    if (parent == robots.size()) return false;
-    parent_of[place_of(member.peer.robot)] = parent;
-  }
-  // Walks up from each robot until a robot of an earlier walk; a robot of the same walk means a
-  // cycle.
-  std::vector<std::size_t> seen_by(robots.size(), kRoot);
-  for (std::size_t start = 0; start < robots.size(); ++start) {
-    std::size_t place = start;
-    while (place != kRoot && seen_by[place] == kRoot) {
-      seen_by[place] = start;
-      place = parent_of[place];
-    }
-    if (place != kRoot && seen_by[place] == start) return false;
-  }
-  return true;
-}
 
 // With the rotation as a quaternion.
 void describe_pose(auto& archive, As<SE3> auto& T) {
@@ -119,17 +90,7 @@ void describe(auto& archive, As<SessionPlan> auto& plan) {
   archive(plan.frame);
   archive.list(plan.members, kMaxTeam, kMemberBytes);
   archive.list(plan.pairs, kMaxTeam * (kMaxTeam - 1) / 2, kPairBytes);
-  std::vector<RobotId> robots;
-  for (const SessionMember& member : plan.members) robots.push_back(member.peer.robot);
-  std::ranges::sort(robots);
-  archive.require(!robots.empty() && std::ranges::adjacent_find(robots) == robots.end() &&
-                  is_tree(plan.members, robots));
-  const auto ends = [](const SessionPair& pair) { return std::pair(pair.a, pair.b); };
-  archive.require(std::ranges::adjacent_find(plan.pairs, std::ranges::greater_equal(), ends) ==
-                  plan.pairs.end());
-  for (const SessionPair& pair : plan.pairs)
-    archive.require(pair.a < pair.b && std::ranges::binary_search(robots, pair.a) &&
-                    std::ranges::binary_search(robots, pair.b));
+  if constexpr (kReads<decltype(archive)>) archive.require(is_well_formed(plan));
 }
 
 void describe(auto& archive, As<Session> auto& m) {
@@ -138,6 +99,8 @@ void describe(auto& archive, As<Session> auto& m) {
   archive(m.upright, m.max_rounds, m.anchor);
   archive.optional(m.T_frame_world, [&](auto& T) { describe_pose(archive, T); });
   archive(m.round, m.cost, m.gradient, m.finished);
+  if constexpr (kReads<decltype(archive)>)
+    archive.require(!archive.failed() && coordinator_of(m.plan) == m.id.coordinator.robot);
 }
 
 void describe(auto& archive, As<WeighedClosure> auto& verdict) {
@@ -169,7 +132,7 @@ void describe(auto& archive, As<MemberPoses> auto& m) {
       next = std::uint64_t{keyframe} + 1;
     });
   }
-  archive.require(m.keyframes.empty() || m.keyframes.front() == 0);
+  archive.require(!m.keyframes.empty() && m.keyframes.front() == 0);
   if constexpr (kReads<decltype(archive)>) m.T_frame_kf.resize(m.keyframes.size());
   for (auto& pose : m.T_frame_kf) archive(pose);
   archive.list(m.verdicts, kMaxPublicPoses, kVerdictBytes);

@@ -172,6 +172,16 @@ std::optional<TreePlace> place_in(const SessionPlan& plan, RobotId robot) {
   return place;
 }
 
+bool is_well_formed(const SessionPlan& plan) {
+  const auto ends = [](const SessionPair& pair) { return std::pair(pair.a, pair.b); };
+  return !plan.members.empty() && place_in(plan, plan.members.front().peer.robot) &&
+         std::ranges::adjacent_find(plan.pairs, std::ranges::greater_equal(), ends) ==
+             plan.pairs.end() &&
+         std::ranges::all_of(plan.pairs, [&](const SessionPair& pair) {
+           return pair.a < pair.b && plan.has_member(pair.a) && plan.has_member(pair.b);
+         });
+}
+
 bool same_graph(const SessionPlan& x, const SessionPlan& y) {
   const auto same = [](const SessionMember& a, const SessionMember& b) {
     return a.peer == b.peer && a.revision == b.revision && a.datum == b.datum;

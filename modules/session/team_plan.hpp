@@ -41,6 +41,10 @@ void plan_tree(SessionPlan& plan, const std::map<RobotId, TeamStatus>& statuses,
 /// the members do not form a tree.
 [[nodiscard]] std::optional<TreePlace> place_in(const SessionPlan& plan, RobotId robot);
 
+/// True if a plan that was received is in order: the parents of the members form a tree, and the
+/// pairs are ascending and between members.
+[[nodiscard]] bool is_well_formed(const SessionPlan& plan);
+
 /// True if both plans optimise the same edges of the same processes, in the same datums, regardless
 /// of order, frame and tree.
 [[nodiscard]] bool same_graph(const SessionPlan& x, const SessionPlan& y);

@@ -1,31 +1,10 @@
 #include "modules/session/team_roster.hpp"
 
-#include <algorithm>
-#include <cmath>
-#include <functional>
 #include <utility>
 
 #include "modules/tree_newton/vertical_prior.hpp"
 
 namespace km {
-
-bool is_well_formed(const MemberPoses& poses) {
-  const auto& keyframes = poses.keyframes;
-  const auto ascending = [](const std::vector<KeyframeIndex>& indices) {
-    return std::ranges::adjacent_find(indices, std::greater_equal<>()) == indices.end();
-  };
-  const Precision& step = poses.step_precision;
-  return !keyframes.empty() && keyframes.front() == 0 && ascending(keyframes) &&
-         ascending(poses.later_runs) && poses.T_frame_kf.size() == keyframes.size() &&
-         std::ranges::all_of(poses.T_frame_kf, [](const SinglePose& T) { return is_valid(T); }) &&
-         step.kappa > 0.0 && step.tau > 0.0 && std::isfinite(step.kappa + step.tau);
-}
-
-bool is_well_formed(const TeamStatus& status) {
-  const auto by_peer = [](const EdgeSetOffer& a, const EdgeSetOffer& b) { return a.peer < b.peer; };
-  return std::is_sorted(status.offers.begin(), status.offers.end(), by_peer) &&
-         status.T_odom_first.matrix().allFinite();
-}
 
 TeamRoster::Meeting TeamRoster::meet(const TeamPeer& peer) {
   const auto [entry, added] = peers_.try_emplace(peer.robot, Peer{.boot = peer.boot});

@@ -13,11 +13,6 @@
 
 namespace km {
 
-/// True if the content of a message of another robot, which is not trusted, fulfils all conditions
-/// on which this robot relies. Some of them are also checked when the message is decoded.
-[[nodiscard]] bool is_well_formed(const TeamStatus& status);
-[[nodiscard]] bool is_well_formed(const MemberPoses& poses);
-
 /// The other robots of a team as one robot knows them: their newest messages, and which of them
 /// links connect to it. Not thread-safe.
 class TeamRoster {

@@ -179,6 +179,7 @@ class TeamNetwork {
   void inject(TeamPeer from, RobotId to, const TeamMessage& message,
               std::optional<std::uint32_t> number = {}) {
     OverlayMessage injected = overlay_message(message);
+    const Decoded<TeamMessage> read = team_message(injected);
     if (number || is_state(injected.stream)) injected.number = number.value_or(++injected_);
     const auto introduction = std::make_shared<const OverlayMessage>(
         OverlayMessage{.origin = injected.origin, .content = {'r'}});
@@ -191,8 +192,9 @@ class TeamNetwork {
     output.delivered.clear();  // the message need not be one that can be decoded
     carry_out(robot, output);
     const auto* reliable = std::get_if<ReliableMessage>(&message);
-    if (arrival == OverlayArrival::kNew && (reliable == nullptr || reliable->to == to))
-      (void)robot.agent->receive(message);
+    if (arrival == OverlayArrival::kNew && read.value &&
+        (reliable == nullptr || reliable->to == to))
+      (void)robot.agent->receive(*read.value);
     robot.steps_now = busy_ = true;
   }
   /// As if `to` received a robot directly that is not in the network, or no longer.

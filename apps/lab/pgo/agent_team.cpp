@@ -298,7 +298,7 @@ class AgentTeam {
                      .kept = odometry_edges(graph_),
                      .settled = settled,
                      .seconds = seconds,
-                     .last = members_.front().agent->part()->state(),
+                     .last = members_.front().agent->part()->progress(),
                      .critical_path_s = critical_path_s_,
                      .bytes = bytes_,
                      .costs = {},

@@ -239,7 +239,7 @@ TEST_CASE("early stopping ends a session after the given rounds", "[pose_graph][
   TeamNetwork network;
   for (const RobotId id : kIds) feed(network.add({id, 1}, config, gather()), id, problem);
   REQUIRE(settle(network));
-  for (const RobotId id : kIds) CHECK(network.agent(id).part()->state().round == 2);
+  for (const RobotId id : kIds) CHECK(network.agent(id).part()->progress().round == 2);
 }
 
 TEST_CASE("robots with different methods optimise separately, with a notice",

@@ -132,7 +132,6 @@ TEST_CASE("Decoding restores an encoded message", "[pose_graph]") {
 
 TEST_CASE("Messages without optional content are valid", "[pose_graph]") {
   CHECK(round_trip(TeamStatus{.sender = kPeer2}).offers.empty());
-  CHECK(round_trip(MemberPoses{.sender = kPeer2}).keyframes.empty());
   Session session = some_session();
   session.T_frame_world.reset();
   CHECK_FALSE(round_trip(session).T_frame_world);
@@ -215,6 +214,8 @@ TEST_CASE("An inconsistent session is refused", "[pose_graph]") {
        {"a duplicate member", [](S& m) { m.plan.members[2].peer.robot = 2; }},
        {"a parent that is no member", [](S& m) { m.plan.members[0].parent = RobotId{8}; }},
        {"a member that is its own parent", [](S& m) { m.plan.members[1].parent = RobotId{2}; }},
+       {"two roots", [](S& m) { m.plan.members[0].parent.reset(); }},
+       {"another coordinator than the lowest member", [](S& m) { m.id.coordinator = kPeer7; }},
        {"a cycle of parents", [](S& m) { m.plan.members[1].parent = RobotId{60000}; }},
        {"a pair with a robot that is no member", [](S& m) { m.plan.pairs[2].b = 60001; }},
        {"a pair in the wrong order", [](S& m) { std::swap(m.plan.pairs[0].a, m.plan.pairs[0].b); }},
@@ -229,6 +230,7 @@ TEST_CASE("Invalid poses of a member are refused", "[pose_graph]") {
   check_refused<P>(
       some_poses(),
       {{"keyframes out of order", [](P& m) { std::swap(m.keyframes[1], m.keyframes[2]); }},
+       {"no keyframes", [](P& m) { m.keyframes.clear(), m.T_frame_kf.clear(); }},
        {"keyframe 0 is missing", [](P& m) { m.keyframes[0] = 1, m.keyframes[1] = 2; }},
        {"runs out of order", [](P& m) { std::swap(m.later_runs[0], m.later_runs[1]); }},
        {"fewer poses than keyframes", [](P& m) { m.T_frame_kf.pop_back(); }},
