@@ -140,6 +140,7 @@ class Watch {
                                     .awaits_peers = ended && awaits_peers(team)});
       robot_.set_settled(reported);
       absentees_.update(now_s, known_peers(), team);
+      unmet_ = robot_.bridge().peers().ask(&PeerTable::unmet);
       const auto running = [](const auto& peer) { return peer.phase == RobotPhase::kRunning; };
       if (reported.phase == RobotPhase::kSettled && std::ranges::none_of(present, running))
         robot_.expect_no_more_closures();
@@ -162,6 +163,7 @@ class Watch {
   [[nodiscard]] double seconds() const { return steady_now_s() - start_s_; }
   [[nodiscard]] const char* reason() const { return departure_.reason(); }
   [[nodiscard]] std::vector<MissedPeer> missed() const { return absentees_.missed(kSecondHand_s); }
+  [[nodiscard]] const std::map<std::string, std::string>& unmet() const { return unmet_; }
 
  private:
   static constexpr double kInterval_s = 1.0;  // between rows of a CSV, and status lines
@@ -271,6 +273,7 @@ class Watch {
   const double serve_limit_s_;
   Departure departure_;
   Absentees absentees_;
+  std::map<std::string, std::string> unmet_;
   double start_s_;
   GrowingFile traffic_file_;
   TrafficCsv traffic_csv_;
@@ -493,6 +496,7 @@ int conclude(const RobotOptions& options, const RobotConfig& config, Robot& robo
   watch->finish(record);
   RunEnd end = end_of(options, robot, result, watch->reason(), record);
   end.missed = watch->missed();
+  end.unmet = watch->unmet();
   RunSummary summary = summary_of(record);
   summary.name = options.name;
   summary.version = built_version();
@@ -517,6 +521,8 @@ int conclude(const RobotOptions& options, const RobotConfig& config, Robot& robo
   for (const MissedPeer& peer : end.missed)
     (peer.why == Absence::kSilent ? summary.lost_peers : summary.apart_peers)[peer.name] =
         peer.missed_s;
+  summary.unmet_peers = end.unmet;
+  summary.forged_announcements = robot.bridge().peers().ask(&PeerTable::forged_announcements);
   const std::map<RobotId, std::string> names = peer_names(robot);
   const auto by_name = [&names](const std::map<RobotId, std::uint64_t>& counts) {
     std::map<std::string, std::uint64_t> result;

@@ -109,13 +109,15 @@ std::string to_string(const ImageCounts& images) {
 namespace {
 
 // "bob (not received for 31.2 s), carol (received, but not in one frame for 7.0 s)"
-std::string names_of(const std::vector<MissedPeer>& missed) {
+std::string names_of(const RunEnd& end) {
   std::string text;
-  for (const MissedPeer& peer : missed)
+  for (const MissedPeer& peer : end.missed)
     text += (text.empty() ? "" : ", ") + peer.name +
             (peer.why == Absence::kSilent ? " (not received for "
                                           : " (received, but not in one frame for ") +
             fixed(peer.missed_s, 1) + " s)";
+  for (const auto& [name, why] : end.unmet)
+    text += (text.empty() ? "" : ", ") + name + " (never met: " + why + ')';
   return text;
 }
 
@@ -133,9 +135,8 @@ Verdict verdict_of_run(const RunEnd& end) {
   if (end.images && end.images->with_pose == 0)
     return {kNothingEstimated, why_no_pose(*end.images)};
   const std::string departure = end.departure != nullptr ? end.departure : "unknown";
-  if (end.missed.empty()) return {0, departure};
-  return {0,
-          (departure == kAllSettled ? "settled" : departure) + " without " + names_of(end.missed)};
+  if (end.missed.empty() && end.unmet.empty()) return {0, departure};
+  return {0, (departure == kAllSettled ? "settled" : departure) + " without " + names_of(end)};
 }
 
 }  // namespace

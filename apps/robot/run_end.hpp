@@ -120,6 +120,7 @@ struct RunEnd {
   /// By file, the reason why a result could not be written.
   std::map<std::string, std::string> lost_results = {};
   std::vector<MissedPeer> missed = {};  ///< Robots of the team that were missing at the end.
+  std::map<std::string, std::string> unmet = {};  ///< At the end: see PeerTable::unmet().
 };
 
 /// Exit code and reason, for people and for the process that started the robot.

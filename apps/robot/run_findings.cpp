@@ -189,6 +189,15 @@ class FindingsOfRun {
           std::to_string(keyframes) + " keyframes of " + name + " were matched by ORB",
           "their keypoints are described by another network or by none: fewer closures are found",
           "use one keyframe_features.network on all robots");
+    if (run_.forged_announcements > 0)
+      add(kWarning, "network.forged",
+          "the announcements of " + std::to_string(run_.forged_announcements) +
+              " robots were forged",
+          "a program in the network sends packets in the name of robots: they meet late or never",
+          "find the program; in a team without keys it can also send measurements (--security)");
+    for (const auto& [name, why] : run_.unmet_peers)
+      add(kWarning, "network.unmet", name + " was never met: " + why, "its messages were not used",
+          "kimera_multi_doctor --network examines the network");
     for (const auto& [name, seconds] : run_.lost_peers)
       add(kWarning, "link.lost",
           name + " was not received in the last " + fixed(seconds, 1) + " s of the run",

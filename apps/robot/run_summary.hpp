@@ -248,6 +248,9 @@ struct RunSummary {
   /// By name, robots that were received but not in one frame with this one, with the time of that
   /// state [s].
   std::map<std::string, double> apart_peers;
+  /// By name, robots that were announced or received, but never met, with the reason.
+  std::map<std::string, std::string> unmet_peers;
+  std::uint64_t forged_announcements = 0;  ///< Robots with contradicting announcements.
   /// By name, robots with another vocabulary, with the number of keyframes that could not be
   /// compared.
   std::map<std::string, std::uint64_t> other_vocabulary;
@@ -265,8 +268,9 @@ struct RunSummary {
                odometry, "localization", localization, "absolute_fixes", fixes, "holes", holes,
                "cameras", cameras, "mapping", mapping, "traffic", traffic, "held_back", held_back,
                "process", process, "seconds", seconds, "lost_peers", lost_peers, "apart_peers",
-               apart_peers, "other_vocabulary", other_vocabulary, "other_network", other_network,
-               "exit_reason", exit_reason, "findings", findings);
+               apart_peers, "unmet_peers", unmet_peers, "forged_announcements",
+               forged_announcements, "other_vocabulary", other_vocabulary, "other_network",
+               other_network, "exit_reason", exit_reason, "findings", findings);
   }
 };
 

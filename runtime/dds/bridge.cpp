@@ -31,8 +31,7 @@ TopicSpec key_topic() {
 }
 
 // Null without keys.
-std::unique_ptr<OutgoingTopic> make_key_topic(const DdsParticipant& participant,
-                                              const Peers& peers) {
+std::unique_ptr<OutgoingTopic> make_key_topic(const DdsParticipant& participant, Peers& peers) {
   if (participant.seal() == nullptr) return nullptr;
   return std::make_unique<OutgoingTopic>(participant, peers, key_topic());
 }
@@ -205,7 +204,14 @@ void DdsBridge::receive_until_stopped() {
       if (triggered[i] >= kFirstTopic)
         incoming_[static_cast<std::size_t>(triggered[i] - kFirstTopic)]->take(now_s);
     for (const auto& topic : incoming_) topic->recall(now_s);
-    if (const auto interface = participant_.new_interface(now_s)) move_to(*interface);
+    if (const auto interface = participant_.new_interface(now_s)) {
+      move_to(*interface);
+    } else if (participant_.can_move() && peers_.take_isolation(now_s)) {
+      log::warn("dds")
+          << "robots are announced, but nothing arrives from them: if the announcements "
+             "are forged, a new participant helps";
+      move_to(NetworkInterface(participant_.interface()));
+    }
   }
 }
 

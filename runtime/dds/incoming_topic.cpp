@@ -122,14 +122,26 @@ void IncomingTopic::arrive(const ddsi_serdata& serialized, dds_instance_handle_t
   *envelope = {};
   if (!ddsi_serdata_to_sample(&serialized, envelope.get(), nullptr, nullptr))
     return refuse("not deserializable");
+  if (is_announcement(spec_.kind, envelope->key)) return announce(*envelope, *guid);
   // Messages of a writer stay in order behind its waiting messages.
-  const Peers::Claim claim = peers_.claim_of(*guid);
+  Peers::Claim claim = peers_.claim_of(*guid);
+  if (claim.later) {
+    receive_claim(*envelope, *guid, claim, now_s);
+    claim = peers_.claim_of(*guid);
+  }
   if (!waiting_.contains(*guid) && is_settled(claim.standing))
     return admit(std::move(envelope), *guid, claim, now_s);
   receive_claim(*envelope, *guid, claim, now_s);
   const std::size_t bytes = kept_bytes(*envelope);
   if (!waiting_.push(*guid, std::move(envelope), bytes, now_s))
     refuse("too many messages from a robot that is not known yet");
+}
+
+void IncomingTopic::announce(const km_wire_Envelope& envelope, const Guid& writer) {
+  const auto bytes = elements_of(envelope.content, spec_.max_bytes);
+  if (!bytes) return refuse("larger than its topic allows");
+  peers_.announced(writer, {reinterpret_cast<const char*>(bytes->data()), bytes->size()},
+                   envelope.key == kAskingAnnouncement);
 }
 
 void IncomingTopic::recall(double now_s) {
@@ -140,8 +152,7 @@ void IncomingTopic::recall(double now_s) {
       return true;
     }
     if (claim.standing == Standing::kArriving || waited_s < kPatience_s) return false;
-    refuse(claim.standing == Standing::kRival ? "claims another robot's id"
-                                              : "its sender is not a known robot");
+    refuse("its sender is not a known robot, or has not proven its identity");
     return true;
   };
   while (waiting_.serve(now_s, take) > 0) {
@@ -178,19 +189,22 @@ void IncomingTopic::file(Received envelope, const TeamPeer& sender, const Guid& 
   if (!fits) refuse("no room for it");
 }
 
-// Handles a status of a participant that is not (yet) the robot it claims to be. The status of a
-// twin states how long the twin has been running. In a team with keys the seal proves the sender.
+// Handles a status of a participant that is not (yet) the robot it claims to be, or that was later
+// announced as another one. The status of a twin states how long the twin has been running. In a
+// team with keys the seal proves the sender.
 void IncomingTopic::receive_claim(const km_wire_Envelope& envelope, const Guid& writer,
                                   const Peers::Claim& claim, double now_s) {
   if (spec_.kind != TopicKind::kStatus) return;
-  if (claim.standing != Standing::kRival && claim.standing != Standing::kTwin) return;
-  if (TeamPeer{envelope.robot, envelope.boot} != claim.sender) return;
+  const TeamPeer named{envelope.robot, envelope.boot};
+  const bool is_twin = claim.standing == Standing::kTwin && named == claim.sender;
+  const bool is_claim = claim.standing == Standing::kRival && named == claim.sender;
+  if (!is_twin && !is_claim && named != claim.later) return;
   if (open(envelope, writer).how.status != Opened::Status::kOpened) return;
-  if (claim.standing == Standing::kTwin) {
+  if (is_twin) {
     peers_.tell(&PeerTable::twin_received, writer, kStatusPeriod_s * envelope.number,
                 now_s - started_s_);
   } else {
-    peers_.tell(&PeerTable::prove, writer);
+    peers_.tell(&PeerTable::prove, writer, named);
   }
 }
 

@@ -109,6 +109,7 @@ class IncomingTopic {
 
   DdsEntity make_reader();
   void arrive(const ddsi_serdata& serialized, dds_instance_handle_t writer, double now_s);
+  void announce(const km_wire_Envelope& envelope, const Guid& writer);
   bool is_settled(Standing standing) const;
   void admit(Received envelope, const Guid& writer, const Peers::Claim& claim, double now_s);
   void file(Received envelope, const TeamPeer& sender, const Guid& writer, double now_s);

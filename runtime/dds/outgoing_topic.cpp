@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "runtime/clock.hpp"
 #include "runtime/dds/envelope.hpp"
 #include "runtime/dds/qos.hpp"
 #include "runtime/log.hpp"
@@ -28,7 +29,7 @@ std::string partition_of(const TeamPeer& peer, bool is_sealed) {
          std::to_string(is_sealed ? peer.boot : peer.boot >> kResumeBits);
 }
 
-OutgoingTopic::OutgoingTopic(const DdsParticipant& participant, const Peers& peers, TopicSpec spec)
+OutgoingTopic::OutgoingTopic(const DdsParticipant& participant, Peers& peers, TopicSpec spec)
     : participant_(participant), peers_(peers), spec_(std::move(spec)) {
   open();
 }
@@ -145,10 +146,24 @@ void OutgoingTopic::write(std::optional<Addressee> addressee, MessageKey key, Oc
   const auto receiver = addressee ? receiver_of(*addressee) : std::nullopt;
   if (addressee && !receiver) return;
   Writer& writer = writer_to(receiver);
-  if (!is_kept()) return send(writer, key, std::move(content));
+  if (!is_kept()) {
+    send(writer, key, std::move(content));
+    if (spec_.kind == TopicKind::kStatus) announce(writer);
+    return;
+  }
   writer.kept[key] = std::move(content);
   writer.due.insert(key);
   send_due(writer);
+}
+
+void OutgoingTopic::announce(Writer& writer) {
+  using enum Peers::AnnouncementDue;
+  const auto due = peers_.take_announcement_due(steady_now_s());
+  if (due == kNo) return;
+  const SharedSeal* seal = participant_.seal();
+  const std::string data =
+      to_user_data(participant_.identity(), seal == nullptr ? std::string() : seal->credentials());
+  send(writer, due == kAsks ? kAskingAnnouncement : kAnnouncement, {data.begin(), data.end()});
 }
 
 void OutgoingTopic::catch_up(RobotId robot) {
@@ -195,8 +210,10 @@ void OutgoingTopic::send(Writer& writer, MessageKey key, Octets content) {
                             .version = spec_.version,
                             .robot = participant_.identity().robot,
                             .content = {}};
-  const char* problem =
-      content.size() > spec_.max_bytes ? "too large" : seal(writer, envelope, content);
+  const bool announces = is_announcement(spec_.kind, key);
+  const char* problem = content.size() > spec_.max_bytes ? "too large"
+                        : announces                      ? nullptr
+                                                         : seal(writer, envelope, content);
   if (problem == nullptr) {
     borrow(envelope.content, content);
     const dds_return_t result = dds_write(writer.writer.handle(), &envelope);
@@ -212,7 +229,7 @@ void OutgoingTopic::send(Writer& writer, MessageKey key, Octets content) {
     ++not_written_[problem];
     return;
   }
-  ++number;
+  if (!announces) ++number;  // the number of statuses is a time, see PeerTable::twin_received()
   const std::uint64_t size = envelope_bytes(content.size());
   writer.written.add(size);
   add_to_history(writer, key, size);

@@ -32,6 +32,13 @@ struct TopicSpec {
   bool carries_keys = false;  ///< Messages of this topic are sealed separately.
 };
 
+/// Keys of the messages in the status topic by which a robot announces itself: they are not sealed,
+/// and their content is the USER_DATA of its participant. See Peers::take_announcement_due().
+inline constexpr MessageKey kAnnouncement = 1, kAskingAnnouncement = 2;
+[[nodiscard]] constexpr bool is_announcement(TopicKind kind, MessageKey key) {
+  return kind == TopicKind::kStatus && (key == kAnnouncement || key == kAskingAnnouncement);
+}
+
 /// Receiver of a message.
 struct Addressee {
   RobotId robot = 0;
@@ -57,7 +64,7 @@ struct Addressee {
 /// threads hold DdsParticipant::use().
 class OutgoingTopic {
  public:
-  OutgoingTopic(const DdsParticipant& participant, const Peers& peers, TopicSpec spec);
+  OutgoingTopic(const DdsParticipant& participant, Peers& peers, TopicSpec spec);
 
   /// Writes to a robot or to all, sealed where the team has keys. Messages are numbered per writer.
   /// Content that DDS refuses, or that no reader would accept, is counted and logged. Messages for
@@ -137,6 +144,7 @@ class OutgoingTopic {
   void renew(const std::optional<TeamPeer>& receiver);
   [[nodiscard]] std::vector<Saved> saved(dds_entity_t reader, const Writer& writer) const;
   void send_due(Writer& writer);
+  void announce(Writer& writer);
   void send(Writer& writer, MessageKey key, Octets content);
   const char* seal(const Writer& writer, const km_wire_Envelope& head, Octets& content) const;
   void refresh_readers(Writer& writer);
@@ -144,7 +152,7 @@ class OutgoingTopic {
   static std::uint64_t retransmitted_bytes(const Writer& writer);
 
   const DdsParticipant& participant_;
-  const Peers& peers_;
+  Peers& peers_;
   TopicSpec spec_;
   DdsEntity topic_;
   bool newcomers_ = false;

@@ -79,6 +79,8 @@ class DdsParticipant {
   /// of the former participant are gone then. Precondition: the caller has use_alone(). Throws
   /// DdsError.
   void move_to(const NetworkInterface& interface);
+  /// False while it waits for its interface, or if it shares its domain.
+  [[nodiscard]] bool can_move() const { return choice_ && !choice_->waits(); }
   /// Number of calls of move_to(). Call with use().
   [[nodiscard]] std::uint64_t moves() const { return moves_; }
 

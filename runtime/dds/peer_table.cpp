@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <tuple>
 
 namespace km {
@@ -50,29 +51,59 @@ bool PeerTable::is_arriving(RobotId robot) const {
 void PeerTable::participant(const Guid& guid, std::string_view user_data,
                             const std::string& addresses) {
   Participant& participant = remember(guid);
-  participant.addresses = addresses;
-  if (std::exchange(participant.announced, true)) return;
-  if (!claims_to_be_a_robot(user_data)) return;
+  if (!addresses.empty()) participant.addresses = addresses;
+  const std::size_t data =
+      claims_to_be_a_robot(user_data) ? std::hash<std::string_view>()(user_data) | 2U : 1U;
+  const std::size_t former = std::exchange(participant.data, data);
+  const bool is_first = !std::exchange(participant.announced, true);
+  if (!is_first && former == data && participant.refusal.empty()) return;
 
+  // A robot announces the same data as long as its participant exists.
+  const bool contradicts = former != 0 && former != data;
+  const bool is_news = contradicts && !std::exchange(participant.forged, true);
+  if (data != 1U) take_announcement(guid, participant, user_data);
+  if (!is_news) return;
+  ++forged_;
+  const RobotIdentity identity = participant.identity.value_or(RobotIdentity());
+  events_.push_back(
+      {PeerEventKind::kRefused, identity,
+       "forged announcements: the participant " +
+           (participant.identity ? "of " + to_string(identity) + ' ' : std::string()) + "at " +
+           participant.addresses + " is announced with contradicting data"});
+}
+
+// Empty if the announced robot is accepted.
+std::string PeerTable::why_refused(const Announcement& announcement) const {
+  const auto& [identity, credentials] = announcement;
+  if (identity.protocol != self_.protocol)
+    return "uses protocol version " + std::to_string(identity.protocol) + ", this robot " +
+           std::to_string(self_.protocol);
+  if (!admit_)
+    return credentials.empty() ? "" : "it has keys of a team, and this robot has none (--security)";
+  const char* reason = admit_(identity, credentials);
+  return reason == nullptr ? "" : reason;
+}
+
+void PeerTable::take_announcement(const Guid& guid, Participant& participant,
+                                  std::string_view user_data) {
   const auto decoded = parse_user_data(user_data);
-  if (!decoded.value) {
-    const RobotIdentity unreadable;
-    const std::string text = "a robot at " + addresses + " refused: " + decoded.refusal;
-    events_.push_back({PeerEventKind::kRefused, unreadable, text});
+  const RobotIdentity identity = decoded.value ? decoded.value->identity : RobotIdentity();
+  const std::string refusal = decoded.value ? why_refused(*decoded.value) : decoded.refusal;
+  if (!refusal.empty()) {
+    if (participant.identity || std::exchange(participant.refusal, refusal) == refusal) return;
+    if (!participant.forged)
+      events_.push_back(
+          {PeerEventKind::kRefused, identity,
+           (decoded.value ? to_string(identity) : "a robot at " + participant.addresses) +
+               " refused: " + refusal});
     return;
   }
-  const auto& [identity, credentials] = *decoded.value;
-  // Any program can send an announcement in the name of a participant, but only a robot can prove
-  // its identity.
-  if (admit_ && participant.proven && identity != *participant.identity)
-    return emit(PeerEventKind::kRefused, identity,
-                "refused: announced as the participant of " + to_string(*participant.identity));
-  if (identity.protocol != self_.protocol)
-    return emit(PeerEventKind::kRefused, identity,
-                "refused: uses protocol version " + std::to_string(identity.protocol) +
-                    ", this robot " + std::to_string(self_.protocol));
-  if (const char* reason = admit_ ? admit_(identity, credentials) : nullptr)
-    return emit(PeerEventKind::kRefused, identity, std::string("refused: ") + reason);
+  participant.refusal.clear();
+  participant.later.reset();
+  if (participant.identity && *participant.identity != identity) {
+    participant.later = identity;
+    return;
+  }
   participant.identity = identity;
   participant.proven |= !admit_;
   appear_if_there(guid, participant);
@@ -82,7 +113,9 @@ void PeerTable::network_changed() {
   std::erase_if(participants_, [this](const auto& entry) {
     return !is_robot(entry.first, entry.second);  // robots are remembered
   });
-  for (auto& [guid, participant] : participants_) participant.announced = participant.alive = false;
+  for (auto& [guid, participant] : participants_) {
+    participant.announced = participant.alive = participant.was_alive = false;
+  }
   for (auto& [robot, known] : peers_)
     if (known.peer.state == PeerState::kAlive) {
       known.peer.state = PeerState::kLost;
@@ -109,11 +142,21 @@ void PeerTable::expel(const std::vector<TeamPeer>& processes) {
   }
 }
 
-void PeerTable::prove(const Guid& guid) {
+void PeerTable::prove(const Guid& guid, const TeamPeer& process) {
   const auto found = participants_.find(guid);
   if (found == participants_.end() || !found->second.identity) return;
-  if (std::exchange(found->second.proven, true)) return;
-  appear_if_there(guid, found->second);
+  Participant& participant = found->second;
+  if (later_claim_of(guid) == process) {
+    const bool was_alive = participant.alive;
+    give_way(guid, PeerState::kLost, PeerEventKind::kLost, "lost: its announcement was forged");
+    participant.identity = std::exchange(participant.later, std::nullopt);
+    participant.alive = was_alive;
+    participant.proven = false;
+  }
+  if (TeamPeer{participant.identity->robot, participant.identity->boot} != process ||
+      std::exchange(participant.proven, true))
+    return;
+  appear_if_there(guid, participant);
 }
 
 void PeerTable::restart_handled(const TeamPeer& restarted) {
@@ -130,6 +173,7 @@ void PeerTable::participant_gone(const Guid& guid) {
 
 void PeerTable::alive(const Guid& guid) {
   Participant& participant = remember(guid);
+  participant.was_alive = true;
   if (std::exchange(participant.alive, true)) return;
   participant.arrival = ++arrivals_;
   appear_if_there(guid, participant);
@@ -193,6 +237,55 @@ Standing PeerTable::standing(const Guid& guid) const {
   const auto known = peers_.find(participant.identity->robot);
   if (known == peers_.end() || known->second.guid != guid) return Standing::kRival;
   return known->second.arriving ? Standing::kArriving : Standing::kAdmitted;
+}
+
+std::optional<TeamPeer> PeerTable::later_claim_of(const Guid& guid) const {
+  const auto found = participants_.find(guid);
+  if (found == participants_.end() || !found->second.later) return std::nullopt;
+  return TeamPeer{found->second.later->robot, found->second.later->boot};
+}
+
+bool PeerTable::receives_strangers() const {
+  return std::ranges::any_of(participants_, [this](const auto& entry) {
+    return entry.second.alive && why_unmet(entry.first, entry.second) != nullptr;
+  });
+}
+
+bool PeerTable::is_isolated() const {
+  const auto is_alive = [](const auto& entry) {
+    return entry.second.peer.state == PeerState::kAlive;
+  };
+  return std::ranges::none_of(peers_, is_alive) &&
+         std::ranges::any_of(participants_, [this](const auto& entry) {
+           return !entry.second.alive && why_unmet(entry.first, entry.second) != nullptr;
+         });
+}
+
+std::map<std::string, std::string> PeerTable::unmet() const {
+  std::map<std::string, std::string> unmet;
+  for (const auto& [guid, participant] : participants_)
+    if (const char* why = why_unmet(guid, participant))
+      unmet[participant.identity ? to_string(*participant.identity)
+                                 : "a robot at " + participant.addresses] = why;
+  return unmet;
+}
+
+// Null for a robot of the team, present or lost, and for programs that are no robots.
+const char* PeerTable::why_unmet(const Guid& guid, const Participant& participant) const {
+  const bool is_mute = participant.announced && !participant.was_alive && participant.identity;
+  if (!is_mute && !participant.alive) return nullptr;
+  // A forged packet can keep the former participant of a process.
+  const RobotIdentity identity = participant.identity.value_or(RobotIdentity());
+  if (is_mute && is_current({identity.robot, identity.boot})) return nullptr;
+  const Standing standing = this->standing(guid);
+  if (standing == Standing::kTwin || standing == Standing::kAdmitted ||
+      standing == Standing::kArriving ||
+      (participant.alive && participant.identity && participant.proven))
+    return nullptr;
+  if (participant.forged) return "its announcements are forged";
+  if (!participant.refusal.empty()) return participant.refusal.c_str();
+  if (is_mute) return "it is announced, but nothing arrives from it";
+  return participant.identity ? "it has not proven its identity" : "it is not announced as a robot";
 }
 
 std::optional<TeamPeer> PeerTable::current(RobotId robot) const {

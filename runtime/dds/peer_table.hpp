@@ -35,7 +35,7 @@ enum class PeerEventKind {
   kRestarted,  ///< Same robot id, another incarnation: its keyframe indices now mean other
                ///< keyframes. With boot id 0: another robot has taken the place of this one.
   kRefused,    ///< Ignored because of another protocol version, unreadable user data, refused
-               ///< keys, too many robots, or the id of a present robot.
+               ///< keys, too many robots, the id of a present robot, or forged announcements.
   kConflict,   ///< This robot's id belongs to a robot that had it first: this one must end.
 };
 
@@ -62,10 +62,13 @@ struct PeerEvent {
 /// origin. Memory is bounded, independent of what other participants announce.
 ///
 /// A robot is present while its participant's user data is accepted and its status writer alive;
-/// the expiry of the participant (dds.lease_s) changes nothing. An id belongs to the first process
-/// that is received with it, as long as this process is received; then to the next process. If
-/// there are kMaxRobots, a new robot takes the place of the one that has been lost for longest, and
-/// waits if all are present. A robot that has lost its place joins again like a new one.
+/// the expiry of the participant (dds.lease_s) changes nothing. Any program can forge
+/// announcements, so a participant may be announced with several identities. It has the first
+/// accepted one, until one of its statuses names the last accepted one: see prove(). An id belongs
+/// to the first process that is received with it, as long as this process is received; then to the
+/// next process. If there are kMaxRobots, a new robot takes the place of the one that has been lost
+/// for longest, and waits if all are present. A robot that has lost its place joins again like a
+/// new one.
 ///
 /// Any program can announce participants, so only kMaxParticipants are remembered. A further one
 /// takes the place of the oldest participant that is neither alive nor a robot of the team. Not
@@ -97,7 +100,7 @@ class PeerTable {
   /// known.
   void reported(const RobotIdentity& identity);
 
-  /// A participant announced itself (again) with this user data.
+  /// A participant announced itself (again) with this user data. Empty addresses: as before.
   void participant(const Guid& guid, std::string_view user_data, const std::string& addresses);
   void participant_gone(const Guid& guid);
   /// False if its announcement was not received, or discarded in favour of others. Once the
@@ -111,8 +114,9 @@ class PeerTable {
   /// refused.
   void expel(const std::vector<TeamPeer>& processes);
 
-  /// Notes that a message has proven the identity of the participant.
-  void prove(const Guid& guid);
+  /// Notes that a status of the participant names this process; with `admit`, that its seal has
+  /// proven this. Changes nothing if the participant was not announced as this process.
+  void prove(const Guid& guid, const TeamPeer& process);
 
   /// Notes that all nodes have handled the event of this process; only then are its messages
   /// delivered.
@@ -140,6 +144,22 @@ class PeerTable {
 
   [[nodiscard]] Standing standing(const Guid& guid) const;
 
+  /// The last accepted announcement of the participant, if it contradicts identity_of().
+  [[nodiscard]] std::optional<TeamPeer> later_claim_of(const Guid& guid) const;
+
+  /// True if statuses of participants arrive that are no robots of the team.
+  [[nodiscard]] bool receives_strangers() const;
+
+  /// True if no robot is received, although robots are announced that never were. Forged
+  /// announcements with other addresses have this effect.
+  [[nodiscard]] bool is_isolated() const;
+
+  /// Such participants, by name or address, with the reason.
+  [[nodiscard]] std::map<std::string, std::string> unmet() const;
+
+  /// Number of participants that were announced with contradicting data.
+  [[nodiscard]] std::size_t forged_announcements() const { return forged_; }
+
   /// The process that has this id, or had it last.
   [[nodiscard]] std::optional<TeamPeer> current(RobotId robot) const;
   /// True unless another process has taken the id over since.
@@ -155,10 +175,15 @@ class PeerTable {
   };
   struct Participant {
     std::optional<RobotIdentity> identity;  // identity; nullopt until accepted
+    std::optional<RobotIdentity> later;     // last accepted identity, if it contradicts the first
     std::string addresses;
+    std::string refusal;   // reason of the last refusal; empty once an identity is accepted
+    std::size_t data = 0;  // hash of the last user data; 0: none, 1: not that of a robot
+    bool forged = false;   // announced with contradicting data
     bool announced = false;
     bool proven = false;  // also after DDS reports its end, which any program can forge
     bool alive = false;
+    bool was_alive = false;
     bool warned = false;  // it was logged that it has to wait for its id or a place
     std::optional<Twin> twin;
     std::uint64_t arrival = 0;  // order of first reports, or of becoming alive
@@ -171,6 +196,9 @@ class PeerTable {
     std::vector<std::uint64_t> former = {};  // boot ids of former processes, oldest first
   };
 
+  [[nodiscard]] const char* why_unmet(const Guid& guid, const Participant& participant) const;
+  [[nodiscard]] std::string why_refused(const Announcement& announcement) const;
+  void take_announcement(const Guid& guid, Participant& participant, std::string_view user_data);
   void appear_if_there(const Guid& guid, Participant& participant);
   void appear(const Guid& guid, Participant& participant);
   [[nodiscard]] bool is_former(const KnownPeer& known, const RobotIdentity& identity) const;
@@ -189,6 +217,7 @@ class PeerTable {
   std::map<Guid, Participant> participants_;
   std::map<RobotId, KnownPeer> peers_;
   std::uint64_t arrivals_ = 0;
+  std::size_t forged_ = 0;
   std::vector<PeerEvent> events_;
 };
 

@@ -15,6 +15,16 @@ namespace {
 
 constexpr std::uint32_t kNews =
     DDS_NOT_READ_SAMPLE_STATE | DDS_ANY_VIEW_STATE | DDS_ANY_INSTANCE_STATE;
+// Robots of a team with keys are unknown senders for about a second, until they exchange their
+// keys.
+constexpr double kStrange_s = 3.0;
+constexpr double kAnnouncementPeriod_s = 5.0;  // shortest interval between announcements in the
+                                               // status topic
+// Time without any robot after which a robot renews its participant [s]: far above the time of
+// discovery, first often, because an attack is short, then rarely.
+constexpr double kIsolated_s = 15.0;
+constexpr double kIsolatedLater_s = 60.0;
+constexpr int kOftenRenewed = 6;
 constexpr std::size_t kMaxEvents = 1024;  // maximum number of waiting events, because any
                                           // participant can cause them
 
@@ -154,7 +164,43 @@ void Peers::listen(dds_listener_t* listener) {
 Peers::Claim Peers::claim_of(const Guid& guid) const {
   const std::lock_guard lock(mutex_);
   const auto identity = table_.identity_of(guid);
-  return {table_.standing(guid), identity ? TeamPeer{identity->robot, identity->boot} : TeamPeer{}};
+  return {table_.standing(guid), identity ? TeamPeer{identity->robot, identity->boot} : TeamPeer{},
+          table_.later_claim_of(guid)};
+}
+
+Peers::AnnouncementDue Peers::take_announcement_due(double now_s) {
+  const std::lock_guard lock(mutex_);
+  if (!table_.receives_strangers())
+    strangers_since_s_.reset();
+  else if (!strangers_since_s_)
+    strangers_since_s_ = now_s;
+  const bool asks = strangers_since_s_ && now_s - *strangers_since_s_ >= kStrange_s;
+  if ((!asks && askers_.empty()) || now_s < next_announcement_s_) return AnnouncementDue::kNo;
+  next_announcement_s_ = now_s + kAnnouncementPeriod_s;
+  for (const Guid& guid : std::exchange(askers_, {}))
+    if (const auto identity = table_.identity_of(guid); identity && seal_ != nullptr)
+      admitted_.push_back({identity->robot, identity->boot});
+  return asks ? AnnouncementDue::kAsks : AnnouncementDue::kAnswers;
+}
+
+bool Peers::take_isolation(double now_s) {
+  const std::lock_guard lock(mutex_);
+  if (!table_.is_isolated()) {
+    isolated_since_s_.reset();
+    return false;
+  }
+  if (!isolated_since_s_) isolated_since_s_ = now_s;
+  const double patience_s = renewals_ < kOftenRenewed ? kIsolated_s : kIsolatedLater_s;
+  if (now_s - *isolated_since_s_ < patience_s) return false;
+  isolated_since_s_.reset();
+  ++renewals_;
+  return true;
+}
+
+void Peers::announced(const Guid& guid, std::string_view user_data, bool asks) {
+  tell(&PeerTable::participant, guid, user_data, std::string());
+  const std::lock_guard lock(mutex_);
+  if (asks && askers_.size() < PeerTable::kMaxParticipants) askers_.insert(guid);
 }
 
 // Runs on a thread of DDS, once per change: only notes it.

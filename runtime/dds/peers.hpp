@@ -6,6 +6,8 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <set>
+#include <string_view>
 #include <type_traits>
 #include <vector>
 
@@ -88,9 +90,23 @@ class Peers {
   /// Handling of the messages of a participant, and its claimed identity.
   struct Claim {
     Standing standing = Standing::kUnknown;
-    TeamPeer sender;  ///< Set for a robot: neither kUnknown nor kOutsider.
+    TeamPeer sender;                     ///< Set for a robot: neither kUnknown nor kOutsider.
+    std::optional<TeamPeer> later = {};  ///< See PeerTable::later_claim_of().
   };
   [[nodiscard]] Claim claim_of(const Guid& guid) const;
+
+  /// Any program can forge the announcements that DDS carries, and DDS then drops the true ones.
+  /// While statuses of unknown senders arrive, a robot therefore announces itself in its status
+  /// topic, and asks for answers, with the keys of this process. Returns whether to announce itself
+  /// now: kAsks if others shall answer.
+  enum class AnnouncementDue { kNo, kAnswers, kAsks };
+  [[nodiscard]] AnnouncementDue take_announcement_due(double now_s);
+  /// Handles such an announcement of a participant.
+  void announced(const Guid& guid, std::string_view user_data, bool asks);
+
+  /// True if PeerTable::is_isolated() has held for long: DdsParticipant::move_to() the same
+  /// interface then discards what DDS has taken from forged announcements.
+  [[nodiscard]] bool take_isolation(double now_s);
 
   /// Processes whose credentials were admitted since the last call: they need the key of this
   /// process.
@@ -139,6 +155,11 @@ class Peers {
   mutable std::mutex mutex_;  // guards the members below, up to changes_
   PeerTable table_;
   std::vector<TeamPeer> admitted_;
+  std::set<Guid> askers_;  // since the last announcement
+  std::optional<double> strangers_since_s_;
+  std::optional<double> isolated_since_s_;
+  int renewals_ = 0;  // number of new participants
+  double next_announcement_s_ = 0.0;
   std::deque<LivelinessChange> changes_;
   const WriterBook* status_writers_ = nullptr;
   DdsEntity liveliness_changed_;  // guard condition

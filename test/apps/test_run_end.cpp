@@ -167,6 +167,9 @@ TEST_CASE("A run is judged by the gravest that happened to it", "[run_end]") {
        0,
        "time limit for serving peers without bob (not received for 31.2 s), carol (received, but "
        "not in one frame for 7.0 s)"},
+      {{[](RunEnd& end) { end.unmet["dora"] = "its announcements are forged"; }},
+       0,
+       "settled without dora (never met: its announcements are forged)"},
       {{miss_both, interrupt}, 0, "interrupted"},  // before it could leave
       {{lose_results},
        4,

@@ -34,6 +34,8 @@ struct Filler {
       value = static_cast<T>(std::is_floating_point_v<T> ? number / 7.0 : number);
     else if constexpr (requires { value.append("x"); })
       value = "text \"" + std::to_string(number) + "\"\n";
+    else if constexpr (requires { value["x"].append("x"); })
+      value["x"] = "text";
     else if constexpr (requires { value["x"]; })
       value["x"] = static_cast<typename T::mapped_type>(std::numeric_limits<std::uint64_t>::max() -
                                                         static_cast<std::uint64_t>(number));
@@ -101,7 +103,8 @@ TEST_CASE("summary.json has the keys that others read", "[robot][summary]") {
         "/process/system_s /process/page_faults /process/peak_memory_bytes "
         "/process/memory_at_start_bytes "
         "/process/memory_at_end_bytes /process/memory_growth_bytes_per_minute "
-        "/seconds /lost_peers/x /apart_peers/x /other_vocabulary/x /other_network/x "
+        "/seconds /lost_peers/x /apart_peers/x /unmet_peers/x "
+        "/forged_announcements /other_vocabulary/x /other_network/x "
         "/exit_reason "
         "/findings/0/id /findings/0/severity /findings/0/what /findings/0/means /findings/0/to_do "
         "/findings/1/id /findings/1/severity /findings/1/what /findings/1/means "

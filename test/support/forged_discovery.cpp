@@ -84,6 +84,19 @@ void ForgedDiscovery::dispose(int robot) {
   send(packet);
 }
 
+void ForgedDiscovery::contradict(int robot) {
+  Packet packet = recorded_.at(robot);
+  // Sequence number of the DATA of the writer of participants: 32 high bits, 32 low bits.
+  constexpr std::array<std::uint8_t, 4> kWriter{0, 1, 0, 0xc2};
+  const auto number = std::ranges::search(packet, kWriter).end();
+  constexpr std::array<std::uint8_t, 8> kHigh{0, 0, 0, 0, 0, 0, 1, 0};
+  std::ranges::copy(kHigh, number);
+  constexpr std::array<std::uint8_t, 6> kRobot{'r', 'o', 'b', 'o', 't', '='};
+  constexpr std::array<std::uint8_t, 6> kLiar{'l', 'i', 'a', 'r', '!', '='};
+  std::ranges::copy(kLiar, std::ranges::search(packet, kRobot).begin());
+  send(packet);
+}
+
 void ForgedDiscovery::invent(int robot, std::size_t count) {
   Packet packet = recorded_.at(robot);
   // Parameter PID_PARTICIPANT_LEASE_DURATION, whose value are seconds and a fraction.

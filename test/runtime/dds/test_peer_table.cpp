@@ -135,7 +135,7 @@ TEST_CASE("A robot that has proven its identity returns without another proof", 
   table.alive(guid(2));
   CHECK(kinds(table).empty());
   CHECK(table.standing(guid(2)) == Standing::kRival);
-  table.prove(guid(2));
+  table.prove(guid(2), {7, 70});
   CHECK(kinds(table) == Kinds{PeerEventKind::kJoined});
   std::string announced = data_of(7, 70);
   SECTION("after its lease has ended, or a forged packet has ended it") {
@@ -152,7 +152,11 @@ TEST_CASE("A robot that has proven its identity returns without another proof", 
     announced = GENERATE(data_of(9, 90), data_of(7, 71), std::string("robot=x"), std::string());
     CAPTURE(announced);
     table.participant(guid(2), announced, "");
-    CHECK(kinds(table) == Kinds(announced.empty() ? 0 : 1, PeerEventKind::kRefused));
+    const std::vector<PeerEvent> events = table.take_events();
+    REQUIRE(events.size() == 1);
+    CHECK(events[0].kind == PeerEventKind::kRefused);
+    CHECK_THAT(events[0].text, Catch::StartsWith("forged announcements"));
+    CHECK(table.forged_announcements() == 1);
     CHECK(table.identity_of(guid(2))->boot == 70);
   }
   table.participant(guid(2), announced, "");
@@ -170,6 +174,71 @@ TEST_CASE("An identity under the GUID of a gone participant needs a proof of its
   table.alive(guid(2));
   CHECK(kinds(table).empty());
   CHECK(table.standing(guid(2)) == Standing::kRival);
+}
+
+TEST_CASE("A robot that was first announced with forged data joins once it announces itself",
+          "[peers]") {
+  const bool has_keys = GENERATE(true, false);
+  const std::string forged = GENERATE(std::string("liar!=3"), std::string("robot=x"),
+                                      data_of(9, 90), data_of(7, 71), data_of(kSelf.robot, 5));
+  CAPTURE(has_keys, forged);
+  PeerTable table(kSelf, has_keys ? admit_all : PeerTable::Admit());
+  table.participant(guid(2), forged, "udp/10.0.0.7");
+  table.alive(guid(2));
+  (void)table.take_events();
+  CHECK(table.is_current({7, 70}) == false);
+  table.participant(guid(2), data_of(7, 70), "");
+  table.prove(guid(2), {7, 70});
+  CHECK(table.standing(guid(2)) == Standing::kAdmitted);
+  CHECK(table.is_current({7, 70}));
+  CHECK(table.unmet().empty());
+  CHECK(table.forged_announcements() == 1);
+  table.participant(guid(2), forged, "udp/10.0.0.7");
+  table.prove(guid(2), {7, 70});
+  CHECK(table.standing(guid(2)) == Standing::kAdmitted);
+  CHECK(table.forged_announcements() == 1);
+}
+
+TEST_CASE("A participant whose statuses arrive is unmet until it is a robot of the team",
+          "[peers]") {
+  PeerTable table(kSelf, GENERATE(true, false) ? admit_all : PeerTable::Admit());
+  const auto [data, name, why] =
+      GENERATE(Catch::Generators::table<std::string, std::string, std::string>(
+          {{"robot=x", "a robot at udp/10.0.0.7", "user data lacks a field"},
+           {"", "a robot at udp/10.0.0.7", "it is not announced as a robot"},
+           {data_of(7, 70, kProtocolVersion + 1), "a robot at udp/10.0.0.7",
+            "uses protocol version " + std::to_string(kProtocolVersion + 1) + ", this robot " +
+                std::to_string(kProtocolVersion)}}));
+  table.participant(guid(2), data, "udp/10.0.0.7");
+  CHECK(table.unmet().empty());
+  CHECK_FALSE(table.is_isolated());
+  table.alive(guid(2));
+  CHECK(table.receives_strangers());
+  CHECK(table.unmet() == std::map<std::string, std::string>{{name, why}});
+  table.participant(guid(2), data_of(7, 70), "");
+  table.prove(guid(2), {7, 70});
+  CHECK(table.unmet().empty());
+}
+
+TEST_CASE("A robot is isolated while robots are announced and none is received", "[peers]") {
+  PeerTable table(kSelf);
+  table.participant(guid(2), data_of(7, 70), "");
+  CHECK(table.is_isolated());
+  CHECK_FALSE(table.receives_strangers());
+  CHECK(table.unmet().begin()->second == "it is announced, but nothing arrives from it");
+  table.alive(guid(2));
+  CHECK_FALSE(table.is_isolated());
+  table.silent(guid(2));
+  CHECK_FALSE(table.is_isolated());
+}
+
+TEST_CASE("A robot without keys ignores one that has keys and the same id", "[peers]") {
+  PeerTable table(kSelf);
+  table.participant(guid(2), to_user_data({kSelf.robot, "peer", kProtocolVersion, 70}, "abc"), "");
+  table.alive(guid(2));
+  table.twin_received(guid(2), 100.0, 2.0);
+  CHECK(kinds(table) == Kinds{PeerEventKind::kRefused});
+  CHECK(table.standing(guid(2)) == Standing::kOutsider);
 }
 
 constexpr std::uint64_t kBoot = 70U << kResumeBits;
@@ -257,7 +326,7 @@ TEST_CASE("With keys a former process does not get its id back", "[peers]") {
   const auto receive = [&](const Guid& from, std::uint64_t boot) {
     table.participant(from, data_of(7, boot), "udp/10.0.0.66");
     table.alive(from);
-    table.prove(from);
+    table.prove(from, {7, boot});
   };
   const std::uint64_t former = GENERATE(kBoot, kOtherIncarnation);
   receive(guid(2), former);
@@ -368,7 +437,7 @@ TEST_CASE("Participants outside the team do not take the place of a robot, howev
   const auto be_alive = [&] {
     table.alive(guid(2));
     if (!table.is_announced(guid(2))) announce();
-    table.prove(guid(2));
+    table.prove(guid(2), {7, 70});
   };
   SECTION("before it comes") {
     announce_strangers(table, strangers, alive);

@@ -1,4 +1,6 @@
 #include <catch2/catch.hpp>
+#include <chrono>
+#include <thread>
 
 #include "test/runtime/dds/peer_process.hpp"
 #include "test/support/forged_discovery.hpp"
@@ -25,6 +27,36 @@ TEST_CASE("Robots with keys return after a forged packet has declared that they 
   CHECK(b->wait_for("ping 3 99"));
   b->send_line("one 3 7");
   CHECK(a->wait_for("one 4 7"));
+}
+
+TEST_CASE("Robots meet after forged packets have replaced the announcement of one of them",
+          "[dds][processes]") {
+  const auto settings =
+      own_team() + std::vector<std::string>{"interface=lo", "spdp_interval_s=0.2"};
+  const TeamOfTwo keys;
+  const bool has_keys = GENERATE(true, false);
+  CAPTURE(has_keys);
+  const auto start = [&](RobotId id) {
+    return start_peer(id, settings, 0, has_keys ? keys.of(id) : std::filesystem::path());
+  };
+  const auto a = start(3);
+  ForgedDiscovery stranger(loopback_config().domain);
+  stranger.record(3);
+  std::jthread forger([&](const std::stop_token& stop) {
+    while (!stop.stop_requested()) {
+      stranger.contradict(3);
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+  });
+  const auto b = start(4);
+  std::this_thread::sleep_for(std::chrono::seconds(1));
+  forger.request_stop();
+  forger.join();
+  CHECK(b->wait_for("joined 3"));
+  CHECK(b->wait_for("refused 3"));
+  CHECK(a->wait_for("joined 4"));
+  a->send_line("ping 0 9");
+  CHECK(b->wait_for("ping 3 9"));
 }
 
 TEST_CASE("Robots meet although a program has announced more participants than they remember",
