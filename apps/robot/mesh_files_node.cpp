@@ -1,5 +1,8 @@
 #include "apps/robot/mesh_files_node.hpp"
 
+#include <algorithm>
+#include <cmath>
+#include <limits>
 #include <utility>
 
 #include "apps/result_files.hpp"
@@ -25,10 +28,29 @@ void write_map_2d(const std::filesystem::path& folder, const char* name, const c
   results.write(folder / name, [&](const auto& file) { write_file(file, map_yaml(map, image)); });
 }
 
+// Without the faces that leave the plan. Vertices outside are no numbers, which no grid contains.
+LabelledMesh cropped(LabelledMesh mesh, const Eigen::AlignedBox2f& plan) {
+  for (Eigen::Vector3f& vertex : mesh.vertices)
+    if (!plan.contains(vertex.head<2>()))
+      vertex.setConstant(std::numeric_limits<float>::quiet_NaN());
+  std::erase_if(mesh.faces, [&](const LabelledMesh::Face& face) {
+    return std::ranges::any_of(face, [&](auto v) { return std::isnan(mesh.vertices[v].x()); });
+  });
+  return mesh;
+}
+
 // The 2D map of the team is made of the fused mesh alone, so that all robots have the same.
 void write_team_map_2d(const std::filesystem::path& folder, const Map2dConfig& config,
                        const TeamMap& team, const LabelPalette& palette, ResultWriter& results) {
   Map2dResult map = make_map_2d(config, {team.mesh, palette});
+  if (map.status == Map2dStatus::kTooLarge) {
+    const Eigen::AlignedBox2f plan = plan_of(team.extents, config.resolution_m, kMaxMap2dCells);
+    map = make_map_2d(config, {cropped(team.mesh, plan), palette});
+    for (const auto& [robot, extent] : team.extents)
+      if (!plan.isEmpty() && !plan.contains({extent.min().head<2>(), extent.max().head<2>()}))
+        log::warn("robot") << "the 2D map of the team lacks the part of robot " << robot
+                           << ": with it, it has more than 16 million cells";
+  }
   map.grid.anchor = team.anchor;
   if (map.status == Map2dStatus::kMade)
     return write_map_2d(folder, kTeamMap2d, kTeamMap2dImage, map.grid, results);
@@ -107,8 +129,9 @@ void write_team_map(const std::filesystem::path& folder, const Map2dConfig& conf
     log::warn("robot") << "the map of the team lacks " << map.other_frames
                        << " chunks in frames of robots that have not joined";
   if (map.left_out > 0)
-    log::warn("robot") << "the map of the team lacks " << map.left_out << " boxes of "
-                       << kMaxMapBoxes + map.left_out << ": its voxels are too small";
+    log::warn("robot") << "the map of the team lacks " << map.left_out << " boxes above "
+                       << kMaxMapBoxes
+                       << ": its voxels are too small, or a robot's map is too large";
 }
 
 }  // namespace km

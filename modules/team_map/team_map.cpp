@@ -60,12 +60,14 @@ bool is_left_out(const Eigen::AlignedBox3f& bounds, const SurfaceFusion& fusion)
 // Chunks by the boxes that their faces may change, in ascending order of their keys.
 using ChunksOfBoxes = std::map<Box, std::vector<const PlacedChunk*>>;
 
-void enter(const PlacedChunk& chunk, const SurfaceFusion& fusion, ChunksOfBoxes& boxes) {
+void enter(const PlacedChunk& chunk, const SurfaceFusion& fusion, ChunksOfBoxes& boxes,
+           Eigen::AlignedBox3f& extent) {
   std::pair<Box, Box> last;
   bool is_first = true;
   for (const MeshChunk::Triple& face : chunk.chunk->faces) {
     const Eigen::AlignedBox3f bounds = bounds_of(corners_of(chunk, face), fusion.reach_m());
     if (is_left_out(bounds, fusion)) continue;
+    extent.extend(bounds);
     const std::pair<Box, Box> range{fusion.box_of(bounds.min()), fusion.box_of(bounds.max())};
     // Neighbours in the list are usually neighbours in space.
     if (!std::exchange(is_first, false) && range == last) continue;
@@ -144,20 +146,66 @@ std::optional<double> stated_voxel_m(const std::vector<PlacedChunk>& chunks) {
   return static_cast<double>(sizes[sizes.size() / 2]);  // the coarser of two
 }
 
-// The anchor of most chunks; the lowest of several.
-RobotId anchor_of(const std::vector<PlacedChunk>& chunks) {
-  std::map<RobotId, std::size_t> counts;
-  for (const PlacedChunk& chunk : chunks) ++counts[chunk.anchor];
+// The key with the largest value, the lowest of several; 0 without any.
+template <typename Value>
+RobotId most_of(const std::map<RobotId, Value>& values) {
   const auto most = std::ranges::max_element(
-      counts, [](const auto& a, const auto& b) { return a.second < b.second; });
-  return most == counts.end() ? RobotId{0} : most->first;
+      values, [](const auto& a, const auto& b) { return a.second < b.second; });
+  return most == values.end() ? RobotId{0} : most->first;
+}
+
+RobotId anchor_of(const std::vector<PlacedChunk>& chunks) {
+  std::map<RobotId, std::map<RobotId, std::size_t>> of_robot;
+  std::map<RobotId, std::pair<std::size_t, std::size_t>> votes;  // robots, chunks
+  for (const PlacedChunk& chunk : chunks) {
+    ++of_robot[chunk.chunk->key.robot][chunk.anchor];
+    ++votes[chunk.anchor].second;
+  }
+  for (const auto& [robot, anchors] : of_robot) ++votes[most_of(anchors)].first;
+  return most_of(votes);
+}
+
+// Largest share of one robot, for counts of all robots with a larger sum than `total`.
+std::size_t share_of(std::vector<std::size_t> counts, std::size_t total) {
+  std::ranges::sort(counts);
+  std::size_t share = total;
+  for (std::size_t k = 0; k < counts.size(); ++k) {
+    share = total / (counts.size() - k);
+    if (counts[k] > share) break;
+    total -= counts[k];
+  }
+  return share;
+}
+
+// Bounds the number of boxes, see fuse_chunks(). Returns the number of boxes that robots lose.
+std::size_t limit(ChunksOfBoxes& boxes, std::size_t max_boxes) {
+  if (boxes.size() <= max_boxes) return 0;
+  std::map<RobotId, std::size_t> counts, taken;
+  const auto for_each_robot = [](const std::vector<const PlacedChunk*>& near, const auto& action) {
+    for (std::size_t k = 0; k < near.size(); ++k)
+      if (k == 0 || near[k]->chunk->key.robot != near[k - 1]->chunk->key.robot)
+        action(near[k]->chunk->key.robot);
+  };
+  for (const auto& [box, near] : boxes)
+    for_each_robot(near, [&](RobotId robot) { ++counts[robot]; });
+  std::vector<std::size_t> sizes;
+  for (const auto& [robot, count] : counts) sizes.push_back(count);
+  const std::size_t share = share_of(sizes, max_boxes);
+  std::size_t lost = 0;
+  for (auto& [box, near] : boxes) {
+    for_each_robot(near, [&](RobotId robot) { lost += ++taken[robot] > share ? 1U : 0U; });
+    std::erase_if(
+        near, [&](const PlacedChunk* placed) { return taken[placed->chunk->key.robot] > share; });
+  }
+  std::erase_if(boxes, [](const auto& entry) { return entry.second.empty(); });
+  return lost;
 }
 
 }  // namespace
 
-TeamMap fuse_chunks(const std::vector<PlacedChunk>& chunks, double voxel_m) {
+TeamMap fuse_chunks(const std::vector<PlacedChunk>& chunks, double voxel_m, std::size_t max_boxes) {
   SurfaceFusion fusion(stated_voxel_m(chunks).value_or(voxel_m));
-  TeamMap map{.anchor = anchor_of(chunks), .mesh = {}};
+  TeamMap map{.anchor = anchor_of(chunks), .mesh = {}, .extents = {}};
   ChunksOfBoxes boxes;
   bool is_labelled = false, is_coloured = false;
   for (const PlacedChunk& chunk : chunks) {
@@ -165,20 +213,51 @@ TeamMap fuse_chunks(const std::vector<PlacedChunk>& chunks, double voxel_m) {
       ++map.other_frames;
       continue;
     }
-    enter(chunk, fusion, boxes);
+    enter(chunk, fusion, boxes, map.extents[chunk.chunk->key.robot]);
     is_labelled = is_labelled || !chunk.chunk->labels.empty();
     is_coloured = is_coloured || !chunk.chunk->colors.empty();
   }
+  std::erase_if(map.extents, [](const auto& entry) { return entry.second.isEmpty(); });
+  map.left_out = limit(boxes, max_boxes);
   BoxJoiner joiner(map.mesh);
-  std::size_t fused = 0;
-  for (const auto& [box, near] : boxes) {
-    if (++fused > kMaxMapBoxes) break;
+  for (const auto& [box, near] : boxes)
     joiner.append(fusion.fuse(box, surfaces_near(box, near, fusion)));
-  }
-  map.left_out = boxes.size() - std::min(boxes.size(), kMaxMapBoxes);
   if (!is_labelled) map.mesh.labels.clear();
   if (!is_coloured) map.mesh.colors.clear();
   return map;
+}
+
+Eigen::AlignedBox2f plan_of(const std::map<RobotId, Eigen::AlignedBox3f>& extents, double cell_m,
+                            double max_cells) {
+  const auto plan = [](const Eigen::AlignedBox3f& extent) {
+    return Eigen::AlignedBox2f(extent.min().head<2>(), extent.max().head<2>());
+  };
+  const auto cells = [cell_m](const Eigen::AlignedBox2f& box) {
+    return (box.sizes().cast<double>() / cell_m).array().ceil().prod();
+  };
+  Eigen::AlignedBox2f best;
+  std::size_t most = 0;
+  for (const auto& [seed, extent] : extents) {
+    Eigen::AlignedBox2f around;
+    std::map<RobotId, Eigen::AlignedBox3f> others = extents;
+    std::size_t count = 0;
+    for (RobotId next = seed;; ++count) {
+      const Eigen::AlignedBox2f grown = around.merged(plan(others.at(next)));
+      if (cells(grown) > max_cells) break;
+      around = grown;
+      others.erase(next);
+      if (others.empty()) {
+        ++count;
+        break;
+      }
+      next = std::ranges::min_element(others, {}, [&](const auto& other) {
+               return cells(around.merged(plan(other.second)));
+             })->first;
+    }
+    if (count > most) best = around;
+    most = std::max(most, count);
+  }
+  return best;
 }
 
 LabelledMesh resampled(const LabelledMesh& mesh, double voxel_m) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <random>
 #include <vector>
 
@@ -119,6 +120,51 @@ TEST_CASE("A face of a size that no mapper makes is left out", "[team_map]") {
   chunk.faces = {{0, 1, 2}};
   CHECK(fuse_chunks({place(chunk, nullptr)}, kMapVoxel_m).mesh.empty());
   CHECK(fuse_chunks({}, kMapVoxel_m).mesh.empty());
+}
+
+TEST_CASE("A robot with many chunks does not decide the frame of three", "[team_map]") {
+  TeamMesh team;
+  add_all(team, {chunks_of(floor_from(0.0F, 0.0F), 1, 1, 1).front(),
+                 chunks_of(floor_from(0.0F, 0.0F), 2, 1, 1).front()});
+  add_all(team, chunks_of(floor_from(0.0F, 1.0F), 0, 1, 0));
+  const TeamMap map = fuse_chunks(team.placed(), kMapVoxel_m);
+  CHECK(map.anchor == 1);
+  CHECK(map.extents.size() == 2);
+}
+
+TEST_CASE("A robot with too many boxes loses its own", "[team_map]") {
+  TeamMesh alone, team;
+  for (TeamMesh* both : {&alone, &team}) add_all(*both, chunks_of(floor_from(0.0F, 0.0F), 5));
+  const LabelledMesh whole = fused(alone);
+  for (const float from_m : {-80.0F, -70.0F, 70.0F, 80.0F})
+    add_all(team, chunks_of(floor_from(from_m, 0.0F), static_cast<RobotId>(from_m > 0.0F ? 9 : 1)));
+  const TeamMap all = fuse_chunks(team.placed(), kMapVoxel_m);
+  CHECK(all.left_out == 0);
+  const TeamMap map = fuse_chunks(team.placed(), kMapVoxel_m, 80);
+  CHECK(map.left_out > 0);
+  CHECK(map.mesh.faces.size() < all.mesh.faces.size());
+  const auto is_whole_part = [](const LabelledMesh& mesh, const LabelledMesh::Face& face) {
+    return std::abs(mesh.vertices[face[0]].x()) < 10.0F;
+  };
+  CHECK(std::ranges::count_if(map.mesh.faces, [&](const auto& face) {
+          return is_whole_part(map.mesh, face);
+        }) == static_cast<std::ptrdiff_t>(whole.faces.size()));
+}
+
+TEST_CASE("The plan of a map leaves out a robot far away", "[team_map]") {
+  const auto extent = [](float from_m, float size_m) {
+    return Eigen::AlignedBox3f(Eigen::Vector3f::Constant(from_m),
+                               Eigen::Vector3f::Constant(from_m + size_m));
+  };
+  using Extents = std::map<RobotId, Eigen::AlignedBox3f>;
+  const auto [liar, far] = GENERATE_REF(table<RobotId, Eigen::AlignedBox3f>(
+      {{0, extent(1e6F, 1.0F)}, {4, extent(1e6F, 1.0F)}, {2, extent(-5e5F, 1e6F)}}));
+  Extents extents{{1, extent(0.0F, 20.0F)}, {3, extent(15.0F, 20.0F)}};
+  extents[liar] = far;
+  const Eigen::AlignedBox2f plan = plan_of(extents, 0.05, 16e6);
+  CHECK(plan.min() == Eigen::Vector2f(0.0F, 0.0F));
+  CHECK(plan.max() == Eigen::Vector2f(35.0F, 35.0F));
+  CHECK(plan_of({{1, extent(0.0F, 1e6F)}}, 0.05, 16e6).isEmpty());
 }
 
 TEST_CASE("A mesh in larger voxels has the same shape with fewer faces", "[team_map]") {
