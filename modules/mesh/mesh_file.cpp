@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <cstdlib>
 #include <fstream>
+#include <iomanip>
 #include <istream>
 #include <map>
 #include <sstream>
@@ -108,8 +109,9 @@ bool parse_line(const std::string& line, PlyHeader& header, bool& has_format) {
 PlyHeader read_ply_header(std::istream& stream) {
   PlyHeader header;
   bool has_format = false;
-  std::string line;
-  for (int number = 1; std::getline(stream, line); ++number) {
+  std::array<char, 4096> buffer;
+  for (int number = 1; stream.getline(buffer.data(), buffer.size()); ++number) {
+    std::string line(buffer.data());
     if (!line.empty() && line.back() == '\r') line.pop_back();
     if (number == 1) {
       if (line != "ply") throw std::runtime_error("line 1: not a PLY file");
@@ -134,7 +136,8 @@ class Body {
   double next(PlyType type) {
     if (format_ == PlyFormat::kAscii) {
       std::string word;  // operator>> of a double refuses "nan"
-      if (!(stream_ >> word)) throw std::runtime_error("ends before its last element");
+      if (!(stream_ >> std::setw(kMaxWord) >> word))
+        throw std::runtime_error("ends before its last element");
       char* end = nullptr;
       const double value = std::strtod(word.c_str(), &end);
       if (*end != '\0') throw std::runtime_error("'" + word.substr(0, 20) + "' is not a number");
@@ -172,6 +175,8 @@ class Body {
       std::reverse(bytes.begin(), bytes.end());
     return std::bit_cast<T>(bytes);
   }
+
+  static constexpr int kMaxWord = 400;  // length of a number
 
   std::istream& stream_;
   PlyFormat format_;

@@ -93,6 +93,7 @@ TEST_CASE("A file that is no mesh is refused with the file and the reason") {
   };
   refuses("", "end_header");
   refuses("solid stl\n", "not a PLY file");
+  refuses("ply\n" + std::string(5000, 'x') + "\nend_header\n", "header without end_header");
   refuses("ply\nformat ascii 2.0\nelement vertex many\n", "line 3: bad element");
   refuses("ply\nelement vertex 0\nproperty float x\nend_header\n", "format");
   refuses("ply\nformat ascii 1.0\nelement void 99999999999\nend_header\n", "without properties");
