@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "modules/absolute_fixes/absolute_fixes_config.hpp"
-#include "modules/constellations/constellations_config.hpp"
 #include "modules/core/config.hpp"
 #include "modules/core/ids.hpp"
 #include "modules/dense_sensing/segmentation_config.hpp"
@@ -171,7 +170,6 @@ struct RobotConfig {
   Map2dConfig map_2d;
   MapSharingConfig map;
   ObjectsConfig objects;
-  ConstellationsConfig constellations;
   ViewConfig view;
 
   std::string effective;  ///< YAML text of a file with this configuration.
@@ -181,8 +179,7 @@ struct RobotConfig {
     const auto visit_all = [&](auto&... sections) { (visit(sections), ...); };
     visit_all(run, dds, budget, sensors, ros, tracker, vio, keyframe_features, place_recognition,
               loop_closure, pcm, pose_graph, absolute_fixes, graph_playback, mapping, stereo_depth,
-              segmentation, semantic_mapping, mesh_deformation, map_2d, map, objects,
-              constellations, view);
+              segmentation, semantic_mapping, mesh_deformation, map_2d, map, objects, view);
   }
 };
 

@@ -100,7 +100,6 @@ Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput 
   }
   if (mapping && !mapping->palette.classes().empty() && config.objects.on)
     add_objects(config.objects, mapping->palette, options.output, results);
-  if (objects_ != nullptr && config.constellations.on) add_constellations(config.constellations);
   add_network(share_meshes(config, mapping ? mapping->palette : LabelPalette()));
   add_records();
   add_view(config, camera);

@@ -268,7 +268,6 @@ class Robot {
   [[nodiscard]] CrossingEnds share_meshes(const RobotConfig& robot, const LabelPalette& palette);
   void add_objects(const ObjectsConfig& config, const LabelPalette& palette,
                    const std::filesystem::path& folder, ResultWriter& results);
-  void add_constellations(const ConstellationsConfig& config);
   void add_playback(const RobotConfig& config, double rate, RecordedGraph graph);
   void add_loop_closure(const RobotConfig& config);
   void add_back_end(const RobotConfig& config, int dimension);

@@ -115,14 +115,10 @@ void Robot::add_objects(const ObjectsConfig& config, const LabelPalette& palette
   topics_.joint_objects.subscribe([this, folder, &results](const auto& objects) {
     write_objects(folder, *objects, objects_->palette(), results);
   });
-}
-
-// Call after add_objects().
-void Robot::add_constellations(const ConstellationsConfig& config) {
   topics_.keyframes.subscribe(
       [this](const auto& keyframe) { objects_->learn(keyframe->odometry); });
   constellations_ =
-      &add<ConstellationsNode>(false, config, identity_.robot,
+      &add<ConstellationsNode>(false, identity_.robot,
                                ConstellationsTopics{.own_objects = topics_.sent_objects,
                                                     .peer_objects = topics_.objects.from_peers(),
                                                     .closures = topics_.closures,

@@ -7,7 +7,6 @@
 #include <stdexcept>
 #include <string>
 
-#include "modules/constellations/chance_match.hpp"
 #include "modules/constellations/constellation_pose.hpp"
 #include "modules/outlier_rejection/clique_search.hpp"
 
@@ -28,18 +27,20 @@ constexpr double kHalfStep_rad = kPi / kWindows;
 // the gate.
 constexpr double kSameTransform = 2.0;
 
-// Share of the evidence of the best set that a second one may have, and of its pairs. In a row of n
-// equal objects at equal distances, the second set has n - 1 pairs.
-constexpr double kMaxSecondEvidence = 0.5;
+// Share of the pairs of the best set that a second one may have. In a row of n equal objects at
+// equal distances, the second set has n - 1 pairs.
 constexpr double kMaxSecondPairs = 0.6;
+
+// Smallest set that a search looks for: two pairs always have a transform.
+constexpr std::size_t kLeastPairs = 3;
 
 // Sides of one object in two maps differ by no more than this, plus half of the larger one.
 constexpr double kSizeMargin_m = 0.3;
 constexpr double kSizeShare = 0.5;
 
-// Largest number of associations. Bounds the time for maps of equal objects, which have no answer:
-// 31 objects of one label in both maps are fewer.
-constexpr std::size_t kMaxAssociations = 1000;
+// Largest number of associations. Bounds time and memory for maps of equal objects, which have no
+// answer: 44 objects of one label in both maps are fewer.
+constexpr std::size_t kMaxAssociations = 2000;
 
 struct Association {
   std::size_t a = 0, b = 0;
@@ -189,35 +190,6 @@ std::vector<LandmarkPair> pairs_of(std::span<const Landmark> a, std::span<const 
   return pairs;
 }
 
-// A set and log10 of its number of false alarms.
-struct WeighedSet {
-  std::vector<Association> set;
-  double log10_chance = 0.0;
-};
-
-// Removes the association that fits least as long as the rest is less likely by chance. Eq. (2)
-// counts every subset, so this choice is paid for.
-WeighedSet trimmed(std::span<const Landmark> a, std::span<const Landmark> b,
-                   const ChanceMatch& chance, std::vector<Association> set, std::size_t min_pairs) {
-  WeighedSet best{set, chance.log10_expected(pairs_of(a, b, set))};
-  while (set.size() > min_pairs) {
-    std::size_t worst = 0;
-    double least = 0.0;
-    for (std::size_t r = 0; r < set.size(); ++r) {
-      std::vector<Association> rest = set;
-      rest.erase(rest.begin() + static_cast<std::ptrdiff_t>(r));
-      const double log10_chance = chance.log10_expected(pairs_of(a, b, rest));
-      if (r == 0 || log10_chance < least) {
-        worst = r;
-        least = log10_chance;
-      }
-    }
-    set.erase(set.begin() + static_cast<std::ptrdiff_t>(worst));
-    if (least < best.log10_chance) best = {set, least};
-  }
-  return best;
-}
-
 }  // namespace
 
 const char* to_string(ConstellationStatus status) {
@@ -226,8 +198,6 @@ const char* to_string(ConstellationStatus status) {
       return "matched";
     case ConstellationStatus::kTooFew:
       return "too few";
-    case ConstellationStatus::kChance:
-      return "chance";
     case ConstellationStatus::kAmbiguous:
       return "ambiguous";
     case ConstellationStatus::kUndecided:
@@ -236,38 +206,32 @@ const char* to_string(ConstellationStatus status) {
   return "";
 }
 
+std::size_t min_pairs(const ConstellationOptions& options) {
+  return options.margin + kLeastPairs - 1;
+}
+
 ConstellationMatch match_constellations(std::span<const Landmark> a, std::span<const Landmark> b,
                                         const ConstellationOptions& options) {
   check(a);
   check(b);
   ConstellationMatch match;
   ConsistencyGraph graph(a, b, options);
-  const std::size_t too_few = std::max<std::size_t>(options.min_pairs, 3) - 1;
-  const auto first = graph.is_too_large() ? std::nullopt : graph.largest(too_few);
+  const auto first = graph.is_too_large() ? std::nullopt : graph.largest(kLeastPairs - 1);
   if (!first) return {.status = ConstellationStatus::kUndecided};
-  if (first->empty()) return match;
-  const ChanceMatch chance(a, b);
-  const WeighedSet best = trimmed(a, b, chance, *first, too_few + 1);
-  for (const Association& pair : best.set) match.pairs.push_back({pair.a, pair.b});
+  for (const Association& pair : *first) match.pairs.push_back({pair.a, pair.b});
   std::ranges::sort(match.pairs);
-  match.log10_chance = best.log10_chance;
-  match.status = ConstellationStatus::kChance;
-  if (!(match.log10_chance <= std::log10(options.max_chance))) return match;
+  if (first->size() < min_pairs(options)) return match;
 
-  match.T_a_b = constellation_pose(pairs_of(a, b, best.set), options.tilt_rad);
+  match.T_a_b = constellation_pose(pairs_of(a, b, *first), options.tilt_rad);
   graph.exclude(match.T_a_b.T);
-  const auto second = graph.largest(2);
+  const auto second = graph.largest(kLeastPairs - 1);
   match.status = ConstellationStatus::kUndecided;
   if (!second) return match;
-  if (!second->empty()) {
-    const WeighedSet other = trimmed(a, b, chance, *second, 3);
-    match.second_pairs = second->size();
-    match.second_log10_chance = std::min(0.0, other.log10_chance);
-  }
-  const bool is_second = match.second_log10_chance < kMaxSecondEvidence * match.log10_chance ||
-                         static_cast<double>(match.second_pairs) >
-                             kMaxSecondPairs * static_cast<double>(match.pairs.size());
-  match.status = is_second ? ConstellationStatus::kAmbiguous : ConstellationStatus::kMatched;
+  match.second_pairs = second->size();
+  const auto pairs = static_cast<double>(first->size());
+  const bool is_clear = first->size() >= match.second_pairs + options.margin &&
+                        static_cast<double>(match.second_pairs) <= kMaxSecondPairs * pairs;
+  match.status = is_clear ? ConstellationStatus::kMatched : ConstellationStatus::kAmbiguous;
   return match;
 }
 

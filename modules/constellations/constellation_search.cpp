@@ -9,10 +9,17 @@
 namespace km {
 namespace {
 
-// A pose whose frame has the axes of `world`, followed by the rotation to the axes of the keyframe.
-UncertainPose turn_of(const ObjectStretch& stretch) {
-  return {make_pose(stretch.keyframe.T_world_kf.linear(), Eigen::Vector3d::Zero()),
-          Matrix6::Zero()};
+// Pose of a keyframe in the frame of a stretch.
+SE3 pose_in(const ObjectStretch& stretch, const SurfaceKeyframe& keyframe) {
+  return make_pose(keyframe.T_world_kf.linear(),
+                   keyframe.T_world_kf.translation() - stretch.keyframe.T_world_kf.translation());
+}
+
+// The keyframe nearest to a point in the frame of the stretch.
+const SurfaceKeyframe& nearest(const ObjectStretch& stretch, const Eigen::Vector3d& point) {
+  return *std::ranges::min_element(stretch.keyframes, {}, [&](const SurfaceKeyframe& keyframe) {
+    return (pose_in(stretch, keyframe).translation() - point).norm();
+  });
 }
 
 double distance_m(const OdometryPose& x, const OdometryPose& y) {
@@ -38,26 +45,28 @@ Closure closure_of(const ObjectStretch& a, const ObjectStretch& b,
     middle_a += a.landmarks[i].center;
     middle_b += b.landmarks[p].center;
   }
-  const double reach_m =
-      std::hypot(middle_a.norm(), middle_b.norm()) / static_cast<double>(match.pairs.size());
-  UncertainPose T_kfa_kfb = compose(compose(inverse(turn_of(a)), match.T_a_b), turn_of(b));
-  T_kfa_kfb.Sigma.bottomRightCorner<3, 3>().diagonal().array() +=
+  middle_a /= static_cast<double>(match.pairs.size());
+  middle_b /= static_cast<double>(match.pairs.size());
+  const SurfaceKeyframe &from = nearest(a, middle_a), &to = nearest(b, middle_b);
+  const SE3 T_a_from = pose_in(a, from), T_b_to = pose_in(b, to);
+  const double reach_m = std::hypot((T_a_from.translation() - middle_a).norm(),
+                                    (T_b_to.translation() - middle_b).norm());
+  UncertainPose T_from_to = compose(compose(inverse({T_a_from, Matrix6::Zero()}), match.T_a_b),
+                                    {T_b_to, Matrix6::Zero()});
+  T_from_to.Sigma.bottomRightCorner<3, 3>().diagonal().array() +=
       kStretchDrift * kStretchDrift * reach_m * reach_m;
-  return {.from = a.keyframe.odometry,
-          .to = b.keyframe.odometry,
-          .T_from_to = T_kfa_kfb.T,
-          .covariance = T_kfa_kfb.Sigma,
+  return {.from = from.odometry,
+          .to = to.odometry,
+          .T_from_to = T_from_to.T,
+          .covariance = T_from_to.Sigma,
           .inliers = static_cast<int>(match.pairs.size())};
 }
-
-ConstellationSearch::ConstellationSearch(RobotId self, const ConstellationsConfig& config)
-    : self_(self), config_(checked(config)) {}
 
 void ConstellationSearch::add(const RobotObjects& objects, double now_s) {
   if (objects.robot < self_) return;  // that robot searches
   std::vector<Stretch>& stretches = stretches_[objects.robot];
   std::vector<Stretch> former = std::exchange(stretches, {});
-  for (ObjectStretch& stretch : stretches_of(objects, config_, options_.min_pairs)) {
+  for (ObjectStretch& stretch : stretches_of(objects, min_pairs(options_))) {
     const auto same = std::ranges::find_if(
         former, [&](const Stretch& old) { return !differ(old.objects, stretch); });
     if (same != former.end())
@@ -84,11 +93,10 @@ void ConstellationSearch::forget(RobotId robot) {
 }
 
 bool ConstellationSearch::is_known_place(const OdometryPose& own, const OdometryPose& peer) const {
-  const double reach_m = 2.0 * config_.radius_m;
   return std::ranges::any_of(places_, [&](const auto& entry) {
     const Place& place = entry.second;
-    return place.peer.id.robot == peer.id.robot && distance_m(place.own, own) < reach_m &&
-           distance_m(place.peer, peer) < reach_m;
+    return place.peer.id.robot == peer.id.robot && distance_m(place.own, own) < kStretchRadius_m &&
+           distance_m(place.peer, peer) < kStretchRadius_m;
   });
 }
 

@@ -16,9 +16,9 @@ namespace km {
 /// their objects. A place is a closure between two keyframes, which the back-end judges like any
 /// other one. No relative pose needs to be known.
 ///
-/// No information counts twice: a closure whose keyframes are both within two radii of those of
-/// another one, along odometry, is not made. Its stretches would share objects, or images measured
-/// the same place better.
+/// Information hardly counts twice: a closure whose keyframes are both within kStretchRadius_m of
+/// those of another one is not made. Its stretches would share most objects, or images measured the
+/// same place better.
 ///
 /// Not thread-safe. The result depends on the order of the calls.
 class ConstellationSearch {
@@ -32,7 +32,7 @@ class ConstellationSearch {
   /// Numbers of searches by their result.
   using Counts = std::map<ConstellationStatus, std::size_t>;
 
-  ConstellationSearch(RobotId self, const ConstellationsConfig& config);
+  explicit ConstellationSearch(RobotId self) : self_(self) {}
 
   /// The objects of this robot or of another one: they replace its former objects.
   void add(const RobotObjects& objects, double now_s);
@@ -69,7 +69,6 @@ class ConstellationSearch {
   [[nodiscard]] std::optional<Closure> take_best();
 
   const RobotId self_;
-  const ConstellationsConfig config_;
   const ConstellationOptions options_;
   std::map<RobotId, std::vector<Stretch>> stretches_;
   std::uint64_t changes_ = 0;
@@ -80,9 +79,9 @@ class ConstellationSearch {
   bool is_done_ = true;
 };
 
-/// The closure between the keyframes of two stretches for T_a_b, the pose of the frame of b's
-/// landmarks in that of a's. The covariance grows by the drift between the keyframes and the middle
-/// of the matched landmarks.
+/// The closure for T_a_b, the pose of the frame of b's landmarks in that of a's. It is between
+/// those keyframes of the stretches that are nearest to the middle of the matched landmarks. The
+/// covariance grows by the drift between the keyframes and this middle.
 [[nodiscard]] Closure closure_of(const ObjectStretch& a, const ObjectStretch& b,
                                  const ConstellationMatch& match);
 

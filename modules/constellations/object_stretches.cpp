@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 namespace km {
@@ -33,14 +34,13 @@ Landmark landmark_of(const AnchoredObject& object, const Eigen::Vector3d& center
           .height_shift_m = kUnseenShare * size.z()};
 }
 
-std::vector<Landmark> landmarks_near(const SurfaceKeyframe& keyframe, const RobotObjects& objects,
-                                     const ConstellationsConfig& config) {
+std::vector<Landmark> landmarks_near(const SurfaceKeyframe& keyframe, const RobotObjects& objects) {
   std::vector<Landmark> near;
   for (const AnchoredObject& object : objects.objects) {
     if (gap(object.keyframe, keyframe.odometry.id.index) > kVisit) continue;
     const Eigen::Vector3d center =
         (object.T_world_kf * object.T_kf_box).translation() - keyframe.T_world_kf.translation();
-    if (center.norm() > config.radius_m) continue;
+    if (center.norm() > kStretchRadius_m) continue;
     const Landmark landmark = landmark_of(object, center);
     if (landmark.side_variance() + landmark.height_variance() <= 2.0 * kMaxSigma_m * kMaxSigma_m)
       near.push_back(landmark);
@@ -57,20 +57,24 @@ bool differ(const Landmark& a, const Landmark& b) {
 
 }  // namespace
 
-std::vector<ObjectStretch> stretches_of(const RobotObjects& objects,
-                                        const ConstellationsConfig& config,
-                                        std::size_t min_landmarks) {
+std::vector<ObjectStretch> stretches_of(const RobotObjects& objects, std::size_t min_landmarks) {
   std::vector<ObjectStretch> stretches;
   for (const SurfaceKeyframe& keyframe : objects.keyframes) {
     const bool is_known = std::ranges::any_of(stretches, [&](const ObjectStretch& other) {
       const Eigen::Vector3d apart =
           other.keyframe.T_world_kf.translation() - keyframe.T_world_kf.translation();
-      return apart.norm() < 0.5 * config.radius_m &&
+      return apart.norm() < 0.5 * kStretchRadius_m &&
              gap(other.keyframe.odometry.id.index, keyframe.odometry.id.index) <= kVisit;
     });
     if (is_known) continue;
-    std::vector<Landmark> landmarks = landmarks_near(keyframe, objects, config);
-    if (landmarks.size() >= min_landmarks) stretches.push_back({keyframe, std::move(landmarks)});
+    std::vector<Landmark> landmarks = landmarks_near(keyframe, objects);
+    if (landmarks.size() < min_landmarks) continue;
+    stretches.push_back({keyframe, {}, std::move(landmarks)});
+    std::ranges::copy_if(objects.keyframes, std::back_inserter(stretches.back().keyframes),
+                         [&](const SurfaceKeyframe& other) {
+                           return gap(other.odometry.id.index, keyframe.odometry.id.index) <=
+                                  kVisit;
+                         });
   }
   return stretches;
 }

@@ -51,7 +51,7 @@ struct RobotObjects {
   std::uint64_t boot = 0;
   RobotId anchor = 0;  ///< Robot whose odometry frame is the frame of T_world_kf.
   std::vector<AnchoredObject> objects;
-  /// Keyframes of some objects with their odometry, ascending; absent without `constellations.on`.
+  /// Keyframes of some objects with their odometry, ascending.
   std::vector<SurfaceKeyframe> keyframes = {};
 };
 

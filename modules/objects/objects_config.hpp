@@ -22,8 +22,9 @@ struct ObjectsConfig {
   void visit_fields(auto& visitor) {
     visitor.field(
         "on", on,
-        "extract objects from a mesh with labels, write them to objects.json and exchange "
-        "them with the other robots; costs nothing without labels");
+        "extract objects from a mesh with labels, write them to objects.json, exchange them "
+        "with the other robots, and find places in common by them; costs nothing without "
+        "labels");
     visitor.field("background", background,
                   "names of the classes of the palette whose surfaces are no objects; names that "
                   "the palette lacks do no harm; label 0 is never an object");

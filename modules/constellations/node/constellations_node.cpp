@@ -25,15 +25,14 @@ std::string text_of(const ConstellationSearch::Counts& counts) {
 
 }  // namespace
 
-ConstellationsNode::ConstellationsNode(const ConstellationsConfig& config, RobotId self,
-                                       const ConstellationsTopics& topics)
-    : WorkerNode({.name = ConstellationsConfig::kSection,
+ConstellationsNode::ConstellationsNode(RobotId self, const ConstellationsTopics& topics)
+    : WorkerNode({.name = "constellations",
                   .queue = kInputs,
                   .tick_s = kMatchTick_s,
                   .in_background = true}),
       found_(topics.found),
       outcomes_(topics.outcomes),
-      search_(self, config) {
+      search_(self) {
   const auto queue = [this](const auto& message) { count_and_post(message); };
   topics.own_objects.subscribe(queue);
   topics.peer_objects.subscribe(queue);
@@ -62,7 +61,7 @@ void ConstellationsNode::step(const Input& input, double now_s) {
 void ConstellationsNode::search(double now_s) {
   if (now_s < next_s_ || search_.is_done()) return;
   const double start_s = steady_now_s();
-  const std::optional<Closure> closure = search_.step(now_s);
+  std::optional<Closure> closure = search_.step(now_s);
   next_s_ = now_s + kMatchPauses * (steady_now_s() - start_s);
   if (closure) {
     const double sigma_m = std::sqrt(closure->covariance.bottomRightCorner<3, 3>().trace() / 3.0);
@@ -76,6 +75,7 @@ void ConstellationsNode::search(double now_s) {
                                      .reason = {},
                                      .matches = closure->inliers,
                                      .inliers = closure->inliers});
+    closure->inliers = 0;  // not stated: its test is stricter than one of a place that looks alike
     found_.publish(*closure);
   }
   search_done_ = search_.is_done();

@@ -27,9 +27,7 @@ class ConstellationsNode final
     : public WorkerNode<std::variant<Tick, Topic<RobotObjects>::Message, Topic<Closure>::Message,
                                      Topic<PeerEvent>::Message>> {
  public:
-  /// Throws ConfigError if `config` is out of bounds.
-  ConstellationsNode(const ConstellationsConfig& config, RobotId self,
-                     const ConstellationsTopics& topics);
+  ConstellationsNode(RobotId self, const ConstellationsTopics& topics);
   ~ConstellationsNode() override { stop(); }
 
   /// True if the objects and closures so far lead to no further closure. Thread-safe.

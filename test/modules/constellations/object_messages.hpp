@@ -37,7 +37,7 @@ inline RobotObjects message_of(RobotId robot, const std::vector<TrueObject>& sce
                                .surface_m2 = 1.0,
                                .views = 5});
   }
-  for (const KeyframeIndex k : {0U, 10U, 20U})
+  for (const KeyframeIndex k : {0U, 8U, 18U})
     message.keyframes.push_back(
         {{.id = {robot, k}, .T_odom_kf = pose_of(0).inverse() * pose_of(k)}, pose_of(k)});
   return message;

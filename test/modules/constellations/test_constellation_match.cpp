@@ -58,6 +58,16 @@ TEST_CASE(
   CHECK(found >= (is_street ? 40 : 50));
 }
 
+TEST_CASE("Maps of two streets have no match", "[constellations]") {
+  std::mt19937 rng(11);
+  for (int n = 0; n < 200; ++n) {
+    CAPTURE(n);
+    const auto a = map_of(street(rng), random_upright(rng), {.found = 0.85}, rng);
+    const auto b = map_of(street(rng), random_upright(rng), {.found = 0.85}, rng);
+    CHECK(match_constellations(a, b).status != ConstellationStatus::kMatched);
+  }
+}
+
 TEST_CASE("A symmetric constellation is ambiguous", "[constellations]") {
   // Equal objects on a circle at irregular angles, and again half a turn later.
   std::mt19937 rng(7);

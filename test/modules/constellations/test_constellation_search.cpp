@@ -47,7 +47,7 @@ TEST_CASE("Robots that meet in opposite directions get one closure with the true
   const auto seed = GENERATE(range(0U, 10U));
   CAPTURE(seed);
   const Meeting meeting(seed);
-  ConstellationSearch search(kSelf, {});
+  ConstellationSearch search(kSelf);
   search.add(meeting.own, 0.0);
   search.add(meeting.peer, 0.0);
   const auto closures = all_of(search);
@@ -65,7 +65,7 @@ TEST_CASE("Robots that meet in opposite directions get one closure with the true
 
 TEST_CASE("A closure nearby excludes another one, and one far away does not", "[constellations]") {
   const Meeting meeting(3);
-  ConstellationSearch search(kSelf, {});
+  ConstellationSearch search(kSelf);
   search.add(meeting.own, 0.0);
   search.add(meeting.peer, 0.0);
   Closure known;
@@ -85,11 +85,11 @@ TEST_CASE("A closure nearby excludes another one, and one far away does not", "[
 TEST_CASE("Only the robot with the lower id searches, and no robot matches itself",
           "[constellations]") {
   const Meeting meeting(4);
-  ConstellationSearch higher(kOther, {});
+  ConstellationSearch higher(kOther);
   higher.add(meeting.own, 0.0);
   higher.add(meeting.peer, 0.0);
   CHECK(all_of(higher).empty());
-  ConstellationSearch alone(kSelf, {});
+  ConstellationSearch alone(kSelf);
   alone.add(meeting.own, 0.0);
   CHECK(all_of(alone).empty());
   CHECK(alone.is_done());
@@ -98,7 +98,7 @@ TEST_CASE("Only the robot with the lower id searches, and no robot matches itsel
 TEST_CASE("Objects that still change wait, and unchanged ones are matched once",
           "[constellations]") {
   const Meeting meeting(5);
-  ConstellationSearch search(kSelf, {});
+  ConstellationSearch search(kSelf);
   search.add(meeting.own, 0.0);
   search.add(meeting.peer, 100.0);
   CHECK_FALSE(search.step(100.5));
@@ -113,7 +113,7 @@ TEST_CASE("Objects that still change wait, and unchanged ones are matched once",
 
 TEST_CASE("A restarted robot is searched again", "[constellations]") {
   const Meeting meeting(6);
-  ConstellationSearch search(kSelf, {});
+  ConstellationSearch search(kSelf);
   search.add(meeting.own, 0.0);
   search.add(meeting.peer, 0.0);
   REQUIRE(all_of(search).size() == 1);
@@ -126,31 +126,29 @@ TEST_CASE("A restarted robot is searched again", "[constellations]") {
 TEST_CASE("A stretch has the nearest landmarks of one visit", "[constellations]") {
   std::mt19937 rng(7);
   const RobotObjects one = message_of(kSelf, square(5, rng), SE3::Identity(), 1.0, 0.0, rng);
-  ConstellationsConfig config;
-  config.radius_m = 200.0;
-  CHECK(stretches_of(one, config, 1).size() == 1);  // the others are too near
-  CHECK(stretches_of(one, config, 1)[0].landmarks.size() == 5);
-  CHECK(stretches_of(one, config, 6).empty());
+  CHECK(stretches_of(one, 1).size() == 2);  // the third is too near
+  CHECK(stretches_of(one, 1)[0].landmarks.size() == 5);
+  CHECK(stretches_of(one, 6).empty());
   SECTION("a later visit") {
     RobotObjects later = one;
     for (AnchoredObject& object : later.objects) object.keyframe += 500;
-    CHECK(stretches_of(later, config, 1).empty());
+    CHECK(stretches_of(later, 1).empty());
   }
   SECTION("without keyframes") {
     RobotObjects none = one;
     none.keyframes.clear();
-    CHECK(stretches_of(none, config, 1).empty());
+    CHECK(stretches_of(none, 1).empty());
   }
   SECTION("sizes of a planet") {
     RobotObjects huge = one;
     for (AnchoredObject& object : huge.objects) object.size_m.setConstant(1e5);
-    CHECK(stretches_of(huge, config, 1).empty());
+    CHECK(stretches_of(huge, 1).empty());
   }
 }
 
 TEST_CASE("A flood of equal objects ends the search without a closure", "[constellations]") {
   Meeting meeting(8);
-  ConstellationSearch search(kSelf, {});
+  ConstellationSearch search(kSelf);
   for (RobotObjects* message : {&meeting.own, &meeting.peer}) {
     const AnchoredObject first = message->objects[0];
     message->objects.assign(kMaxObjects, first);

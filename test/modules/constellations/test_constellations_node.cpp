@@ -34,7 +34,7 @@ TEST_CASE("The started node finds the place, and is then done", "[node]") {
   std::mt19937 rng(2);
   const auto scene = square(24, rng);
   NodeChannels channels;
-  ConstellationsNode node({}, 1, channels.ends());
+  ConstellationsNode node(1, channels.ends());
   node.start();
   CHECK(node.is_done());
   channels.own.publish(message_of(1, scene, random_upright(rng), 1.0, 0.1, rng));
