@@ -168,9 +168,8 @@ cv::Ptr<cv::StereoSGBM> make_matcher(int disparities, int speckle_px) {
 constexpr int kSpeckle_px = 300;  // smaller areas of similar depth are wrong matches
 constexpr int kPreviewScale = 4;
 
-// The matcher's disparities also for the left columns, where it has none because it does not
-// compare what is outside the right image: the images get as many columns as it searches
-// disparities.
+// The matcher's disparities for all columns. It compares only columns beyond the number of searched
+// disparities, therefore both images get as many more at the left.
 cv::Mat matched(const cv::Mat& left, const cv::Mat& right, cv::StereoSGBM& matcher) {
   const int columns = matcher.getNumDisparities();
   std::array<cv::Mat, 2> wide;

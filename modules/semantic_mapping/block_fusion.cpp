@@ -8,13 +8,14 @@
 namespace km {
 namespace {
 
-// Distance between sampled pixels [px]: about one voxel at the greatest depth of the view.
-int stride_of(const DepthView& view, double voxel_size_m) {
+// Distance between sampled pixels [px]: about one voxel at the greatest depth of the view, or
+// `to_m`.
+int stride_of(const DepthView& view, double voxel_size_m, double to_m) {
   constexpr int kLongest = 16;  // upper bound of the distance [px]
   const std::uint16_t farthest = *std::max_element(view.farthest.begin(), view.farthest.end());
   const float focal = std::max(view.fx, view.fy);
-  const float pixels =
-      static_cast<float>(voxel_size_m) * focal / std::max(DepthView::depth_m(farthest), 0.1F);
+  const float depth_m = std::min(DepthView::depth_m(farthest), static_cast<float>(to_m));
+  const float pixels = static_cast<float>(voxel_size_m) * focal / std::max(depth_m, 0.1F);
   return static_cast<int>(std::clamp(pixels, 1.0F, static_cast<float>(kLongest)));
 }
 
@@ -68,10 +69,11 @@ class Selector {
 
 }  // namespace
 
-NearBlocks select_near_blocks(const DepthView& view, const SE3& T_odom_cam, double voxel_size_m,
+NearBlocks select_near_blocks(const DepthView& view, const SE3& T_odom_cam, const DepthBand& band,
                               std::size_t max_blocks, std::uint64_t frame, KeyframeIndex keyframe,
                               BlockMap& map) {
-  const double block_m = kBlockSide * voxel_size_m;
+  const double block_m = kBlockSide * map.voxel_m();
+  const auto above_m = static_cast<float>(band.above_m), to_m = static_cast<float>(band.to_m);
   // Positions are in blocks, relative to the camera's block, so that float is precise enough at any
   // distance from the origin.
   const Eigen::Vector3d camera = T_odom_cam.translation() / block_m;
@@ -82,7 +84,7 @@ NearBlocks select_near_blocks(const DepthView& view, const SE3& T_odom_cam, doub
   constexpr float kReach = kNearVoxels / static_cast<float>(kBlockSide);
 
   Selector selector(max_blocks, frame, keyframe, map);
-  const int stride = stride_of(view, voxel_size_m);
+  const int stride = stride_of(view, map.voxel_m(), band.to_m);
   for (int v = stride / 2; v < view.height; v += stride) {
     const std::uint32_t* line =
         &view.pixels[static_cast<std::size_t>(v) * static_cast<std::size_t>(view.width)];
@@ -91,7 +93,7 @@ NearBlocks select_near_blocks(const DepthView& view, const SE3& T_odom_cam, doub
     const Eigen::Vector3f start = y * R.col(1) + R.col(2) - view.cx * side;
     for (int u = stride / 2; u < view.width; u += stride) {
       const float depth = DepthView::depth_m(line[u]);
-      if (depth <= 0.0F) continue;
+      if (depth <= above_m || depth > to_m) continue;
       const Eigen::Vector3f point = origin + depth * (start + static_cast<float>(u) * side);
       selector.add(base_block + floor_of(point.array() - kReach),
                    base_block + floor_of(point.array() + kReach));
@@ -100,13 +102,25 @@ NearBlocks select_near_blocks(const DepthView& view, const SE3& T_odom_cam, doub
   return selector.result();
 }
 
-float exposure_gain(const DepthView& view, const SE3& T_odom_cam, double voxel_size_m,
-                    const BlockMap& map) {
+float exposure_gain(const DepthView& view, const SE3& T_odom_cam, std::span<const BlockMap> maps) {
   constexpr int kStep_px = 12;
   constexpr std::size_t kLeastPixels = 50;
   constexpr int kDark = 30, kBright = 720;  // sums of three channels of usable pixels
-  if (view.colors.empty() || map.size() == 0) return 1.0F;
+  if (view.colors.empty()) return 1.0F;
   const auto sum_of = [](const ColorImage::Pixel& color) { return color[0] + color[1] + color[2]; };
+  const auto color_at = [&](const Eigen::Vector3d& point) -> const VoxelColor* {
+    for (const BlockMap& map : maps) {
+      const Eigen::Vector3d at = point / map.voxel_m();
+      if (!(at.cwiseAbs().maxCoeff() < 1e7)) continue;
+      const Eigen::Vector3i voxel = at.array().round().cast<int>();
+      const Eigen::Vector3i inside = voxel.unaryExpr([](int x) { return x & (kBlockSide - 1); });
+      const VoxelBlock* block = map.find((voxel - inside) / kBlockSide);
+      if (block == nullptr || block->colors == nullptr) continue;
+      const VoxelColor& color = (*block->colors)[voxel_index(inside.x(), inside.y(), inside.z())];
+      if (color.quality > 0) return &color;
+    }
+    return nullptr;
+  };
   std::size_t count = 0;
   double of_map = 0.0, of_view = 0.0;
   for (int v = 0; v < view.height; v += kStep_px)
@@ -118,16 +132,10 @@ float exposure_gain(const DepthView& view, const SE3& T_odom_cam, double voxel_s
       if (depth <= 0.0F || seen < kDark || seen > kBright) continue;
       const Eigen::Vector3f ray((static_cast<float>(u) - view.cx) / view.fx,
                                 (static_cast<float>(v) - view.cy) / view.fy, 1.0F);
-      const Eigen::Vector3d at = T_odom_cam * (depth * ray).cast<double>().eval() / voxel_size_m;
-      if (!(at.cwiseAbs().maxCoeff() < 1e7)) continue;
-      const Eigen::Vector3i voxel = at.array().round().cast<int>();
-      const Eigen::Vector3i inside = voxel.unaryExpr([](int x) { return x & (kBlockSide - 1); });
-      const VoxelBlock* block = map.find((voxel - inside) / kBlockSide);
-      if (block == nullptr || block->colors == nullptr) continue;
-      const VoxelColor& known = (*block->colors)[voxel_index(inside.x(), inside.y(), inside.z())];
-      if (known.quality == 0) continue;
+      const VoxelColor* known = color_at(T_odom_cam * (depth * ray).cast<double>().eval());
+      if (known == nullptr) continue;
       ++count;
-      of_map += sum_of(known.color);
+      of_map += sum_of(known->color);
       of_view += seen;
     }
   if (count < kLeastPixels) return 1.0F;
@@ -144,7 +152,7 @@ struct BlockFusion::Row {
   unsigned near_bits = 0;                                     // observed near the surface
 };
 
-BlockFusion::BlockFusion(const SemanticMappingConfig& config, const DepthView& view,
+BlockFusion::BlockFusion(const SemanticMappingConfig& config, double voxel_m, const DepthView& view,
                          const SE3& T_odom_cam, KeyframeIndex keyframe, float gain)
     : view_(view), keyframe_(keyframe), gain_(gain) {
   const SE3 T_cam_odom = T_odom_cam.inverse();
@@ -155,10 +163,10 @@ BlockFusion::BlockFusion(const SemanticMappingConfig& config, const DepthView& v
       0.0, 0.0, 1.0;
   M_ = K * T_cam_odom.linear();
   offset_ = K * T_cam_odom.translation();
-  step_ = (config.voxel_m() * M_).cast<float>();
-  block_m_ = kBlockSide * config.voxel_m();
+  step_ = (voxel_m * M_).cast<float>();
+  block_m_ = kBlockSide * voxel_m;
 
-  voxel_ = static_cast<float>(config.voxel_m());
+  voxel_ = static_cast<float>(voxel_m);
   truncation_ = static_cast<float>(SemanticMappingConfig::kTruncation_voxels) * voxel_;
   near_ = kNearVoxels * voxel_;
   closest_ = 0.5F * static_cast<float>(std::max(config.min_range_m, 0.01));

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "modules/core/geometry.hpp"
@@ -19,19 +20,25 @@ struct NearBlocks {
   std::size_t refused = 0;  ///< Requests for a block beyond `max_blocks` or BlockMap::kReach.
 };
 
-/// The blocks within kNearVoxels of the surface, found by a subsample of the pixels about one voxel
-/// apart at the view's greatest depth. Missing blocks are allocated, up to `max_blocks` in all. All
-/// are marked with `frame`, a number that grows with every call, and new ones also as seen by
-/// `keyframe`.
+/// Depths above `above_m` and up to `to_m`.
+struct DepthBand {
+  double above_m = 0.0;
+  double to_m = 0.0;
+};
+
+/// The blocks within kNearVoxels of the surface at depths of the band, found by a subsample of the
+/// pixels about one voxel apart at the greatest depth. Missing blocks are allocated, up to
+/// `max_blocks` in this map. All are marked with `frame`, a number that grows with every call, and
+/// new ones also as seen by `keyframe`.
 [[nodiscard]] NearBlocks select_near_blocks(const DepthView& view, const SE3& T_odom_cam,
-                                            double voxel_size_m, std::size_t max_blocks,
+                                            const DepthBand& band, std::size_t max_blocks,
                                             std::uint64_t frame, KeyframeIndex keyframe,
                                             BlockMap& map);
 
 /// Factor on the colours of a view that makes it as bright as the map, 0.5 to 2. It is the ratio of
 /// the sums over a sample of pixels whose voxels have colours; 1 for too few of them.
-[[nodiscard]] float exposure_gain(const DepthView& view, const SE3& T_odom_cam, double voxel_size_m,
-                                  const BlockMap& map);
+[[nodiscard]] float exposure_gain(const DepthView& view, const SE3& T_odom_cam,
+                                  std::span<const BlockMap> maps);
 
 /// Fuses one depth view into blocks. fuse() changes only its block, so it may run on several blocks
 /// at once.
@@ -43,9 +50,9 @@ struct NearBlocks {
 /// weight falls linearly to zero, because a voxel farther behind may belong to another surface.
 class BlockFusion {
  public:
-  /// Colours of the view are multiplied by `gain`.
-  BlockFusion(const SemanticMappingConfig& config, const DepthView& view, const SE3& T_odom_cam,
-              KeyframeIndex keyframe, float gain = 1.0F);
+  /// For blocks with voxels of side `voxel_m`. Colours of the view are multiplied by `gain`.
+  BlockFusion(const SemanticMappingConfig& config, double voxel_m, const DepthView& view,
+              const SE3& T_odom_cam, KeyframeIndex keyframe, float gain = 1.0F);
 
   /// Relation of a view and a block.
   enum class Relation {

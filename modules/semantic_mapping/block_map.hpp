@@ -78,12 +78,11 @@ struct VoxelBlock {
   /// Null until a face of the mesh has a vertex on one of the block's edges.
   std::unique_ptr<BlockMesh> mesh;
 
+  /// Bit x of row y + 8 z: blocks of smaller voxels that have left the window knew the voxel.
+  std::array<std::uint8_t, kBlockRows> finer_rows = {};
+
   /// Bit x of row y + 8 z: the voxel was seen near a surface since the block was last meshed.
   std::array<std::uint8_t, kBlockRows> near_rows = {};
-
-  [[nodiscard]] bool knows(std::size_t voxel, const KnownFrom& from) const {
-    return views[voxel] >= from.views && weight[voxel] > from.weight;
-  }
 
   std::uint64_t selected_in = 0;    ///< Last frame for which select_near_blocks() chose the block.
   KeyframeIndex last_seen = 0;      ///< Last keyframe that saw surface in the block.
@@ -102,10 +101,19 @@ struct BlockOrder {
   }
 };
 
-/// The blocks of a map, hashed by their position. References to blocks stay valid until they are
-/// erased. The order of blocks() depends only on the sequence of calls.
+/// The blocks of a map with voxels of one size, hashed by their position. References to blocks stay
+/// valid until they are erased. The order of blocks() depends only on the sequence of calls.
 class BlockMap {
  public:
+  BlockMap(double voxel_m, const KnownFrom& known) : voxel_m_(voxel_m), known_(known) {}
+
+  [[nodiscard]] double voxel_m() const { return voxel_m_; }
+
+  /// The voxel counts as known.
+  [[nodiscard]] bool knows(const VoxelBlock& block, std::size_t voxel) const {
+    return block.views[voxel] >= known_.views && block.weight[voxel] > known_.weight;
+  }
+
   /// Positions are representable from -kReach to kReach - 1 along every axis.
   static constexpr int kReach = 1 << 20;
 
@@ -129,6 +137,8 @@ class BlockMap {
   [[nodiscard]] const std::vector<std::unique_ptr<VoxelBlock>>& blocks() const { return blocks_; }
 
  private:
+  double voxel_m_;
+  KnownFrom known_;
   std::vector<std::unique_ptr<VoxelBlock>> blocks_;
   std::unordered_map<Eigen::Vector3i, std::size_t, BlockHash> index_;  // index in blocks_
 };

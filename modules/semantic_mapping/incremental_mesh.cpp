@@ -54,6 +54,26 @@ std::uint8_t certainty_of(float weight) {
   return static_cast<std::uint8_t>(std::clamp(steps, 0.0F, 255.0F));
 }
 
+// True if finer maps have the surface in a cell: at every edge that it crosses, they know the voxel
+// nearest to the crossing.
+bool is_refined(const BlockCells& cells, int x, int y, int z, std::span<const BlockMap> finer) {
+  const unsigned negative = cells.negative_corners(x, y, z);
+  for (int edge = 0; edge < MarchingCubes::kEdges; ++edge) {
+    const int a = MarchingCubes::first_corner_of_edge(edge);
+    const int b = a | 1 << MarchingCubes::axis_of_edge(edge);
+    if ((negative >> a & 1U) == (negative >> b & 1U)) continue;
+    const auto corner = [&](int c) {
+      return Eigen::Vector3i(x + (c & 1), y + (c >> 1 & 1), z + (c >> 2 & 1));
+    };
+    const auto distance = [&](int c) {
+      return std::abs(cells.value(corner(c).x(), corner(c).y(), corner(c).z()));
+    };
+    const Eigen::Vector3i nearest = corner(distance(a) <= distance(b) ? a : b);
+    if (!cells.is_finer(nearest.x(), nearest.y(), nearest.z(), finer)) return false;
+  }
+  return true;
+}
+
 void mark_changed(VoxelBlock& block, KeyframeIndex since) {
   block.changed_since = block.changed ? std::min(block.changed_since, since) : since;
   block.changed = true;
@@ -75,10 +95,7 @@ class PlaceOfId {
 
 }  // namespace
 
-IncrementalMesh::IncrementalMesh(double voxel_size_m, const KnownFrom& known)
-    : voxel_m_(voxel_size_m), known_(known) {}
-
-std::size_t IncrementalMesh::update(BlockMap& map) {
+std::size_t IncrementalMesh::update(BlockMap& map, std::span<const BlockMap> finer) {
   std::vector<VoxelBlock*> blocks;
   for (const auto& block : map.blocks())
     if (block->changed) blocks.push_back(block.get());
@@ -89,16 +106,17 @@ std::size_t IncrementalMesh::update(BlockMap& map) {
       mark_changed(lower, blocks[i]->changed_since);
       blocks.push_back(&lower);
     });
-  return mesh_blocks(blocks, map);
+  return mesh_blocks(blocks, map, finer);
 }
 
-std::size_t IncrementalMesh::mesh_blocks(const std::vector<VoxelBlock*>& blocks, BlockMap& map) {
+std::size_t IncrementalMesh::mesh_blocks(const std::vector<VoxelBlock*>& blocks, BlockMap& map,
+                                         std::span<const BlockMap> finer) {
   ++update_;
   for (const Face& face : forgotten_faces_) release(face);
   faces_ -= forgotten_faces_.size();
   forgotten_faces_.clear();
   for (VoxelBlock* block : blocks) release_faces(*block);
-  for (VoxelBlock* block : blocks) mesh_block(*block, map);
+  for (VoxelBlock* block : blocks) mesh_block(*block, map, finer);
   for (VoxelBlock* block : blocks) {
     block->changed = false;
     block->near_rows.fill(0);
@@ -120,8 +138,9 @@ void IncrementalMesh::release_faces(VoxelBlock& block) {
   block.mesh->cell_of_face.clear();
 }
 
-void IncrementalMesh::mesh_block(VoxelBlock& block, BlockMap& map) {
-  const BlockCells cells(block, map, known_);
+void IncrementalMesh::mesh_block(VoxelBlock& block, BlockMap& map,
+                                 std::span<const BlockMap> finer) {
+  const BlockCells cells(block, map);
   if (!cells.any()) return;
   std::array<std::uint32_t, MarchingCubes::kEdges> vertices;
   for (int z = 0; z < kBlockSide; ++z)
@@ -129,6 +148,7 @@ void IncrementalMesh::mesh_block(VoxelBlock& block, BlockMap& map) {
       const unsigned crossed = cells.crossed(y, z);
       for (int x = 0; x < kBlockSide; ++x) {
         if ((crossed >> x & 1U) == 0) continue;
+        if (!finer.empty() && is_refined(cells, x, y, z, finer)) continue;
         vertices.fill(BlockMesh::kNone);
         for (const auto& triangle : table_.triangles(cells.negative_corners(x, y, z))) {
           Face face;
@@ -201,7 +221,7 @@ void IncrementalMesh::compute(Vertex& vertex, const BlockCells& cells, const Eig
   const Eigen::Vector3i local(voxel.x() & 7, voxel.y() & 7, voxel.z() & 7);
   Eigen::Vector3d grid = (kBlockSide * near_block.position + local).cast<double>();
   grid[axis] += static_cast<double>(t);
-  vertex.position = (voxel_m_ * grid).cast<float>();
+  vertex.position = (cells.voxel_m() * grid).cast<float>();
 
   // The labels of the voxel behind the surface come first. The ray to this voxel went through the
   // surface here. The ray to the voxel in front continues and may meet another surface.
@@ -252,7 +272,8 @@ void IncrementalMesh::forget(VoxelBlock& block, BlockMap& map, KeyframeIndex key
   disown(block);
 }
 
-std::size_t IncrementalMesh::finalise(const std::vector<VoxelBlock*>& blocks, BlockMap& map) {
+std::size_t IncrementalMesh::finalise(const std::vector<VoxelBlock*>& blocks, BlockMap& map,
+                                      std::span<const BlockMap> finer) {
   // The lower neighbours of `blocks` have cells that extend into `blocks`. They are meshed as well,
   // because their cells need the voxels of `blocks`, which are discarded afterwards.
   std::vector<VoxelBlock*> last_time;
@@ -270,7 +291,7 @@ std::size_t IncrementalMesh::finalise(const std::vector<VoxelBlock*>& blocks, Bl
     visit_lower_neighbours(*block, map, [&](VoxelBlock& lower, int) {
       if (!lower.changed) mark_changed(lower, block->changed_since);
     });
-  const std::size_t meshed = mesh_blocks(last_time, map);
+  const std::size_t meshed = mesh_blocks(last_time, map, finer);
   for (VoxelBlock* block : blocks) finalise(*block, map);
   return meshed;
 }
@@ -335,7 +356,7 @@ SurfaceDrop IncrementalMesh::drop(const SupersededSurface& superseded) {
   return dropped;
 }
 
-MapMesh IncrementalMesh::snapshot(const BlockMap& map, bool labelled, bool coloured) {
+MapMesh IncrementalMesh::snapshot(std::span<const BlockMap> maps, bool labelled, bool coloured) {
   std::vector<std::uint32_t> order;
   order.reserve(vertex_count());
   for (std::size_t i = 0; i < vertices_.size(); ++i)
@@ -344,11 +365,11 @@ MapMesh IncrementalMesh::snapshot(const BlockMap& map, bool labelled, bool colou
             [&](auto a, auto b) { return vertices_[a].id < vertices_[b].id; });
 
   MapMesh map_mesh;
-  map_mesh.voxel_m = voxel_m_;
+  map_mesh.voxel_m = maps.front().voxel_m();
   LabelledMesh& mesh = map_mesh.mesh;
   std::vector<std::uint32_t> index(vertices_.size()), changed;
   std::vector<Eigen::Vector3f> filtered;
-  const auto least_move_m = static_cast<float>(0.05 * voxel_m_);
+  const auto least_move_m = static_cast<float>(0.05 * map_mesh.voxel_m);
   for (const std::uint32_t place : order) {
     const Vertex& vertex = vertices_[place];
     index[place] = static_cast<std::uint32_t>(mesh.vertices.size());
@@ -368,8 +389,9 @@ MapMesh IncrementalMesh::snapshot(const BlockMap& map, bool labelled, bool colou
       mesh.faces.push_back({index[face[0]], index[face[1]], index[face[2]]});
   };
   add(final_faces_);
-  for (const auto& block : map.blocks())
-    if (block->mesh != nullptr) add(block->mesh->faces);
+  for (const BlockMap& map : maps)
+    for (const auto& block : map.blocks())
+      if (block->mesh != nullptr) add(block->mesh->faces);
   filter_surface(mesh.vertices, mesh.faces, changed, filtered);
   for (const std::uint32_t i : changed) vertices_[order[i]].filtered_at = mesh.vertices[i];
   for (std::size_t i = 0; i < order.size(); ++i) vertices_[order[i]].filtered = filtered[i];

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <span>
 #include <vector>
 
 #include "modules/mesh/map_mesh.hpp"
@@ -25,12 +26,10 @@ struct SurfaceDrop {
 /// rim of final faces exist too, and still move with the blocks that are in the map.
 class IncrementalMesh {
  public:
-  /// Makes no face at a voxel that is not known from `known` on.
-  IncrementalMesh(double voxel_size_m, const KnownFrom& known);
-
   /// Meshes the blocks that changed, and the blocks below them whose cells extend into them.
-  /// Returns their number.
-  std::size_t update(BlockMap& map);
+  /// Returns their number. Cells have a face where their voxels are known and the maps `finer` have
+  /// no known voxels at the surface (see BlockCells::is_finer()).
+  std::size_t update(BlockMap& map, std::span<const BlockMap> finer = {});
 
   /// Call before a block is erased because `keyframe` showed no surface in it. The next update()
   /// removes the faces of the block.
@@ -39,7 +38,8 @@ class IncrementalMesh {
   /// Call before blocks are erased whose mesh stays. Changed blocks are meshed once more. Faces of
   /// the blocks' cells, and of cells that extend into the blocks, become final. Returns the number
   /// of blocks that were meshed.
-  std::size_t finalise(const std::vector<VoxelBlock*>& blocks, BlockMap& map);
+  std::size_t finalise(const std::vector<VoxelBlock*>& blocks, BlockMap& map,
+                       std::span<const BlockMap> finer = {});
 
   /// Drops the final faces whose vertices are all listed, and then the listed vertices without
   /// other faces. The votes on labels of such a vertex are added to its replacement, unless that is
@@ -48,9 +48,10 @@ class IncrementalMesh {
   SurfaceDrop drop(const SupersededSurface& superseded);
 
   /// All faces and the vertices they use, with labels and colours as wanted. Positions are those of
-  /// filter_surface(), which runs near vertices that are new, or have moved by a twentieth of a
-  /// voxel since they were last filtered.
-  [[nodiscard]] MapMesh snapshot(const BlockMap& map, bool labelled, bool coloured = false);
+  /// filter_surface(), which runs near vertices that are new, or have moved by a twentieth of the
+  /// smallest voxels since they were last filtered. `maps`: all maps, from the finest on.
+  [[nodiscard]] MapMesh snapshot(std::span<const BlockMap> maps, bool labelled,
+                                 bool coloured = false);
 
   [[nodiscard]] std::size_t vertex_count() const { return vertices_.size() - free_.size(); }
   [[nodiscard]] std::size_t face_count() const { return faces_; }
@@ -78,11 +79,12 @@ class IncrementalMesh {
     std::uint8_t certainty = 0;  // see MapMesh
   };
 
-  std::size_t mesh_blocks(const std::vector<VoxelBlock*>& blocks, BlockMap& map);
+  std::size_t mesh_blocks(const std::vector<VoxelBlock*>& blocks, BlockMap& map,
+                          std::span<const BlockMap> finer);
   void finalise(VoxelBlock& block, BlockMap& map);
   void release(const Face& face);
   void release_faces(VoxelBlock& block);
-  void mesh_block(VoxelBlock& block, BlockMap& map);
+  void mesh_block(VoxelBlock& block, BlockMap& map, std::span<const BlockMap> finer);
   std::uint32_t vertex_on(const BlockCells& cells, const Eigen::Vector3i& voxel, int axis,
                           const VoxelBlock& meshed);
   std::uint32_t new_vertex(KeyframeIndex keyframe);
@@ -94,9 +96,6 @@ class IncrementalMesh {
   void disown(VoxelBlock& block);
 
   MarchingCubes table_;
-  double voxel_m_;
-  KnownFrom known_;
-
   std::vector<Vertex> vertices_;
   std::vector<std::uint32_t> free_;          // free indices in vertices_
   std::vector<std::uint32_t> maybe_unused_;  // vertices that lost their last face in this update

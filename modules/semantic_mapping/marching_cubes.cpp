@@ -67,13 +67,13 @@ MarchingCubes::MarchingCubes() {
   first_[256] = static_cast<std::uint16_t>(triangles_.size());
 }
 
-BlockCells::BlockCells(VoxelBlock& block, BlockMap& map, const KnownFrom& known) {
+BlockCells::BlockCells(VoxelBlock& block, BlockMap& map) : voxel_m_(map.voxel_m()) {
   blocks_[0] = &block;
   for (int i = 1; i < 8; ++i)
     blocks_[static_cast<std::size_t>(i)] =
         map.find(block.position + Eigen::Vector3i(i & 1, i >> 1 & 1, i >> 2 & 1));
   for (int z = 0; z < kSide; ++z)
-    for (int y = 0; y < kSide; ++y) copy_row(y, z, known);
+    for (int y = 0; y < kSide; ++y) copy_row(y, z, map);
   unsigned negative = 0, positive = 0;
   for (std::size_t row = 0; row < negative_.size(); ++row) {
     negative |= negative_[row] & observed_[row];
@@ -82,7 +82,7 @@ BlockCells::BlockCells(VoxelBlock& block, BlockMap& map, const KnownFrom& known)
   any_ = negative != 0 && positive != 0;
 }
 
-void BlockCells::copy_row(int y, int z, const KnownFrom& known) {
+void BlockCells::copy_row(int y, int z, const BlockMap& map) {
   const std::size_t row = row_of(y, z);
   const auto first = static_cast<std::size_t>((y >> 3) << 1 | (z >> 3) << 2);
   const std::size_t voxel = voxel_index(0, y & 7, z & 7);
@@ -92,16 +92,30 @@ void BlockCells::copy_row(int y, int z, const KnownFrom& known) {
     std::copy_n(distance, kBlockSide, values_[row].data());
     for (unsigned x = 0; x < kBlockSide; ++x) {
       negative |= distance[x] < 0.0F ? 1U << x : 0U;
-      observed |= block->knows(voxel + x, known) ? 1U << x : 0U;
+      observed |= map.knows(*block, voxel + x) ? 1U << x : 0U;
     }
   }
   if (const VoxelBlock* block = blocks_[first + 1]) {
     values_[row][kBlockSide] = block->distance[voxel];
     negative |= block->distance[voxel] < 0.0F ? 1U << kBlockSide : 0U;
-    observed |= block->knows(voxel, known) ? 1U << kBlockSide : 0U;
+    observed |= map.knows(*block, voxel) ? 1U << kBlockSide : 0U;
   }
   negative_[row] = static_cast<std::uint16_t>(negative);
   observed_[row] = static_cast<std::uint16_t>(observed);
+}
+
+bool BlockCells::is_finer(int x, int y, int z, std::span<const BlockMap> finer) const {
+  const auto row = static_cast<std::size_t>((y & 7) + kBlockSide * (z & 7));
+  if ((block_of(x, y, z).finer_rows[row] >> (x & 7) & 1) != 0) return true;
+  Eigen::Vector3i voxel = kBlockSide * blocks_[0]->position + Eigen::Vector3i(x, y, z);
+  for (auto map = finer.rbegin(); map != finer.rend(); ++map) {
+    voxel *= 2;
+    const Eigen::Vector3i inside = voxel.unaryExpr([](int c) { return c & (kBlockSide - 1); });
+    const VoxelBlock* block = map->find((voxel - inside) / kBlockSide);
+    if (block != nullptr && map->knows(*block, voxel_index(inside.x(), inside.y(), inside.z())))
+      return true;
+  }
+  return false;
 }
 
 unsigned BlockCells::crossed(int y, int z) const {

@@ -47,9 +47,9 @@ class MarchingCubes {
 /// of the next blocks along each axis.
 class BlockCells {
  public:
-  /// Copies the values. Voxels that are not known from `known` on count as not observed. The blocks
-  /// must outlive this object.
-  BlockCells(VoxelBlock& block, BlockMap& map, const KnownFrom& known);
+  /// Copies the values. Voxels that the map does not know count as not observed. The blocks must
+  /// outlive this object.
+  BlockCells(VoxelBlock& block, BlockMap& map);
 
   /// Cells of row (y, z), as bits by x, that the surface passes through: all corners are observed,
   /// and both signs occur.
@@ -68,6 +68,12 @@ class BlockCells {
     return *blocks_[static_cast<std::size_t>((x >> 3) | (y >> 3) << 1 | (z >> 3) << 2)];
   }
 
+  /// True if a voxel is known in one of the maps `finer`, or was (VoxelBlock::finer_rows). Their
+  /// voxels are 2, 4, ... times smaller from the last one on. Precondition: the voxel was observed.
+  [[nodiscard]] bool is_finer(int x, int y, int z, std::span<const BlockMap> finer) const;
+
+  [[nodiscard]] double voxel_m() const { return voxel_m_; }
+
   /// False if no cell is crossed; a cheap test.
   [[nodiscard]] bool any() const { return any_; }
 
@@ -77,13 +83,14 @@ class BlockCells {
   [[nodiscard]] static std::size_t row_of(int y, int z) {
     return static_cast<std::size_t>(y + kSide * z);
   }
-  void copy_row(int y, int z, const KnownFrom& known);
+  void copy_row(int y, int z, const BlockMap& map);
 
   // Block and neighbours, at index x + 2 y + 4 z of their offset; null: no block.
   std::array<VoxelBlock*, 8> blocks_ = {};
   std::array<std::array<float, kSide>, kSide * kSide> values_;
   std::array<std::uint16_t, kSide* kSide> negative_ = {};  // bits by x
   std::array<std::uint16_t, kSide* kSide> observed_ = {};
+  double voxel_m_;
   bool any_ = false;
 };
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <opencv2/core/utility.hpp>
 #include <optional>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -28,6 +29,23 @@ DepthNoise noise_of(const SemanticMappingConfig& config) {
           config.depth_sigma_per_m.value_or(SemanticMappingConfig::kDepthSigma_per_m)};
 }
 
+// Bands of depths for voxels of voxel_m(), twice and four times as large, and so on up to
+// max_range_m. At the end of a band the truncation is two standard deviations. Bands overlap, so
+// that their surfaces meet.
+std::vector<DepthBand> bands_of(const SemanticMappingConfig& config) {
+  constexpr double kOverlap = 0.1;
+  const double per_m = std::max(noise_of(config).per_m, 1e-9);
+  std::vector<DepthBand> bands;
+  double from_m = 0.0;
+  for (double voxel_m = config.voxel_m();; voxel_m *= 2.0) {
+    const double to_m =
+        std::sqrt(SemanticMappingConfig::kTruncation_voxels * voxel_m / (2.0 * per_m));
+    bands.push_back({from_m, to_m});
+    if (to_m >= config.max_range_m) return bands;
+    from_m = (1.0 - kOverlap) * to_m;
+  }
+}
+
 bool usable(const SE3& T) {
   constexpr double kTolerance = 1e-3;
   const Eigen::Matrix3d R = T.linear();
@@ -45,19 +63,17 @@ bool fits(const Image& image, const Pixels& pixels, const Camera& camera) {
 
 }  // namespace
 
-double fitting_voxel_m(const SemanticMappingConfig& config, const DepthImage& depth) {
+double fitting_voxel_m(const SemanticMappingConfig& config,
+                       std::span<const std::shared_ptr<const DepthImage>> images) {
   constexpr std::array kSides_m = {0.02, 0.03, 0.05, 0.1};
   std::vector<std::uint16_t> known;
-  for (const std::uint16_t mm : depth.millimetres)
-    if (mm >= 1e3 * config.min_range_m && mm <= 1e3 * config.max_range_m) known.push_back(mm);
+  for (const auto& image : images)
+    for (const std::uint16_t mm : image->millimetres)
+      if (mm >= 1e3 * config.min_range_m && mm <= 1e3 * config.max_range_m) known.push_back(mm);
   if (known.empty()) return kSides_m.back();
-  const auto quartile = known.begin() + static_cast<std::ptrdiff_t>(known.size() * 3 / 4);
+  const auto quartile = known.begin() + static_cast<std::ptrdiff_t>(known.size() / 4);
   std::ranges::nth_element(known, quartile);
-  const double depth_m = 1e-3 * *quartile;
-  const DepthNoise noise = noise_of(config);
-  const double wanted_m =
-      std::max(depth_m / 130.0, 0.2 * std::hypot(noise.base_m, noise.per_m * depth_m * depth_m));
-  const auto found = std::ranges::lower_bound(kSides_m, wanted_m);
+  const auto found = std::ranges::lower_bound(kSides_m, 1e-3 * *quartile / 74.0);
   return found == kSides_m.end() ? kSides_m.back() : *found;
 }
 
@@ -75,21 +91,37 @@ struct SemanticMapper::State {
         camera(its_camera),
         views(camera, config.min_range_m, config.max_range_m, palette),
         coarse_views(camera, noise_of(config), config.min_range_m),
-        mesh(config.voxel_m(), known_from(config)) {}
+        bands(bands_of(config)) {
+    for (std::size_t level = 0; level < bands.size(); ++level) {
+      const double voxel_m = std::ldexp(config.voxel_m(), static_cast<int>(level));
+      maps.emplace_back(voxel_m, known_from(config, voxel_m));
+    }
+    bands[space_level()].above_m = 0.0;
+  }
 
-  std::vector<Update> select(const DepthView& view, const BlockFusion& fusion,
+  void integrate(std::size_t level, const DepthView& view, const BlockFusion& fusion,
+                 const SE3& T_odom_cam, bool sees_free, IntegrationReport& report);
+  std::vector<Update> select(std::size_t level, const DepthView& view, const BlockFusion& fusion,
                              const SE3& T_odom_cam, IntegrationReport& report);
   static void fuse(const BlockFusion& fusion, const std::vector<Update>& updates);
-  void remove_empty(const BlockFusion& fusion, const std::vector<Update>& updates);
+  void remove_empty(std::size_t level, const BlockFusion& fusion,
+                    const std::vector<Update>& updates);
   void leave_window();
   void make_room();
-  void finalise(const std::vector<VoxelBlock*>& blocks);
+  void finalise(std::size_t level, const std::vector<VoxelBlock*>& blocks);
+  void note_finer(std::size_t level, const VoxelBlock& block);
+  [[nodiscard]] std::span<const BlockMap> finer_than(std::size_t level) const {
+    return std::span(maps).first(level);
+  }
+  [[nodiscard]] std::size_t block_count() const;
+  [[nodiscard]] std::size_t space_level() const;
 
   SemanticMappingConfig config;
   Camera camera;
   DepthViewMaker views;
   CoarseViews coarse_views;
-  BlockMap map;
+  std::vector<DepthBand> bands;
+  std::vector<BlockMap> maps;  // by band, with voxels of double size from one to the next
   IncrementalMesh mesh;
   std::size_t unreported = 0;  // number of blocks that were meshed since update_mesh()
   std::uint64_t frame = 0;
@@ -101,14 +133,42 @@ struct SemanticMapper::State {
   std::size_t dropped_faces = 0;
 };
 
+std::size_t SemanticMapper::State::block_count() const {
+  std::size_t count = 0;
+  for (const BlockMap& map : maps) count += map.size();
+  return count;
+}
+
+// Free space is followed in the finest map whose band contains its range. This map has also the
+// surface of smaller bands.
+std::size_t SemanticMapper::State::space_level() const {
+  std::size_t level = 0;
+  while (level + 1 < bands.size() && bands[level].to_m < SpaceTracker::kFreeRange_m) ++level;
+  return level;
+}
+
+void SemanticMapper::State::integrate(std::size_t level, const DepthView& view,
+                                      const BlockFusion& fusion, const SE3& T_odom_cam,
+                                      bool sees_free, IntegrationReport& report) {
+  const auto updates = select(level, view, fusion, T_odom_cam, report);
+  fuse(fusion, updates);
+  if (space && level == space_level()) {
+    for (const Update& update : updates) space->note(update.block->position);
+    if (sees_free) space->see_free(view, fusion, T_odom_cam, maps[level], way_m);
+  }
+  remove_empty(level, fusion, updates);
+}
+
 std::vector<SemanticMapper::State::Update> SemanticMapper::State::select(
-    const DepthView& view, const BlockFusion& fusion, const SE3& T_odom_cam,
+    std::size_t level, const DepthView& view, const BlockFusion& fusion, const SE3& T_odom_cam,
     IntegrationReport& report) {
   std::vector<Update> updates;
-  const NearBlocks near =
-      select_near_blocks(view, T_odom_cam, config.voxel_m(),
-                         static_cast<std::size_t>(config.max_blocks), frame, keyframe, map);
-  report.blocks_refused = near.refused;
+  BlockMap& map = maps[level];
+  const std::size_t others = block_count() - map.size();
+  const NearBlocks near = select_near_blocks(
+      view, T_odom_cam, bands[level],
+      std::max(static_cast<std::size_t>(config.max_blocks), others) - others, frame, keyframe, map);
+  report.blocks_refused += near.refused;
   for (VoxelBlock* block : near.blocks) {
     if (view.labelled && block->labels == nullptr)
       block->labels = std::make_unique<std::array<VoxelLabels, kBlockVoxels>>();
@@ -139,43 +199,72 @@ void SemanticMapper::State::fuse(const BlockFusion& fusion, const std::vector<Up
   });
 }
 
-void SemanticMapper::State::remove_empty(const BlockFusion& fusion,
+void SemanticMapper::State::remove_empty(std::size_t level, const BlockFusion& fusion,
                                          const std::vector<Update>& updates) {
   for (const Update& update : updates) {
     if (update.near || !fusion.is_empty(*update.block)) continue;
-    mesh.forget(*update.block, map, keyframe);
-    if (space) space->note_empty(update.block->position, way_m);
-    map.erase(Eigen::Vector3i(update.block->position));
+    mesh.forget(*update.block, maps[level], keyframe);
+    if (space && level == space_level()) space->note_empty(update.block->position, way_m);
+    maps[level].erase(Eigen::Vector3i(update.block->position));
   }
 }
 
-void SemanticMapper::State::finalise(const std::vector<VoxelBlock*>& blocks) {
-  unreported += mesh.finalise(blocks, map);
+// The larger voxels at the same points remember that smaller ones knew them.
+void SemanticMapper::State::note_finer(std::size_t level, const VoxelBlock& block) {
+  for (std::size_t coarser = level + 1; coarser < maps.size(); ++coarser) {
+    const int scale = 1 << (coarser - level);
+    const auto is_common = [&](int c) { return (c & (scale - 1)) == 0; };
+    for (int z = 0; z < kBlockSide; ++z)
+      for (int y = 0; y < kBlockSide; ++y)
+        for (int x = 0; x < kBlockSide; ++x) {
+          const Eigen::Vector3i at = kBlockSide * block.position + Eigen::Vector3i(x, y, z);
+          if (!is_common(at.x()) || !is_common(at.y()) || !is_common(at.z()) ||
+              !maps[level].knows(block, voxel_index(x, y, z)))
+            continue;
+          const Eigen::Vector3i voxel = at / scale;
+          const Eigen::Vector3i inside =
+              voxel.unaryExpr([](int c) { return c & (kBlockSide - 1); });
+          VoxelBlock* larger = maps[coarser].find((voxel - inside) / kBlockSide);
+          if (larger == nullptr) continue;
+          const auto row = static_cast<std::size_t>(inside.y() + kBlockSide * inside.z());
+          larger->finer_rows[row] =
+              static_cast<std::uint8_t>(larger->finer_rows[row] | 1 << inside.x());
+        }
+  }
+}
+
+void SemanticMapper::State::finalise(std::size_t level, const std::vector<VoxelBlock*>& blocks) {
+  unreported += mesh.finalise(blocks, maps[level], finer_than(level));
   for (VoxelBlock* block : blocks) {
-    if (space) space->note_left(block->position);
-    map.erase(Eigen::Vector3i(block->position));
+    note_finer(level, *block);
+    if (space && level == space_level()) space->note_left(block->position);
+    maps[level].erase(Eigen::Vector3i(block->position));
   }
 }
 
+// From the largest voxels on: their last mesh depends on smaller ones.
 void SemanticMapper::State::leave_window() {
-  std::vector<VoxelBlock*> old;
-  for (const auto& block : map.blocks())
-    if (way_m - block->last_seen_m > config.window_m) old.push_back(block.get());
-  if (!old.empty()) finalise(old);
+  for (std::size_t level = maps.size(); level-- > 0;) {
+    std::vector<VoxelBlock*> old;
+    for (const auto& block : maps[level].blocks())
+      if (way_m - block->last_seen_m > config.window_m) old.push_back(block.get());
+    if (!old.empty()) finalise(level, old);
+  }
 }
 
 void SemanticMapper::State::make_room() {
   const std::size_t most = static_cast<std::size_t>(config.max_blocks) * kFullEighths / 8;
-  if (map.size() <= most) return;
-  std::vector<VoxelBlock*> others;  // blocks not selected for this frame
-  for (const auto& block : map.blocks())
-    if (block->selected_in != frame) others.push_back(block.get());
-  std::stable_sort(others.begin(), others.end(), [](const VoxelBlock* a, const VoxelBlock* b) {
-    return a->last_seen != b->last_seen ? a->last_seen < b->last_seen
-                                        : a->selected_in < b->selected_in;
-  });
-  others.resize(std::min(others.size(), map.size() - most));
-  finalise(others);
+  for (std::size_t level = maps.size(); level-- > 0 && block_count() > most;) {
+    std::vector<VoxelBlock*> others;  // blocks not selected for this frame
+    for (const auto& block : maps[level].blocks())
+      if (block->selected_in != frame) others.push_back(block.get());
+    std::stable_sort(others.begin(), others.end(), [](const VoxelBlock* a, const VoxelBlock* b) {
+      return a->last_seen != b->last_seen ? a->last_seen < b->last_seen
+                                          : a->selected_in < b->selected_in;
+    });
+    others.resize(std::min(others.size(), block_count() - most));
+    finalise(level, others);
+  }
 }
 
 SemanticMapper::SemanticMapper(const SemanticMappingConfig& config, const Camera& camera,
@@ -217,23 +306,22 @@ IntegrationReport SemanticMapper::integrate(const DepthImage& depth, const Label
   state.coarse_views.add(depth, T_odom_cam, keyframe);
   report.off_palette_pixels = view.off_palette_pixels;
 
-  const float gain = exposure_gain(view, T_odom_cam, state.config.voxel_m(), state.map);
-  const BlockFusion fusion(state.config, view, T_odom_cam, keyframe, gain);
-  const auto updates = state.select(view, fusion, T_odom_cam, report);
-  State::fuse(fusion, updates);
-  if (state.space) {
-    for (const State::Update& update : updates) state.space->note(update.block->position);
-    if (new_keyframe || state.frame == 1)
-      state.space->see_free(view, fusion, T_odom_cam, state.map, state.way_m);
+  const float gain = exposure_gain(view, T_odom_cam, state.maps);
+  for (std::size_t level = 0; level < state.maps.size(); ++level) {
+    const BlockFusion fusion(state.config, state.maps[level].voxel_m(), view, T_odom_cam, keyframe,
+                             gain);
+    state.integrate(level, view, fusion, T_odom_cam, new_keyframe || state.frame == 1, report);
   }
-  state.remove_empty(fusion, updates);
   if (new_keyframe) state.leave_window();
   state.make_room();
   return report;
 }
 
 std::size_t SemanticMapper::update_mesh() {
-  return state_->mesh.update(state_->map) + std::exchange(state_->unreported, 0);
+  std::size_t meshed = std::exchange(state_->unreported, 0);
+  for (std::size_t level = 0; level < state_->maps.size(); ++level)
+    meshed += state_->mesh.update(state_->maps[level], state_->finer_than(level));
+  return meshed;
 }
 
 SurfaceDrop SemanticMapper::drop(const SupersededSurface& superseded) {
@@ -245,22 +333,27 @@ SurfaceDrop SemanticMapper::drop(const SupersededSurface& superseded) {
 void SemanticMapper::track_space(bool is_wanted) {
   state_->space.reset();
   if (!is_wanted) return;
-  state_->space.emplace(state_->config);
-  for (const auto& block : state_->map.blocks()) state_->space->note(block->position);
+  state_->space.emplace(state_->config.max_range_m, state_->config.window_m);
+  for (const auto& block : state_->maps[state_->space_level()].blocks())
+    state_->space->note(block->position);
 }
 
 SpaceChanges SemanticMapper::take_space_changes() {
-  return state_->space->take(state_->map);
+  return state_->space->take(state_->maps[state_->space_level()]);
+}
+
+double SemanticMapper::space_voxel_m() const {
+  return state_->maps[state_->space_level()].voxel_m();
 }
 
 MapMesh SemanticMapper::mesh() const {
-  MapMesh map = state_->mesh.snapshot(state_->map, state_->labelled, state_->coloured);
+  MapMesh map = state_->mesh.snapshot(state_->maps, state_->labelled, state_->coloured);
   map.views = state_->coarse_views.views();
   return map;
 }
 
 MapSize SemanticMapper::size() const {
-  return {state_->map.size(), state_->mesh.vertex_count(), state_->mesh.face_count(),
+  return {state_->block_count(), state_->mesh.vertex_count(), state_->mesh.face_count(),
           state_->mesh.final_face_count(), state_->dropped_faces};
 }
 

@@ -46,11 +46,13 @@ struct MapSize {
 ///
 /// Voxels are in blocks of 8^3 that are hashed by their position (Niessner et al., "Real-time 3D
 /// Reconstruction at Scale using Voxel Hashing", 2013). Blocks are allocated where a depth image
-/// shows surface. Every voxel of these blocks and, for carving, of the other blocks in view is
-/// projected into the depth image (Curless and Levoy, "A Volumetric Method for Building Complex
-/// Models from Range Images", 1996). Voxels near the surface also receive votes on labels (see
-/// VoxelLabels) by Bayes' rule, as in Rosinol et al., "Kimera: an Open-Source Library for Real-Time
-/// Metric-Semantic Localization and Mapping", 2020.
+/// shows surface, with voxels of a size that fits the error of its depth: there is a map for each
+/// band of depths. Surface that a map of smaller voxels knows is not meshed from larger ones. Every
+/// voxel of these blocks and, for carving, of the other blocks in view is projected into the depth
+/// image (Curless and Levoy, "A Volumetric Method for Building Complex Models from Range Images",
+/// 1996). Voxels near the surface also receive votes on labels (see VoxelLabels) by Bayes' rule, as
+/// in Rosinol et al., "Kimera: an Open-Source Library for Real-Time Metric-Semantic Localization
+/// and Mapping", 2020.
 ///
 /// The mesh has no cracks: blocks share the vertices on their borders. Only changed blocks are
 /// meshed again. A vertex is the crossing of one grid edge, and keeps its identity while the
@@ -73,10 +75,10 @@ class SemanticMapper {
   SemanticMapper(SemanticMapper&&) noexcept;
   SemanticMapper& operator=(SemanticMapper&&) noexcept;
 
-  /// Fuses one depth image and, unless null, its labels. `T_odom_cam` is the camera's pose,
-  /// `keyframe` the robot's last keyframe at that time. Throws std::invalid_argument if `keyframe`
-  /// is before that of an earlier call.
-  /// Colours of the camera's image may be added; those of another size do not count.
+  /// Fuses one depth image and, unless null, its labels and the colours of the camera's image.
+  /// Colours of another size do not count. `T_odom_cam` is the camera's pose, `keyframe` the
+  /// robot's last keyframe at that time. Throws std::invalid_argument if `keyframe` is before that
+  /// of an earlier call.
   IntegrationReport integrate(const DepthImage& depth, const LabelImage* labels,
                               const SE3& T_odom_cam, KeyframeIndex keyframe,
                               const ColorImage* color = nullptr);
@@ -104,6 +106,9 @@ class SemanticMapper {
   /// at first that of all blocks. Free space away from surface is updated with the first frame of
   /// each keyframe. Voxels that known_from() excludes are unknown. Precondition: track_space(true).
   [[nodiscard]] SpaceChanges take_space_changes();
+
+  /// Side of the voxels of the space changes [m].
+  [[nodiscard]] double space_voxel_m() const;
 
  private:
   struct State;

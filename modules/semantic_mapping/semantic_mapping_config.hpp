@@ -1,6 +1,8 @@
 #pragma once
 
+#include <memory>
 #include <optional>
+#include <span>
 
 #include "modules/core/config.hpp"
 #include "modules/core/frame.hpp"
@@ -39,9 +41,10 @@ struct SemanticMappingConfig {
 
   void visit_fields(auto& visitor) {
     visitor.field("voxel_size_m", voxel_size_m, {0.005, 1.0},
-                  "[m] side of a voxel; half of it needs about four times the memory, time and "
-                  "triangles; left "
-                  "out: 0.02 to 0.1 by the depths of the first image and their noise");
+                  "[m] side of the smallest voxels; half of it needs up to four times the memory, "
+                  "time and triangles; left out: 0.02 to 0.1 by the depths of the first images. "
+                  "Farther surface has voxels of twice this size, four times, and so on, so that "
+                  "four voxels are at least two standard deviations of depth");
     visitor.field("min_range_m", min_range_m, {0.0, 10.0},
                   "[m along the optical axis] smallest depth that is used");
     visitor.field("max_range_m", max_range_m, {0.5, 65.0}, "[m] largest depth that is used");
@@ -54,7 +57,7 @@ struct SemanticMappingConfig {
     visitor.field("min_views", min_views, {1, 255},
                   "number of images that must show a surface before it is meshed; excludes single "
                   "wrong depths. More are needed until the standard deviation of their mean depth "
-                  "is below a voxel");
+                  "is below half a voxel");
     visitor.field("window_m", window_m, {0.1, 1e6},
                   "[m] distance travelled after which an unseen block becomes final mesh and its "
                   "voxels are discarded; on return it is mapped again; the drift of odometry over "
@@ -65,16 +68,16 @@ struct SemanticMappingConfig {
   }
 };
 
-/// Voxels are known once min_views images have observed them, and the standard deviation of the
-/// mean of their depths is below a voxel.
-[[nodiscard]] inline KnownFrom known_from(const SemanticMappingConfig& config) {
-  const double share = SemanticMappingConfig::kDepthSigma_m / config.voxel_m();
+/// Voxels of side `voxel_m` are known once min_views images have observed them, and the standard
+/// deviation of the mean of their depths is below half a voxel.
+[[nodiscard]] inline KnownFrom known_from(const SemanticMappingConfig& config, double voxel_m) {
+  const double share = 2.0 * SemanticMappingConfig::kDepthSigma_m / voxel_m;
   return {static_cast<std::uint8_t>(config.min_views), static_cast<float>(share * share)};
 }
 
-/// The side of voxels that fits a camera's first depth image: 0.02, 0.03, 0.05 or 0.1 m. It is the
-/// smallest above a 130th of the upper quartile of the depths and a fifth of its standard
-/// deviation.
-[[nodiscard]] double fitting_voxel_m(const SemanticMappingConfig& config, const DepthImage& depth);
+/// The side of the smallest voxels that fits a camera's first depth images: 0.02, 0.03, 0.05 or
+/// 0.1 m, at least a 74th of the lower quartile of the depths.
+[[nodiscard]] double fitting_voxel_m(const SemanticMappingConfig& config,
+                                     std::span<const std::shared_ptr<const DepthImage>> images);
 
 }  // namespace km

@@ -25,6 +25,17 @@ std::pair<Eigen::Vector3i, Eigen::Vector3i> blocks_in(const DepthView& view, con
   return {block(low), block(high)};
 }
 
+BlockSpace space_of(const BlockMap& map, const VoxelBlock& block) {
+  BlockSpace space{.position = block.position};
+  for (std::size_t k = 0; k < kBlockVoxels; ++k) {
+    const std::uint64_t bit = std::uint64_t{1} << (k % 64);
+    if (!map.knows(block, k)) continue;
+    space.observed[k / 64] |= bit;
+    if (block.distance[k] <= 0.0F) space.inside[k / 64] |= bit;
+  }
+  return space;
+}
+
 }  // namespace
 
 void SpaceTracker::note_empty(const Eigen::Vector3i& position, double way_m) {
@@ -41,8 +52,8 @@ void SpaceTracker::note_left(const Eigen::Vector3i& position) {
 
 void SpaceTracker::see_free(const DepthView& view, const BlockFusion& fusion, const SE3& T_odom_cam,
                             const BlockMap& map, double way_m) {
-  const double depth_m = std::min(kFreeRange_m, config_.max_range_m);
-  const auto [low, high] = blocks_in(view, T_odom_cam, depth_m, kBlockSide * config_.voxel_m());
+  const double depth_m = std::min(kFreeRange_m, range_m_);
+  const auto [low, high] = blocks_in(view, T_odom_cam, depth_m, kBlockSide * map.voxel_m());
   for (int z = low.z(); z <= high.z(); ++z)
     for (int y = low.y(); y <= high.y(); ++y)
       for (int x = low.x(); x <= high.x(); ++x) {
@@ -51,7 +62,7 @@ void SpaceTracker::see_free(const DepthView& view, const BlockFusion& fusion, co
           add_free(fusion, way_m);
       }
   for (auto entry = free_.begin(); entry != free_.end();) {
-    if (way_m - entry->second.last_seen_m > config_.window_m) {
+    if (way_m - entry->second.last_seen_m > window_m_) {
       changed_.insert(entry->first);
       entry = free_.erase(entry);
     } else {
@@ -83,24 +94,12 @@ void SpaceTracker::add_free(const BlockFusion& fusion, double way_m) {
   }
 }
 
-BlockSpace SpaceTracker::space_of(const VoxelBlock& block) const {
-  BlockSpace space{.position = block.position};
-  const KnownFrom known = known_from(config_);
-  for (std::size_t k = 0; k < kBlockVoxels; ++k) {
-    const std::uint64_t bit = std::uint64_t{1} << (k % 64);
-    if (!block.knows(k, known)) continue;
-    space.observed[k / 64] |= bit;
-    if (block.distance[k] <= 0.0F) space.inside[k / 64] |= bit;
-  }
-  return space;
-}
-
 SpaceChanges SpaceTracker::take(const BlockMap& map) {
   SpaceChanges changes;
   for (const Eigen::Vector3i& position : std::exchange(changed_, {})) {
     const auto free = free_.find(position);
     BlockSpace space{.position = position};
-    if (const VoxelBlock* block = map.find(position)) space = space_of(*block);
+    if (const VoxelBlock* block = map.find(position)) space = space_of(map, *block);
     // A voxel that was seen free before the block had surface stays known.
     if (free != free_.end())
       for (std::size_t z = 0; z < space.observed.size(); ++z)

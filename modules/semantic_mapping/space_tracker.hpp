@@ -19,7 +19,8 @@ class SpaceTracker {
  public:
   static constexpr double kFreeRange_m = 5.0;
 
-  explicit SpaceTracker(const SemanticMappingConfig& config) : config_(config) {}
+  /// `range_m`: range of depths; `window_m`: as in SemanticMappingConfig.
+  SpaceTracker(double range_m, double window_m) : range_m_(range_m), window_m_(window_m) {}
 
   /// The block of the map has changed.
   void note(const Eigen::Vector3i& position) { changed_.insert(position); }
@@ -44,10 +45,9 @@ class SpaceTracker {
     double last_seen_m = 0.0;
   };
 
-  [[nodiscard]] BlockSpace space_of(const VoxelBlock& block) const;
   void add_free(const BlockFusion& fusion, double way_m);
 
-  SemanticMappingConfig config_;
+  double range_m_, window_m_;
   std::unordered_map<Eigen::Vector3i, FreeBlock, BlockHash> free_;
   std::set<Eigen::Vector3i, BlockOrder> changed_;
   VoxelBlock scratch_;

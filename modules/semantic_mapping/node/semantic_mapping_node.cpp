@@ -9,6 +9,7 @@ namespace km {
 namespace {
 
 constexpr std::size_t kQueuedFrames = 2;
+constexpr std::size_t kFirstFrames = 5;  // frames whose depths decide on the side of voxels
 
 }  // namespace
 
@@ -31,6 +32,7 @@ SemanticMappingNode::SemanticMappingNode(const SemanticMappingConfig& config, co
 }
 
 void SemanticMappingNode::conclude() {
+  map_first();
   if (progress_.integrated == 0 && !before_) return;
   progress_.too_late = load().dropped;
   publish_mesh();
@@ -58,7 +60,18 @@ void SemanticMappingNode::drop_superseded() {
 
 void SemanticMappingNode::step(const DenseFrame& frame) {
   drop_superseded();
-  if (!mapper_) make_mapper(*frame.depth);
+  if (mapper_) return map(frame);
+  first_.push_back(frame);
+  if (config_.voxel_size_m || first_.size() == kFirstFrames) map_first();
+}
+
+void SemanticMappingNode::map_first() {
+  if (first_.empty()) return;
+  make_mapper();
+  for (const DenseFrame& frame : std::exchange(first_, {})) map(frame);
+}
+
+void SemanticMappingNode::map(const DenseFrame& frame) {
   count(frame, mapper_->integrate(*frame.depth, frame.labels.get(), frame.T_odom_cam,
                                   frame.keyframe, frame.color.get()));
   // The mesh is updated once for each keyframe, so that a vertex gets the first one that saw it.
@@ -76,11 +89,13 @@ void SemanticMappingNode::step(const DenseFrame& frame) {
   topics_.progress.publish(progress_);
 }
 
-void SemanticMappingNode::make_mapper(const DepthImage& depth) {
+void SemanticMappingNode::make_mapper() {
   const bool is_chosen = !config_.voxel_size_m;
-  if (is_chosen) config_.voxel_size_m = fitting_voxel_m(config_, depth);
-  log::info(name()) << "voxels of " << fixed(config_.voxel_m(), 3) << " m"
-                    << (is_chosen ? ", by the depths of the first image" : "") << "; depths up to "
+  std::vector<std::shared_ptr<const DepthImage>> images;
+  for (const DenseFrame& frame : first_) images.push_back(frame.depth);
+  if (is_chosen) config_.voxel_size_m = fitting_voxel_m(config_, images);
+  log::info(name()) << "voxels from " << fixed(config_.voxel_m(), 3) << " m on"
+                    << (is_chosen ? ", by the depths of the first images" : "") << "; depths up to "
                     << fixed(config_.max_range_m, 1) << " m";
   mapper_.emplace(config_, camera_, palette_);
 }
@@ -103,7 +118,7 @@ void SemanticMappingNode::publish_space(const DenseFrame& frame) {
   if (is_wanted != std::exchange(tracks_space_, is_wanted)) mapper_->track_space(is_wanted);
   if (is_wanted)
     topics_.space.publish(SpaceUpdate{.stamp = frame.stamp,
-                                      .voxel_m = config_.voxel_m(),
+                                      .voxel_m = mapper_->space_voxel_m(),
                                       .camera_z_m = frame.T_odom_cam.translation().z(),
                                       .is_first = is_first,
                                       .changes = mapper_->take_space_changes()});

@@ -3,6 +3,7 @@
 #include <functional>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "modules/core/dense_frame.hpp"
 #include "modules/mesh/resumed_map.hpp"
@@ -50,7 +51,9 @@ class SemanticMappingNode final : public WorkerNode<Topic<DenseFrame>::Message> 
  private:
   void handle(const Topic<DenseFrame>::Message& frame) override { step(*frame); }
   void conclude() override;
-  void make_mapper(const DepthImage& depth);
+  void make_mapper();
+  void map_first();
+  void map(const DenseFrame& frame);
   void count(const DenseFrame& frame, const IntegrationReport& report);
   void drop_superseded();
   void publish_mesh();
@@ -58,7 +61,8 @@ class SemanticMappingNode final : public WorkerNode<Topic<DenseFrame>::Message> 
 
   SemanticMappingConfig config_;
   Camera camera_;
-  std::optional<SemanticMapper> mapper_;  // from the first frame on
+  std::optional<SemanticMapper> mapper_;
+  std::vector<DenseFrame> first_;  // frames before the side of voxels is chosen
   LabelPalette palette_;
   const double mesh_interval_s_;
   const SemanticMappingTopics topics_;

@@ -40,7 +40,7 @@ void fill(BlockMap& map, int n, const Distance& distance) {
       for (int x = -n; x < n; ++x) fill(map.insert({x, y, z}), distance);
 }
 
-IncrementalMesh new_mesh() {
+BlockMap new_map() {
   return {kVoxel_m, {.views = 0}};
 }
 
@@ -66,11 +66,11 @@ TEST_CASE("The mesh of a sphere is closed across blocks and near the sphere",
           "[semantic_mapping]") {
   constexpr double kRadius_m = 1.0;
   const auto sphere = [](const Eigen::Vector3d& p) { return (p - kCentre).norm() - kRadius_m; };
-  BlockMap map;
+  BlockMap map = new_map();
   fill(map, 2, sphere);
-  IncrementalMesh mesh = new_mesh();
+  IncrementalMesh mesh;
   mesh.update(map);
-  const LabelledMesh result = mesh.snapshot(map, false).mesh;
+  const LabelledMesh result = mesh.snapshot({&map, 1}, false).mesh;
   CHECK(result.labels.empty());
   REQUIRE(result.vertices.size() > 1000);
   CHECK(rim_of(result).empty());
@@ -91,15 +91,15 @@ TEST_CASE("The surface has no cracks with any signs", "[semantic_mapping]") {
   CAPTURE(seed);
   std::mt19937 rng(seed);
   std::uniform_real_distribution<double> draw(-1.0, 1.0);
-  BlockMap map;
+  BlockMap map = new_map();
   // Noise in the middle, free space around it.
   fill(map, 2, [&](const Eigen::Vector3d& p) {
     const double value = draw(rng);
     return p.cwiseAbs().maxCoeff() < 11.5 * kVoxel_m ? value : 1.0;
   });
-  IncrementalMesh mesh = new_mesh();
+  IncrementalMesh mesh;
   mesh.update(map);
-  const LabelledMesh result = mesh.snapshot(map, false).mesh;
+  const LabelledMesh result = mesh.snapshot({&map, 1}, false).mesh;
   CHECK(result.faces.size() > 10000);  // all 256 kinds of cells
   CHECK(rim_of(result).empty());
   CHECK(volume_of(result) > 0.0);
@@ -109,23 +109,23 @@ TEST_CASE("Only changed blocks are meshed again, and vertices keep their identit
           "[semantic_mapping]") {
   double radius_m = 1.0;
   const auto sphere = [&](const Eigen::Vector3d& p) { return (p - kCentre).norm() - radius_m; };
-  BlockMap map;
+  BlockMap map = new_map();
   fill(map, 2, sphere);
-  IncrementalMesh mesh = new_mesh();
+  IncrementalMesh mesh;
   CHECK(mesh.update(map) == 64);
-  const MapMesh before = mesh.snapshot(map, false);
+  const MapMesh before = mesh.snapshot({&map, 1}, false);
   CHECK(std::is_sorted(before.ids.begin(), before.ids.end()));
 
   SECTION("without a change nothing happens") {
     CHECK(mesh.update(map) == 0);
-    const MapMesh after = mesh.snapshot(map, false);
+    const MapMesh after = mesh.snapshot({&map, 1}, false);
     CHECK(after.ids == before.ids);
     CHECK(after.mesh.faces == before.mesh.faces);
   }
   SECTION("repeated values give the same vertices") {
     for (const auto& block : map.blocks()) fill(*block, sphere);
     mesh.update(map);
-    const MapMesh after = mesh.snapshot(map, false);
+    const MapMesh after = mesh.snapshot({&map, 1}, false);
     CHECK(after.ids == before.ids);
     CHECK(after.mesh.vertices == before.mesh.vertices);
     CHECK(after.mesh.faces == before.mesh.faces);
@@ -135,13 +135,13 @@ TEST_CASE("Only changed blocks are meshed again, and vertices keep their identit
     REQUIRE(block != nullptr);
     fill(*block, sphere);
     CHECK(mesh.update(map) == 8);
-    CHECK(mesh.snapshot(map, false).ids == before.ids);
+    CHECK(mesh.snapshot({&map, 1}, false).ids == before.ids);
   }
   SECTION("a sphere that grows a little keeps most of its vertices, and stays closed") {
     radius_m = 1.01;
     for (const auto& block : map.blocks()) fill(*block, sphere);
     mesh.update(map);
-    const MapMesh after = mesh.snapshot(map, false);
+    const MapMesh after = mesh.snapshot({&map, 1}, false);
     CHECK(rim_of(after.mesh).empty());
     std::vector<std::uint64_t> kept;
     std::set_intersection(before.ids.begin(), before.ids.end(), after.ids.begin(), after.ids.end(),
@@ -156,11 +156,11 @@ TEST_CASE("Final mesh stays when its blocks are erased and stays connected with 
           "[semantic_mapping]") {
   double radius_m = 1.0;
   const auto sphere = [&](const Eigen::Vector3d& p) { return (p - kCentre).norm() - radius_m; };
-  BlockMap map;
+  BlockMap map = new_map();
   fill(map, 2, sphere);
-  IncrementalMesh mesh = new_mesh();
+  IncrementalMesh mesh;
   mesh.update(map);
-  const MapMesh before = mesh.snapshot(map, false);
+  const MapMesh before = mesh.snapshot({&map, 1}, false);
   const std::vector<Eigen::Vector3i> leaving{{0, 0, 0}, {1, 0, 0}, {0, -1, 1}};
   std::vector<VoxelBlock*> blocks;
   for (const Eigen::Vector3i& position : leaving) blocks.push_back(map.find(position));
@@ -168,7 +168,7 @@ TEST_CASE("Final mesh stays when its blocks are erased and stays connected with 
   for (const Eigen::Vector3i& position : leaving) map.erase(position);
   CHECK(mesh.final_face_count() > 0);
 
-  const MapMesh same = mesh.snapshot(map, false);
+  const MapMesh same = mesh.snapshot({&map, 1}, false);
   CHECK(same.ids == before.ids);
   CHECK(same.mesh.vertices == before.mesh.vertices);
   CHECK(same.mesh.faces.size() == before.mesh.faces.size());
@@ -177,14 +177,14 @@ TEST_CASE("Final mesh stays when its blocks are erased and stays connected with 
   // The rest is meshed again: the surface is equal and the seam is closed.
   for (const auto& block : map.blocks()) fill(*block, sphere);
   mesh.update(map);
-  const MapMesh again = mesh.snapshot(map, false);
+  const MapMesh again = mesh.snapshot({&map, 1}, false);
   CHECK(again.ids == before.ids);
   CHECK(rim_of(again.mesh).empty());
 
   // One of the blocks returns and is observed again: this adds new vertices.
   fill(map.insert({0, 0, 0}), sphere);
   mesh.update(map);
-  const MapMesh revisited = mesh.snapshot(map, false);
+  const MapMesh revisited = mesh.snapshot({&map, 1}, false);
   CHECK(revisited.ids.size() > before.ids.size());
   CHECK(std::includes(revisited.ids.begin(), revisited.ids.end(), before.ids.begin(),
                       before.ids.end()));
@@ -192,12 +192,12 @@ TEST_CASE("Final mesh stays when its blocks are erased and stays connected with 
 
 TEST_CASE("Unobserved voxels leave a hole, not a wall", "[semantic_mapping]") {
   const auto plane = [](const Eigen::Vector3d& p) { return p.z() - 0.05; };
-  BlockMap map;
+  BlockMap map = new_map();
   fill(map, 1, plane);
   map.find({0, 0, 0})->weight[voxel_index(4, 4, 0)] = 0.0F;
-  IncrementalMesh mesh = new_mesh();
+  IncrementalMesh mesh;
   mesh.update(map);
-  const LabelledMesh result = mesh.snapshot(map, false).mesh;
+  const LabelledMesh result = mesh.snapshot({&map, 1}, false).mesh;
   // 15 x 15 cells of two triangles, without the four around the voxel.
   CHECK(result.faces.size() == 2 * (15 * 15 - 4));
   // Counter-clockwise from free space, above.
@@ -214,7 +214,7 @@ struct PlaneTwice {
   PlaneTwice() {
     see(kFirst_m, 1, 3);
     leave();
-    first = mesh.snapshot(map, true);
+    first = mesh.snapshot({&map, 1}, true);
     see(kSecond_m, 2, 2);
   }
 
@@ -236,7 +236,7 @@ struct PlaneTwice {
   }
   // Each vertex of the first visit, with the vertex of the second visit above it.
   [[nodiscard]] SupersededSurface superseded() {
-    const MapMesh both = mesh.snapshot(map, false);
+    const MapMesh both = mesh.snapshot({&map, 1}, false);
     std::map<std::pair<float, float>, std::uint64_t> above;
     for (std::size_t v = 0; v < both.ids.size(); ++v) {
       const Eigen::Vector3f& p = both.mesh.vertices[v];
@@ -250,8 +250,8 @@ struct PlaneTwice {
     return surface;
   }
 
-  BlockMap map;
-  IncrementalMesh mesh = new_mesh();
+  BlockMap map = new_map();
+  IncrementalMesh mesh;
   MapMesh first;
 };
 
@@ -273,7 +273,7 @@ TEST_CASE("Superseded final surface is dropped and its votes on labels are kept"
     CHECK(dropped.vertices == vertices);
     CHECK(plane.mesh.face_count() == faces);
     CHECK(plane.mesh.final_face_count() == faces);
-    const MapMesh left = plane.mesh.snapshot(plane.map, true);
+    const MapMesh left = plane.mesh.snapshot({&plane.map, 1}, true);
     REQUIRE(left.ids.size() == vertices);
     for (std::size_t v = 0; v < vertices; ++v) {
       CHECK(left.mesh.vertices[v].z() == Approx(PlaneTwice::kSecond_m));
@@ -293,7 +293,7 @@ TEST_CASE("Superseded final surface is dropped and its votes on labels are kept"
     CHECK(plane.mesh.drop(all_but_one).faces == faces - around);
     // The remaining vertices got no votes: the replacements next to them know only the second
     // visit.
-    const MapMesh left = plane.mesh.snapshot(plane.map, true);
+    const MapMesh left = plane.mesh.snapshot({&plane.map, 1}, true);
     std::size_t stayed = 0;
     for (std::size_t v = 0; v < left.ids.size(); ++v) {
       stayed += left.mesh.vertices[v].z() < 0.06F ? 1 : 0;
@@ -308,7 +308,7 @@ TEST_CASE("Superseded final surface is dropped and its votes on labels are kept"
     plane.leave();
     (void)plane.mesh.drop(superseded);
     plane.see(0.03, 2, 1);
-    const MapMesh seen = plane.mesh.snapshot(plane.map, true);
+    const MapMesh seen = plane.mesh.snapshot({&plane.map, 1}, true);
     CHECK(seen.ids.size() == 2 * vertices);
     CHECK(seen.ids[vertices] > superseded.vertices.back().replacement);  // ids are not reused
   }
