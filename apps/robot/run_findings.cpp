@@ -295,6 +295,14 @@ class FindingsOfRun {
           "vertical (map.yaml needs a level camera there); no pose is known while vision is lost "
           "for more than a second",
           "");
+    if (run_.odometry && run_.odometry->vision_losses > 0)
+      add(kWarning, "odometry.blind",
+          "vision was lost " + std::to_string(run_.odometry->vision_losses) + " times, for " +
+              fixed(run_.odometry->blind_s, 1) + " s in all",
+          run_.odometry->has_imu
+              ? "inertial sensing alone gives the poses of these times, which are less certain"
+              : "the poses of these times are extrapolated, and less certain",
+          "the log names the times: avoid blank walls, darkness and motion blur there");
     if (!run_.holes) return;
     const HolesSummary& holes = *run_.holes;
     add(kWarning, "trajectory.hole",

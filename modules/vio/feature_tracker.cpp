@@ -368,7 +368,8 @@ std::optional<SE3> FeatureTracker::drop_outliers(std::vector<Step>& steps, const
   } else if (has_gyro_) {
     drop_by_two_points(steps, guess);
   } else {  // the wrong features are unknown
-    for (Step& step : steps) step.now.inverse_depth = step.depth_before;
+    statistics_.motion += static_cast<int>(steps.size());
+    steps.clear();
   }
   return motion;
 }

@@ -199,6 +199,10 @@ SmootherUpdate FixedLagSmoother::add(const InertialFrame& frame, bool rests) {
   update.fit = fit_of_newest();
   update.outliers = reject_outliers();
   if (has_imu_ && !newest.imu->rests() && !newest.is_bridged) compare_gyro();
+  if (is_moved)
+    shown_motion_.add(
+        window_.frames[last_keyframe()].state, newest.state,
+        seconds_between(window_.frames[window_.frames.size() - 2].state.stamp, newest.state.stamp));
   update.state = newest.state;
   update.keyframe = newest.keyframe;
   for (const WindowLandmark& landmark : window_.landmarks) {
@@ -219,6 +223,13 @@ bool FixedLagSmoother::append(const InertialFrame& frame, OdometryState state, d
   if (now == 0) return true;
   added.samples = frame.samples;
   added.is_bridged = frame.is_bridged;
+  added.is_smooth = !has_imu_ && !frame.tracked.T_previous_current;
+  // The prior determines the velocity after the last image before the loss of vision, too.
+  WindowFrame& before = window_.frames[now - 1];
+  if (added.is_smooth && before.imu && !before.imu->rests()) {
+    before.is_smooth = true;
+    if (!set_imu(now - 1)) return false;
+  }
   return window_.calibrates ? share_samples() && set_imu(now) : set_imu(now);
 }
 
@@ -244,7 +255,7 @@ bool FixedLagSmoother::set_imu(std::size_t frame) {
   WindowFrame& f = window_.frames[frame];
   ImuNoise noise = noise_;
   if (!has_imu_)
-    noise = virtual_imu_noise(config_, seconds_between(before.state.stamp, f.state.stamp));
+    noise = prior_noise(f.is_smooth, seconds_between(before.state.stamp, f.state.stamp));
   noise.gyro_noise_density *= gyro_noise_.scale();
   if (f.is_bridged) {
     noise.gyro_noise_density = std::max(noise.gyro_noise_density, kBridgeGyro);
@@ -264,6 +275,19 @@ bool FixedLagSmoother::set_imu(std::size_t frame) {
   f.imu = covered ? ImuFactor::of(imu, config_.gravity_mps2) : std::nullopt;
   if (f.imu) f.gyro = gyro_at(samples, f.instant());
   return f.imu.has_value();
+}
+
+// Noise of the virtual sensor, see motion_prior.hpp.
+ImuNoise FixedLagSmoother::prior_noise(bool is_smooth, double dt_s) const {
+  const MotionNoise allowed{.accel = config_.motion_accel, .turn = config_.motion_turn};
+  return virtual_imu_noise(is_smooth ? shown_motion_.noise(allowed) : allowed, dt_s);
+}
+
+// Last keyframe before the newest image; the first image if there is none.
+std::size_t FixedLagSmoother::last_keyframe() const {
+  std::size_t last = window_.frames.size() - 2;
+  while (last > 0 && !window_.frames[last].keyframe) --last;
+  return last;
 }
 
 void FixedLagSmoother::compare_gyro() {
@@ -288,8 +312,7 @@ void FixedLagSmoother::decide_keyframe() {
     newest.keyframe = !window_.frames[now - 1].rests;
     return;
   }
-  std::size_t last = now - 1;
-  while (last > 0 && !window_.frames[last].keyframe) --last;
+  const std::size_t last = last_keyframe();
   const WindowFrame& keyframe = window_.frames[last];
   const double patience = locates_new(window_) ? 1.0 : kPatience;
   if (seconds_between(keyframe.state.stamp, newest.state.stamp) >= patience * kKeyframeInterval_s) {
@@ -313,6 +336,9 @@ void FixedLagSmoother::decide_keyframe() {
     parallax.push_back((p.head<2>() / p.z() - *in_keyframe->bearings[0]).norm());
   }
   if (seen_now < kMinKeyframeFeatures) return;
+  // The window lacks some lost features of the keyframe. With an inertial sensor, motion is
+  // also determined without common features.
+  if (!has_imu_) seen_in_keyframe = keyframe.features;
   if (patience * static_cast<double>(parallax.size()) <= kKeyframeTrackedShare * seen_in_keyframe ||
       parallax.empty()) {
     newest.keyframe = true;
@@ -538,6 +564,7 @@ bool FixedLagSmoother::drop_and_merge(std::size_t frame) {
   later = joined(window_.frames[frame].samples, later, window_.frames[frame - 1].instant(),
                  window_.frames[frame + 1].instant());
   window_.frames[frame + 1].is_bridged |= window_.frames[frame].is_bridged;
+  window_.frames[frame + 1].is_smooth &= window_.frames[frame].is_smooth;
   forget_frame(window_, frame);
   return set_imu(frame);
 }
@@ -552,7 +579,7 @@ void FixedLagSmoother::drop_at_rest(std::size_t frame) {
     if (std::ranges::none_of(landmark.observations, in_keyframe)) landmark.located = false;
   WindowFrame& later = window_.frames[frame];
   const double dt_s = seconds_between(window_.frames[frame - 1].state.stamp, later.state.stamp);
-  later.imu = ImuFactor::at_rest(has_imu_ ? noise_ : virtual_imu_noise(config_, dt_s), dt_s);
+  later.imu = ImuFactor::at_rest(has_imu_ ? noise_ : prior_noise(false, dt_s), dt_s);
 }
 
 }  // namespace km

@@ -8,6 +8,7 @@
 #include "modules/core/covariance.hpp"
 #include "modules/vio/estimate_watch.hpp"
 #include "modules/vio/gyro_noise_scale.hpp"
+#include "modules/vio/motion_prior.hpp"
 #include "modules/vio/tracked_frame.hpp"
 #include "modules/vio/vio_config.hpp"
 #include "modules/vio/window.hpp"
@@ -113,6 +114,8 @@ class FixedLagSmoother {
   [[nodiscard]] bool share_samples();
   [[nodiscard]] bool set_imu(std::size_t frame);
   void compare_gyro();
+  [[nodiscard]] ImuNoise prior_noise(bool is_smooth, double dt_s) const;
+  [[nodiscard]] std::size_t last_keyframe() const;
   void decide_keyframe();
   int reject_outliers();
   [[nodiscard]] ImageFit fit_of_newest() const;
@@ -132,6 +135,7 @@ class FixedLagSmoother {
   ImuNoise noise_;
   bool has_imu_;  // False: see motion_prior.hpp.
   GyroNoiseScale gyro_noise_;
+  ShownMotion shown_motion_;  // Without an inertial sensor.
   double focal_px_;
   Eigen::Matrix3d R_cam_body_;
   SE3 T_body_left_;

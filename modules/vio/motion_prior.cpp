@@ -1,5 +1,6 @@
 #include "modules/vio/motion_prior.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -34,11 +35,25 @@ VioConfig config_for(const SensorRig& rig, const VioConfig& config) {
   return result;
 }
 
-ImuNoise virtual_imu_noise(const VioConfig& config, double dt_s) {
-  return {.gyro_noise_density = config.motion_turn * dt_s / std::numbers::sqrt3,
-          .gyro_random_walk = config.motion_turn,
-          .accel_noise_density = config.motion_accel,
+ImuNoise virtual_imu_noise(const MotionNoise& motion, double dt_s) {
+  return {.gyro_noise_density = motion.turn * dt_s / std::numbers::sqrt3,
+          .gyro_random_walk = motion.turn,
+          .accel_noise_density = motion.accel,
           .accel_random_walk = kHeldAccel};
+}
+
+void ShownMotion::add(const OdometryState& former, const OdometryState& newest, double dt_s) {
+  const double over_s = 3.0 * seconds_between(former.stamp, newest.stamp);
+  seconds_ += dt_s;
+  const double share = dt_s / std::min(seconds_, kTimeConstant_s);
+  accel_ += share * ((newest.v_odom - former.v_odom).squaredNorm() / over_s - accel_);
+  turn_ += share * ((newest.gyro_bias - former.gyro_bias).squaredNorm() / over_s - turn_);
+}
+
+MotionNoise ShownMotion::noise(const MotionNoise& most) const {
+  if (seconds_ == 0.0) return most;
+  return {.accel = std::min(kCaution * std::sqrt(accel_), most.accel),
+          .turn = std::min(kCaution * std::sqrt(turn_), most.turn)};
 }
 
 std::vector<ImuSample> virtual_samples(Stamp from, Stamp to) {

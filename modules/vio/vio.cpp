@@ -81,7 +81,8 @@ Vio::Vio(RobotId robot, const SensorRig& rig, const TrackerConfig& tracker, cons
       readout_s_(tracker.readout_s),
       tracker_(rig.stereo, tracker, rig.has_imu),
       smoother_(rig, config),
-      rest_detector_(config_, rig.stereo.cameras[0].fx) {
+      rest_detector_(config_, rig.stereo.cameras[0].fx),
+      vision_(rig.has_imu) {
   statistics_.has_imu = rig.has_imu;
 }
 

@@ -16,7 +16,7 @@ std::optional<VisionEvent> VisionWatch::add(Stamp stamp, int features, int seen)
     lost_s_ += now_lost_s_;
     return event;
   }
-  if (is_lost_ || now_lost_s_ < kPatience_s) return std::nullopt;
+  if (is_lost_ || now_lost_s_ < patience_s_) return std::nullopt;
   is_lost_ = true;
   ++losses_;
   return event;

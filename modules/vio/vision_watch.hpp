@@ -16,11 +16,14 @@ struct VisionEvent {
 
 /// Detects from each image whether vision still determines the pose. An image holds the pose if it
 /// shows at least kMinLandmarks located landmarks. Vision is lost when no image has held the pose
-/// for kPatience_s, and returns with the next image that holds the pose.
+/// for kPatience_s, and returns with the next image that holds the pose. Without an inertial sensor
+/// nothing else holds the pose, and there is no patience.
 class VisionWatch {
  public:
   static constexpr int kMinLandmarks = 8;
   static constexpr double kPatience_s = 0.3;
+
+  explicit VisionWatch(bool has_imu = true) : patience_s_(has_imu ? kPatience_s : 0.0) {}
 
   /// Adds an image with `features` features, `seen` of them located landmarks; `seen` is 0 while
   /// odometry has no pose. Stamps ascend. There is no loss before the first image that holds the
@@ -33,6 +36,7 @@ class VisionWatch {
   [[nodiscard]] double lost_s() const { return lost_s_ + (is_lost_ ? now_lost_s_ : 0.0); }
 
  private:
+  double patience_s_;
   bool has_seen_ = false;
   bool is_lost_ = false;
   int losses_ = 0;

@@ -201,6 +201,7 @@ std::vector<SE3> image_poses(const Window& window) {
 }
 
 void observe(Window& window, const TrackedFrame& tracked) {
+  window.frames.back().features = static_cast<int>(tracked.features.size());
   std::vector<WindowLandmark> added;
   auto at = window.landmarks.begin();
   for (const TrackedFeature& feature :

@@ -81,10 +81,13 @@ struct WindowFrame {
   OdometryState state;
   bool keyframe = false;
   bool rests = false;  ///< The body stands still in this image.
+  int features = 0;    ///< Number of features in the image.
   /// Samples since the frame before, except for rests. The samples of the first frame are used only
   /// by the following frames.
   std::vector<ImuSample> samples;
-  bool is_bridged = false;       ///< `samples` have a gap: see InertialFrame.
+  bool is_bridged = false;  ///< `samples` have a gap: see InertialFrame.
+  /// Without an inertial sensor: this image or the next one shows no motion. See ShownMotion.
+  bool is_smooth = false;
   std::optional<ImuFactor> imu;  ///< Factor from the frame before; none for the first.
   /// The state belongs to the instant state.stamp + offset_s of the inertial sensor.
   double offset_s = 0.0;

@@ -173,6 +173,8 @@ TEST_CASE("A finding on a run is reported with its severity and its number", "[r
        of([](auto& s) { s.pgo.odometry_breaks = 2; })},
       {"odometry.images_alone", kNote, "without an inertial sensor",
        of([](auto& s) { s.odometry = VioStatistics{.has_imu = false}; })},
+      {"odometry.blind", kWarning, "vision was lost 3 times, for 1.5 s in all",
+       of([](auto& s) { s.odometry = VioStatistics{.vision_losses = 3, .blind_s = 1.5}; })},
       {"map.dropped_under_load", kWarning, "25 frames were left out of the map, 25 %",
        of([](auto& s) { s.mapping = {.frames = 75, .dropped_under_load = 25}; })},
       {"map.dropped_under_load", kNote, "1 frames",

@@ -125,12 +125,13 @@ void VioNode::step(const SensorPacket& packet) {
 void VioNode::log_event(const VisionEvent& event, bool has_imu) const {
   const std::string since = fixed(1e-9 * static_cast<double>(event.since), 3) + " s";
   if (event.is_lost)
-    log::warn(name()) << "vision lost since " << since << ", " << event.features
-                      << " features: the pose is "
-                      << (has_imu ? "by inertial sensing alone" : "extrapolated");
+    log::limited(log::Level::kWarn, name(), "vision lost")
+        << "vision lost since " << since << ", " << event.features << " features: the pose is "
+        << (has_imu ? "by inertial sensing alone" : "extrapolated");
   else
-    log::info(name()) << "vision lost since " << since << " is back after "
-                      << fixed(event.lasted_s, 2) << " s, " << event.features << " features";
+    log::limited(log::Level::kInfo, name(), "vision back")
+        << "vision lost since " << since << " is back after " << fixed(event.lasted_s, 2) << " s, "
+        << event.features << " features";
 }
 
 void VioNode::report(const VioResult& result, Stamp stamp) const {

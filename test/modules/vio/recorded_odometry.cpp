@@ -53,6 +53,19 @@ struct SeenRay {
   double depth_ratio = 0.0;
 };
 
+// Poses of the body by the truth in `folder`; none if there is no truth.
+std::vector<StampedPose> read_truth(const std::filesystem::path& folder, const SensorRig& rig) {
+  const SE3 T_cam_body = rig.stereo.cameras[0].T_body_cam.inverse();
+  if (layout_of(folder) == FolderLayout::kEuroc) {
+    const auto states = folder / "mav0/state_groundtruth_estimate0";
+    return std::filesystem::exists(states) ? read_trajectory(states) : std::vector<StampedPose>{};
+  }
+  if (layout_of(folder) != FolderLayout::kTum) return read_camera_poses(folder, T_cam_body);
+  std::vector<StampedPose> poses = read_trajectory(folder / "groundtruth.txt");
+  for (StampedPose& pose : poses) pose.T = pose.T * T_cam_body;
+  return poses;
+}
+
 // Rays of all pixels of the left camera; nullopt if its lens has no bearing there.
 std::vector<std::optional<SeenRay>> seen_rays(const Camera& rectified, const Camera& left) {
   const SE3 T_rect_left = rectified.T_body_cam.inverse() * left.T_body_cam;
@@ -94,13 +107,11 @@ Recording read_recording(const std::filesystem::path& folder, double from_s, dou
   options.part.from_s = from_s;
   options.part.to_s = to_s;
   options.imu = imu;
-  FolderReader reader = open_folder(folder, options);
+  const bool is_tum = layout_of(folder) == FolderLayout::kTum;
+  FolderReader reader = open_folder(folder, options, is_tum ? folder / "rig.yaml" : "");
   Recording result;
   result.rig = reader.rig();
-  const auto truth =
-      layout_of(folder) == FolderLayout::kEuroc
-          ? read_trajectory(folder / "mav0/state_groundtruth_estimate0")
-          : read_camera_poses(folder, result.rig.stereo.cameras[0].T_body_cam.inverse());
+  const std::vector<StampedPose> truth = read_truth(folder, result.rig);
   const Eigen::Matrix4d unknown =
       Eigen::Matrix4d::Constant(std::numeric_limits<double>::quiet_NaN());
   while (auto packet = reader.next()) {

@@ -22,7 +22,8 @@ struct Recording {
 };
 
 /// Images of `folder` (see FolderLayout) from `from_s` to `to_s`, with the poses of its
-/// groundtruth_tum.txt or poses.txt. `imu`: with the inertial sensor, if there is one.
+/// groundtruth_tum.txt, groundtruth.txt or poses.txt, if there is one. `imu`: with the inertial
+/// sensor, if there is one.
 Recording read_recording(const std::filesystem::path& folder, double from_s, double to_s,
                          bool imu = true);
 

@@ -21,7 +21,8 @@ VioConfig without_imu() {
 
 ImuPreintegration virtual_preintegration(Stamp to) {
   const VioConfig config = without_imu();
-  ImuPreintegration imu(virtual_imu_noise(config, seconds_between(0, to)), Eigen::Vector3d::Zero(),
+  const MotionNoise noise{.accel = config.motion_accel, .turn = config.motion_turn};
+  ImuPreintegration imu(virtual_imu_noise(noise, seconds_between(0, to)), Eigen::Vector3d::Zero(),
                         Eigen::Vector3d::Zero());
   REQUIRE(imu.add(virtual_samples(0, to), 0, to));
   return imu;
@@ -126,6 +127,69 @@ TEST_CASE("Images alone: a loss of vision is extrapolated for a second, then odo
   for (std::size_t k = 1; k < run.keyframes.size(); ++k)
     CHECK(run.keyframes[k].id.index == run.keyframes[k - 1].id.index + 1);
   CHECK(run.states.back().stamp == data->packets.back().frame->stamp);
+}
+
+TEST_CASE("The noise of the shown motion is that of a random walk of both speeds",
+          "[vio][images]") {
+  constexpr double kAccel = 0.5, kTurn = 0.8, kStep_s = 0.05;
+  std::mt19937 rng(3);
+  ShownMotion shown;
+  const MotionNoise most{.accel = 10.0, .turn = 5.0};
+  CHECK(shown.noise(most).accel == most.accel);
+  OdometryState now;
+  for (int k = 0; k < 400; ++k) {
+    const OdometryState before = now;
+    now.stamp += nanoseconds(kStep_s);
+    now.v_odom += std::sqrt(kStep_s) * kAccel * random_vector<3>(rng);
+    now.gyro_bias += std::sqrt(kStep_s) * kTurn * random_vector<3>(rng);
+    shown.add(before, now, kStep_s);
+  }
+  // The mean of 3 s has 180 degrees of freedom: 5 % of the deviation, here four times as much.
+  CHECK(shown.noise(most).accel == Approx(ShownMotion::kCaution * kAccel).epsilon(0.2));
+  CHECK(shown.noise(most).turn == Approx(ShownMotion::kCaution * kTurn).epsilon(0.2));
+  CHECK(shown.noise({.accel = 0.1, .turn = 0.1}).accel == 0.1);
+}
+
+// Images 10 to 12 show a blank wall.
+TEST_CASE("TartanAir: a blank wall is a loss of vision, bridged within the stated uncertainty",
+          "[vio][images]") {
+  const Recording* const data = recording("tartanair_hospital", 3.0);
+  if (data == nullptr) return;
+  const OdometryRun run = run_odometry(*data, 0, data->packets.size(), {}, {});
+  REQUIRE(run.states.size() == data->packets.size());
+  CHECK(run.statistics.vision_losses == 1);
+  CHECK(run.statistics.blind_s == Approx(0.2));
+  for (std::size_t k = 1; k < run.states.size(); ++k) {
+    const SE3 step = run.states[k - 1].T_odom_body.inverse() * run.states[k].T_odom_body;
+    const SE3 truth = run.truth[k - 1].inverse() * run.truth[k];
+    CAPTURE(k);
+    CHECK((step.translation() - truth.translation()).norm() < 0.02);  // wrong tracks: 0.19
+    CHECK(angle_of(step.linear().transpose() * truth.linear()) < 0.01);
+  }
+  double usual_m = 1.0, largest_m = 0.0;
+  for (std::size_t k = 1; k < run.keyframes.size(); ++k) {
+    const double sigma_m = std::sqrt(run.keyframes[k].covariance.bottomRightCorner<3, 3>().trace());
+    usual_m = std::min(usual_m, sigma_m);
+    largest_m = std::max(largest_m, sigma_m);
+  }
+  CHECK(largest_m > 3.0 * usual_m);
+}
+
+TEST_CASE("ZED 2: odometry does not jump against the motion of the tracks", "[vio][images]") {
+  const Recording* const data = recording("zed2_clips/desk_c", 6.0);
+  if (data == nullptr) return;
+  FeatureTracker tracker(data->rig.stereo, {}, false);
+  const OdometryRun run = run_odometry(*data, 0, data->packets.size(), {}, {});
+  REQUIRE(run.states.size() == data->packets.size());
+  for (std::size_t k = 0; k < run.states.size(); ++k) {
+    const auto motion =
+        tracker.track(*data->packets[k].frame, Eigen::Matrix3d::Identity()).T_previous_current;
+    if (!motion) continue;
+    const SE3 step = run.states[k - 1].T_odom_body.inverse() * run.states[k].T_odom_body;
+    CAPTURE(k);
+    // Keyframes with few common landmarks: 0.057 m.
+    CHECK(std::abs(step.translation().norm() - motion->translation().norm()) < 0.02);
+  }
 }
 
 }  // namespace

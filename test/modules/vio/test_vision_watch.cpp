@@ -10,7 +10,7 @@ constexpr Stamp kStart = 7'000'000'000, kPeriod = 50'000'000;
 
 // The events of images in a row, each with the landmarks that it sees.
 struct Watched {
-  VisionWatch watch = {};
+  VisionWatch watch{};
   Stamp stamp = kStart;
   std::vector<VisionEvent> events = {};
 
@@ -52,6 +52,19 @@ TEST_CASE("A few images without landmarks and a start without vision are no loss
   }
   CHECK(run.events.empty());
   CHECK(run.watch.lost_s() == 0.0);
+}
+
+TEST_CASE("Without an inertial sensor a single image without landmarks is a loss",
+          "[vio][vision]") {
+  Watched run{.watch = VisionWatch(false)};
+  run.add(20, 50);
+  run.add(1, VisionWatch::kMinLandmarks - 1);
+  REQUIRE(run.events.size() == 1);
+  CHECK(run.events[0].is_lost);
+  run.add(20, 50);
+  REQUIRE(run.events.size() == 2);
+  CHECK(run.watch.losses() == 1);
+  CHECK(run.watch.lost_s() == Approx(0.05));
 }
 
 }  // namespace
