@@ -2,6 +2,8 @@
 
 #include <arpa/inet.h>
 #include <ifaddrs.h>
+#include <linux/if_bridge.h>
+#include <linux/sockios.h>
 #include <net/if.h>
 #include <netdb.h>
 #include <sys/ioctl.h>
@@ -61,6 +63,22 @@ class QuerySocket {
     ifreq request{};
     std::strncpy(request.ifr_name, interface, IFNAMSIZ - 1);
     return ioctl(socket_, SIOCGIFMTU, &request) == 0 ? request.ifr_mtu : 0;
+  }
+
+  // True for a bridge without members, for instance of containers: it has a carrier nevertheless.
+  [[nodiscard]] bool is_empty_bridge(const char* interface) const {
+    using Arguments = std::array<unsigned long, 4>;  // see if_bridge.h
+    std::array<int, 256> bridges{}, members{};
+    Arguments list = {BRCTL_GET_BRIDGES, reinterpret_cast<unsigned long>(bridges.data()), 256, 0};
+    const int index = static_cast<int>(if_nametoindex(interface));
+    if (ioctl(socket_, SIOCGIFBR, list.data()) <= 0 || std::ranges::count(bridges, index) == 0)
+      return false;
+    Arguments ports = {BRCTL_GET_PORT_LIST, reinterpret_cast<unsigned long>(members.data()), 256,
+                       0};
+    ifreq request{};
+    std::strncpy(request.ifr_name, interface, IFNAMSIZ - 1);
+    request.ifr_data = reinterpret_cast<char*>(ports.data());
+    return ioctl(socket_, SIOCDEVPRIVATE, &request) >= 0 && std::ranges::count(members, 0) == 256;
   }
 
   struct Route {
@@ -254,7 +272,8 @@ std::vector<NetworkInterface> network_interfaces(const std::vector<std::string>&
                           .multicast = (entry->ifa_flags & IFF_MULTICAST) != 0,
                           .loopback = (entry->ifa_flags & IFF_LOOPBACK) != 0,
                           .index = if_nametoindex(entry->ifa_name),
-                          .carrier = (entry->ifa_flags & IFF_RUNNING) != 0,
+                          .carrier = (entry->ifa_flags & IFF_RUNNING) != 0 &&
+                                     !QuerySocket().is_empty_bridge(entry->ifa_name),
                           .mtu = QuerySocket().mtu_of(entry->ifa_name)});
   }
   add_routes(hosts, interfaces);

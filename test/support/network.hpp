@@ -43,7 +43,7 @@ class VirtualNetwork {
   /// Larger packets to `host` are dropped on the way, without a notice to the sender.
   void set_path_mtu(int host, int bytes);
 
-  /// Gives `host` a second interface, "eth1", that leads nowhere: it has no carrier.
+  /// Gives `host` a second interface, "eth1", that leads nowhere: a bridge without members.
   void add_dead_interface(int host);
 
  private:
