@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "apps/output_file.hpp"
+#include "modules/core/quantile.hpp"
 
 namespace km {
 namespace {
@@ -89,10 +90,8 @@ std::vector<PoseHole> pose_holes(std::span<const StampedPose> path) {
   intervals_s.reserve(path.size() - 1);
   for (std::size_t i = 1; i < path.size(); ++i)
     intervals_s.push_back(seconds_between(path[i - 1].stamp, path[i].stamp));
-  const auto middle =
-      intervals_s.begin() + static_cast<std::ptrdiff_t>((intervals_s.size() - 1) / 2);
-  std::ranges::nth_element(intervals_s, middle);
-  const double longest_s = std::max(kHole_s, kHoleIntervals * *middle);
+  const double longest_s =
+      std::max(kHole_s, kHoleIntervals * quantile(std::move(intervals_s), 0.5));
   std::vector<PoseHole> holes;
   for (std::size_t i = 1; i < path.size(); ++i)
     if (seconds_between(path[i - 1].stamp, path[i].stamp) > longest_s)

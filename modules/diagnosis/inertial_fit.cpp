@@ -6,6 +6,8 @@
 #include <limits>
 #include <vector>
 
+#include "modules/core/quantile.hpp"
+
 namespace km {
 
 GyroIntegral::GyroIntegral(std::span<const ImuSample> samples) : samples_(samples) {
@@ -93,12 +95,11 @@ double coarse_offset(const GyroIntegral& gyro, std::span<const VisualRotation> s
 std::vector<VisualRotation> trusted(const GyroIntegral& gyro, std::span<const VisualRotation> seen,
                                     double offset_s) {
   const Eigen::VectorXd squares = residuals(image_rates(seen), gyro_rates(gyro, seen, offset_s));
-  std::vector<double> sorted(squares.data(), squares.data() + squares.size());
-  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
-  std::nth_element(sorted.begin(), middle, sorted.end());
+  const double median =
+      quantile(std::vector<double>(squares.data(), squares.data() + squares.size()), 0.5);
   std::vector<VisualRotation> kept;
   for (std::size_t k = 0; k < seen.size(); ++k)
-    if (squares[static_cast<Eigen::Index>(k)] <= kMaxDeviation * kMaxDeviation * *middle)
+    if (squares[static_cast<Eigen::Index>(k)] <= kMaxDeviation * kMaxDeviation * median)
       kept.push_back(seen[k]);
   return kept;
 }

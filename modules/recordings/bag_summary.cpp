@@ -8,6 +8,7 @@
 #include <optional>
 #include <string_view>
 
+#include "modules/core/quantile.hpp"
 #include "modules/recordings/bag_reader.hpp"
 #include "modules/recordings/ros_messages.hpp"
 
@@ -81,16 +82,6 @@ void add_message(TopicSummary& topic, const BagChannel& channel, const BagMessag
 }
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-
-// Quantile: the smallest value such that at least `share` of the values are no larger. `values` is
-// not empty.
-double quantile(std::vector<double> values, double share) {
-  const auto rank = static_cast<std::size_t>(
-      std::max(1.0, std::ceil(share * static_cast<double>(values.size()))));
-  const auto at = values.begin() + static_cast<std::ptrdiff_t>(rank - 1);
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
-}
 
 // seconds_between() for arbitrary stamps, whose difference may overflow a Stamp.
 double seconds_from_to(Stamp a, Stamp b) {

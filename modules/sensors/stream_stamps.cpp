@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "modules/core/quantile.hpp"
 #include "modules/core/text_table.hpp"
 #include "modules/recordings/bag_summary.hpp"
 
@@ -166,8 +167,7 @@ Synchrony find_synchrony(std::span<const Stamp> left, std::span<const Stamp> oth
   std::vector<double> intervals_s;
   for (std::size_t i = 1; i < left.size(); ++i)
     intervals_s.push_back(seconds_between(left[i - 1], left[i]));
-  std::ranges::nth_element(intervals_s, intervals_s.begin() + std::ssize(intervals_s) / 2);
-  const double interval_s = intervals_s[intervals_s.size() / 2];
+  const double interval_s = quantile(std::move(intervals_s), 0.5);
   const StampAgreement agreement = stamp_agreement(left, other, 0.5 * interval_s);
   if (agreement.pairs == 0) return found;
   found.offset_s = agreement.median_offset_s;

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "modules/core/config.hpp"
+#include "modules/core/quantile.hpp"
 #include "modules/core/text_table.hpp"
 
 namespace km {
@@ -99,14 +100,6 @@ std::string number_text(double value) {
   return value >= 1e3 && value < 1e7 ? fixed(value, 0) : rounded(value, 4);
 }
 
-// NaN without values.
-double median_of(std::vector<double> values) {
-  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
-
 }  // namespace
 
 std::optional<Doubt> doubt(UsualNumber number, double value) {
@@ -131,6 +124,7 @@ std::optional<Doubt> doubt(UsualNumber number, double value) {
     doubt.id = "imu.no_gravity";
     doubt.what += ": the driver subtracts gravity, or uses another unit";
     doubt.to_do = "set the driver to raw acceleration";
+    doubt.is_explained = true;
   }
   return doubt;
 }
@@ -150,7 +144,7 @@ std::vector<Doubt> rig_doubts(const StereoRig& rig) {
 double median_acceleration(const std::vector<ImuSample>& samples) {
   std::vector<double> norms;
   for (const ImuSample& sample : samples) norms.push_back(sample.accel.norm());
-  return median_of(std::move(norms));
+  return quantile(std::move(norms), 0.5);
 }
 
 void FirstPackets::add_depth(const StereoFrame& frame) {
@@ -185,7 +179,7 @@ std::vector<Doubt> FirstPackets::add(const SensorPacket& packet) {
   judge(UsualNumber::kDepthShare,
         static_cast<double>(count) / static_cast<double>(depths_m_.size()));  // NaN without depth
   depths_m_.resize(count);
-  judge(UsualNumber::kDepth_m, median_of(depths_m_));
+  judge(UsualNumber::kDepth_m, quantile(depths_m_, 0.5));
   depths_m_ = {};
   samples_ = {};
   return doubts;

@@ -23,11 +23,6 @@ constexpr float kOnPlane_m = 0.3F;        // distance up to which a face belongs
 constexpr float kPlaneCell_m = 0.5F;      // side of the cells in which planes are fitted
 constexpr std::size_t kLeastInCell = 10;  // samples of a plane
 
-double median(std::vector<float> values) {
-  return values.empty() ? std::numeric_limits<double>::quiet_NaN()
-                        : quantile(std::move(values), 0.5);
-}
-
 Eigen::Vector3f normal_of(const LabelledMesh& mesh, std::size_t face) {
   const auto [a, b, c] = mesh.faces[face];
   return (mesh.vertices[b] - mesh.vertices[a])
@@ -138,10 +133,10 @@ void judge_map(const LabelledMesh& truth, const LabelledMesh& map, const Surface
   };
   quality.within_5cm = share(0.05F);
   quality.within_10cm = share(0.10F);
-  quality.median_mm = 1e3 * median(distances_m);
-  quality.wall_deg = median(std::move(wall_deg));
-  quality.floor_deg = median(std::move(floor_deg));
-  quality.wall_rms_mm = median(planes.rms_mm());
+  quality.median_mm = 1e3 * quantile(distances_m, 0.5);
+  quality.wall_deg = quantile(std::move(wall_deg), 0.5);
+  quality.floor_deg = quantile(std::move(floor_deg), 0.5);
+  quality.wall_rms_mm = quantile(planes.rms_mm(), 0.5);
 }
 
 double open_edges_m(const LabelledMesh& mesh) {
