@@ -1,9 +1,11 @@
 #include "modules/core/calibration_limits.hpp"
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 
 #include "modules/core/lie.hpp"
+#include "modules/core/text_table.hpp"
 
 namespace km {
 namespace {
@@ -59,6 +61,13 @@ std::optional<std::string> transform_problem(const Eigen::Matrix4d& T) {
 }
 
 std::optional<std::string> pair_problem(const StereoRig& rig) {
+  // No lens has bearings farther from its axis.
+  static const double kMost_rad = 2.0 * std::atan(Lens::kMaxBearing);
+  const double cosine = rig.T_left_right()(2, 2);
+  if (cosine < std::cos(kMost_rad))
+    return "makes the cameras look " + fixed(kDegrees * std::acos(std::max(cosine, -1.0)), 0) +
+           " degrees apart (back to back, or one pose is inverted): no point is in both images; "
+           "name two cameras that look in one direction";
   if (!(rig.baseline_m() >= kMinBaseline_m)) return "puts the right camera where the left one is";
   if (rig.T_left_right().translation().x() < -0.5 * rig.baseline_m())
     return "puts the right camera to the left of the left one: exchange them";

@@ -210,8 +210,8 @@ std::optional<Eigen::Vector2d> inverse_double_sphere(double xi, double alpha,
 
 // The bearing up to which the image radius increases with the bearing. The paper's region of valid
 // points is that of a positive denominator; with a xi near -1 the image folds back within it.
-double max_double_sphere_bearing(double xi, double alpha) {
-  return first_failure(Lens::kMaxBearing, [&](double r) {
+double max_double_sphere_bearing(double xi, double alpha, double end) {
+  return first_failure(end, [&](double r) {
     const double z = 1.0 + xi * std::sqrt(1.0 + r * r), dz = xi * r / std::sqrt(1.0 + r * r);
     const double d = std::hypot(r, z);
     const double below = alpha * d + (1.0 - alpha) * z;
@@ -228,7 +228,7 @@ bool is_count(LensModel model, std::size_t count) {
     case LensModel::kOmnidirectional:
       return count == 5;
     case LensModel::kDoubleSphere:
-      return count == 2;
+      return count == 2 || count == 3;
   }
   return false;
 }
@@ -246,6 +246,13 @@ void require_usable(LensModel model, const std::vector<double>& k) {
     throw std::invalid_argument(lens + "xi = " + std::to_string(k[0]) + " is not within (-1, 1]");
   if (!(k[1] >= 0.0 && k[1] <= 1.0))
     throw std::invalid_argument(lens + "alpha = " + std::to_string(k[1]) + " is not within [0, 1]");
+  if (k.size() == 3 && !(k[2] > 0.0))
+    throw std::invalid_argument(lens + "beta = " + std::to_string(k[2]) + " is not positive");
+}
+
+// The root of beta of a double-sphere lens: 1 without beta.
+double root_beta(const Lens::Coefficients& k) {
+  return k[2] > 0.0 ? std::sqrt(k[2]) : 1.0;
 }
 
 // The largest radius of points of radial-tangential distortion, from the largest bearing.
@@ -291,7 +298,8 @@ Lens::Lens(LensModel model, const std::vector<double>& coefficients)
       return;
     }
     case LensModel::kDoubleSphere:
-      max_bearing_ = max_double_sphere_bearing(k[0], k[1]);
+      max_bearing_ =
+          max_double_sphere_bearing(k[0], k[1], kMaxBearing * root_beta(k)) / root_beta(k);
       return;
   }
 }
@@ -317,7 +325,7 @@ std::optional<Eigen::Vector2d> Lens::distorted(const Eigen::Vector2d& bearing) c
       return Eigen::Vector2d((1.0 + k[0]) * RadialTangential(k.data() + 1).point(m));
     }
     case LensModel::kDoubleSphere:
-      return double_sphere(k[0], k[1], bearing);
+      return double_sphere(k[0], k[1], bearing * root_beta(k)) / root_beta(k);
   }
   return std::nullopt;
 }
@@ -340,8 +348,11 @@ std::optional<Eigen::Vector2d> Lens::undistorted(const Eigen::Vector2d& point) c
       const auto m = inverse_of(RadialTangential(k.data() + 1), on_plane, max_plane_);
       return m ? lifted(k[0], *m, max_bearing_) : std::nullopt;
     }
-    case LensModel::kDoubleSphere:
-      return inverse_double_sphere(k[0], k[1], point, max_bearing_);
+    case LensModel::kDoubleSphere: {
+      const double root = root_beta(k);
+      const auto bearing = inverse_double_sphere(k[0], k[1], point * root, max_bearing_ * root);
+      return bearing ? std::optional<Eigen::Vector2d>(*bearing / root) : std::nullopt;
+    }
   }
   return std::nullopt;
 }

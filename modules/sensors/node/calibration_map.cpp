@@ -44,14 +44,15 @@ struct Projection {
 };
 constexpr Projection kProjections[] = {{"pinhole", 4, "fu, fv, cu, cv"},
                                        {"omni", 5, "xi, fu, fv, cu, cv"},
-                                       {"ds", 6, "xi, alpha, fu, fv, cu, cv"}};
+                                       {"ds", 6, "xi, alpha, fu, fv, cu, cv"},
+                                       {"eucm", 6, "alpha, beta, fu, fv, cu, cv"}};
 
 const Projection& read_projection(const CalibrationMap& map) {
   const std::string name = map.word("camera_model");
   for (const Projection& projection : kProjections)
     if (name == projection.name) return projection;
   map.fail("camera_model",
-           "camera_model '" + name + "' is not supported, only pinhole, omni and ds");
+           "camera_model '" + name + "' is not supported, only pinhole, omni, ds and eucm");
 }
 
 [[noreturn]] void refuse_distortion(const CalibrationMap& map, const std::string& name,
@@ -287,7 +288,11 @@ Camera read_camera(const CalibrationMap& map, const char* coefficients_key) {
   } else {
     if (map.word("distortion_model") != "none")
       refuse_distortion(map, map.word("distortion_model"), "none");
-    camera.lens = lens_of(map, "intrinsics", LensModel::kDoubleSphere, {K[0], K[1]});
+    const bool is_enhanced = model == "eucm";
+    const std::vector<double> k =
+        is_enhanced ? std::vector{0.0, K[0], K[1]} : std::vector{K[0], K[1]};
+    camera.lens = lens_of(map, "intrinsics", LensModel::kDoubleSphere, k);
+    if (is_enhanced) return camera;
   }
   camera.fx /= 1.0 + K[0];
   camera.fy /= 1.0 + K[0];

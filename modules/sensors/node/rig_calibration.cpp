@@ -212,15 +212,14 @@ TypedLens read_lens(const CalibrationMap& camera, const CalibrationMap& k) {
     const std::vector<double> values = values_of(k, {"xi", "alpha"});
     return {lens(LensModel::kDoubleSphere, values), 1.0 / (1.0 + values[0])};
   }
-  if (type == "ucm") {
-    // x / (alpha d + (1 - alpha) z) is Mei's model with xi = alpha / (1 - alpha) and unit
-    // magnification on the axis.
-    const double alpha = k.number("alpha", {0.0, 0.99});
-    return {lens(LensModel::kOmnidirectional, {alpha / (1.0 - alpha), 0.0, 0.0, 0.0, 0.0})};
+  if (type == "eucm") {
+    const std::vector<double> values = values_of(k, {"alpha", "beta"});
+    return {lens(LensModel::kDoubleSphere, {0.0, values[0], values[1]})};
   }
+  if (type == "ucm") return {lens(LensModel::kDoubleSphere, {0.0, values_of(k, {"alpha"})[0]})};
   camera.fail("camera_type", "camera_type '" + type +
-                                 "' is not supported, only pinhole, pinhole-radtan8, kb4, ds and "
-                                 "ucm");
+                                 "' is not supported, only pinhole, pinhole-radtan8, kb4, ds, "
+                                 "eucm and ucm");
 }
 
 SE3 read_pose(const CalibrationMap& pose) {

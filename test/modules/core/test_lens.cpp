@@ -36,7 +36,8 @@ std::vector<Lens> all_lenses() {
           kOmni,
           Lens(LensModel::kOmnidirectional, {2.2, -0.1, 0.4, 1e-3, -2e-3}),
           kTumViDoubleSphere,
-          Lens(LensModel::kDoubleSphere, {0.3, 0.4})};
+          Lens(LensModel::kDoubleSphere, {0.3, 0.4}),
+          Lens(LensModel::kDoubleSphere, {0.0, 0.6, 1.1})};
 }
 
 // Bearings over the whole disc of a lens, denser near the axis.
@@ -102,6 +103,11 @@ TEST_CASE("A double sphere maps bearings like the equations of its paper", "[cor
   const Eigen::Vector2d expected = 0.8 * Eigen::Vector2d(0.6, -0.8) / below;
   CHECK((lens.distorted({0.6, -0.8}).value() - expected).norm() < 1e-14);
 
+  // The enhanced unified model at the same bearing: d = sqrt(beta (x^2 + y^2) + z^2).
+  const double unified = 0.6 * std::sqrt(1.1 + 1.0) + 0.4;
+  const auto found = Lens(LensModel::kDoubleSphere, {0.0, 0.6, 1.1}).distorted({0.6, -0.8});
+  CHECK((found.value() - Eigen::Vector2d(0.6, -0.8) / unified).norm() < 1e-14);
+
   // The lens of TUM-VI in two calibrations with separate focal lengths. They were estimated
   // independently, and agree to a pixel.
   const double f = 190.97847715128717, f_sphere = 158.28600034966977 / (1.0 - 0.17213086034353243);
@@ -115,7 +121,7 @@ TEST_CASE("A double sphere maps bearings like the equations of its paper", "[cor
 }
 
 TEST_CASE("Undistorting inverts distorting on the whole disc of a lens", "[core][lens]") {
-  const auto index = GENERATE(range(0, 10));
+  const auto index = GENERATE(range(0, 11));
   CAPTURE(index);
   const Lens lens = all_lenses()[static_cast<std::size_t>(index)];
   CHECK(lens.max_bearing() > 1.0);
@@ -206,6 +212,7 @@ TEST_CASE("Invalid coefficients of a lens are refused", "[core][lens]") {
   refuses(LensModel::kOmnidirectional, {-0.1, 0.1, 0.0, 0.0, 0.0});
   refuses(LensModel::kDoubleSphere, {-1.0, 0.5});
   refuses(LensModel::kDoubleSphere, {0.0, 1.1});
+  refuses(LensModel::kDoubleSphere, {0.0, 0.6, 0.0});
 }
 
 }  // namespace

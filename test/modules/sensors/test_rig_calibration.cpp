@@ -164,6 +164,10 @@ TEST_CASE("The models of Kalibr's chains are read", "[sensors][calibration]") {
       left_of(replaced(replaced(none, "pinhole", "ds"), "[458.6,", "[-0.2, 0.6, 458.6,"));
   CHECK(ds.lens == Lens(LensModel::kDoubleSphere, {-0.2, 0.6}));
   CHECK(ds.fx == Approx(458.6 / 0.8));
+  const Camera eucm =
+      left_of(replaced(replaced(none, "pinhole", "eucm"), "[458.6,", "[0.6, 1.1, 458.6,"));
+  CHECK(eucm.lens == Lens(LensModel::kDoubleSphere, {0.0, 0.6, 1.1}));
+  CHECK(eucm.fx == 458.6);
   const Camera rational =
       left_of(replaced(kCamera0, "0.00002]", "0.00002, 0.01, 0.1, 0.02, 0.003]"));
   CHECK(rational.lens.coefficients().size() == 8);
@@ -266,6 +270,9 @@ TEST_CASE("Basalt's other models are read", "[sensors][calibration]") {
   const Camera ucm = left_of("ucm", R"("alpha": 0.6)");
   CHECK(ucm.project({1.0, 0.0}).value().x() ==
         Approx(254.9 + 158.0 / (0.6 * std::sqrt(2.0) + 0.4)));
+  const Camera eucm = left_of("eucm", R"("alpha": 0.6, "beta": 1.1)");
+  CHECK(eucm.project({1.0, 0.0}).value().x() ==
+        Approx(254.9 + 158.0 / (0.6 * std::sqrt(2.1) + 0.4)));
 }
 
 TEST_CASE("An unused part of a calibration is noted with its place", "[sensors][calibration]") {
@@ -333,6 +340,11 @@ TEST_CASE("A file that is no calibration is refused with a list of the expected 
   CHECK_THROWS_WITH(files.read("a.yaml", kImu),
                     Catch::Contains("also name Kalibr's chain of cameras"));
   CHECK_THROWS_WITH(files.read_kalibr(kCamera0), Catch::Contains("one camera without depth"));
+  const std::string behind = replaced(replaced(cut(kCamera1, "  T_cn_cnm1", "  camera_model"),
+                                               "[0.0, -1.0, 0.0, -0.1]", "[0.0, 1.0, 0.0, 0.1]"),
+                                      "[1.0, 0.0, 0.0, -0.05]", "[-1.0, 0.0, 0.0, -0.05]");
+  CHECK_THROWS_WITH(files.read_kalibr(kCamera0 + behind),
+                    Catch::Contains("makes the cameras look 180 degrees apart"));
   CHECK_THROWS_WITH(files.read_kalibr(kCamera0 + kCamera1, kCamera0),
                     Catch::Contains("imu.yaml: a second file of cam0"));
   CHECK_THROWS_WITH(read_rig({EurocFolder().mav0() / "cam0" / "sensor.yaml"}),
@@ -364,7 +376,7 @@ TEST_CASE("An impossible Basalt file is refused with file and line", "[sensors][
     std::string from, to, message;
   };
   const Case c = GENERATE(
-      Case{R"("ds")", R"("eucm")", "line 9: camera_type 'eucm' is not supported"},
+      Case{R"("ds")", R"("fov")", "line 9: camera_type 'fov' is not supported"},
       Case{R"("alpha": 0.6)", R"("alpha": 1.6)", "line 9: camera_type: double sphere lens: alpha"},
       Case{R"("qw": 0.5})", R"("qw": 1.5})", "line 4: T_imu_cam: a quaternion of norm"},
       Case{R"([[512, 512], )", "[", "line 7: intrinsics of 2 cameras, but T_imu_cam of 2 and"},
