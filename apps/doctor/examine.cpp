@@ -17,12 +17,12 @@
 #include "apps/robot/run_findings.hpp"
 #include "modules/core/input_file.hpp"
 #include "modules/core/text_table.hpp"
+#include "modules/diagnosis/doubt_finding.hpp"
 #include "modules/diagnosis/examine_sensors.hpp"
 #include "modules/evaluation/closure_truth.hpp"
 #include "modules/place_recognition/vocabulary_file.hpp"
 #include "modules/recordings/ros_messages.hpp"
 #include "modules/sensors/node/rig_file.hpp"
-#include "modules/sensors/usual_numbers.hpp"
 #include "runtime/clock.hpp"
 #include "runtime/dds/ros_subscription.hpp"
 
@@ -196,8 +196,7 @@ Examination examine_packets(DatasetReader& reader, const RobotConfig& config, do
   result.add(examine_words(sample.descriptors, load_vocabulary(find_shipped_file(
                                                    config.run.vocabulary, "run.vocabulary"))));
   for (const Doubt& found : doubts)
-    if (!has(result, found.id))
-      result.add(kWarning, found.id, found.what, found.means, found.to_do);
+    if (!has(result, found.id)) result.findings.push_back(finding_of(found));
   sort_by_severity(result.findings);
   return result;
 }

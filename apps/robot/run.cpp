@@ -22,6 +22,7 @@
 #include "apps/program_version.hpp"
 #include "apps/result_files.hpp"
 #include "apps/result_writer.hpp"
+#include "apps/robot/failed_odometry.hpp"
 #include "apps/robot/growing_files.hpp"
 #include "apps/robot/results.hpp"
 #include "apps/robot/run_end.hpp"
@@ -31,6 +32,7 @@
 #include "modules/core/input_file.hpp"
 #include "modules/core/text_table.hpp"
 #include "modules/core/write_file.hpp"
+#include "modules/diagnosis/doubt_finding.hpp"
 #include "modules/sensors/node/rig_file.hpp"
 #include "runtime/clock.hpp"
 #include "runtime/log.hpp"
@@ -492,7 +494,7 @@ std::vector<Finding> what_stands_out(const RunFacts& facts, const Verdict& verdi
 // Writes the results of the run and returns the exit code.
 int conclude(const RobotOptions& options, const RobotConfig& config, Robot& robot,
              std::optional<Watch>& watch, const RunResult& result, const RunRecord& record,
-             FinalRoom& room, ResultWriter& results) {
+             FinalRoom& room, ResultWriter& results, SignalWatch& signals) {
   watch->finish(record);
   RunEnd end = end_of(options, robot, result, watch->reason(), record);
   end.missed = watch->missed();
@@ -508,6 +510,7 @@ int conclude(const RobotOptions& options, const RobotConfig& config, Robot& robo
     const ReaderReport faults = sensors->faults();
     for (const auto& [fault, entry] : faults.entries())
       summary.sensor_faults[to_string(fault)] = entry.count;
+    for (const Doubt& doubt : sensors->doubts()) summary.noticed.push_back(finding_of(doubt));
   }
   summary.traffic = robot.sent_bytes();
   if (const LocalizationNode* localization = robot.localization())
@@ -543,6 +546,13 @@ int conclude(const RobotOptions& options, const RobotConfig& config, Robot& robo
                        << ": the poses of this run are those of odometry, apart from those before";
   room.release_trajectories();
   write_all(options, config, robot, record, result, results);
+  if (summary.odometry && summary.odometry->divergences > 0 && !result.interrupted) {
+    log::warn("robot") << "odometry failed " << summary.odometry->divergences
+                       << " times: looking at the recording for the cause";
+    for (Finding& found : causes_of_failed_odometry(options, config, signals))
+      if (std::ranges::find(summary.noticed, found.id, &Finding::id) == summary.noticed.end())
+        summary.noticed.push_back(std::move(found));
+  }
   end.lost_results = results.lost();
   summary.exit_reason = verdict_of(end).reason;
   summary.findings =
@@ -656,7 +666,7 @@ int run_robot(const RobotOptions& asked, SignalWatch& signals,
   const auto end = [&](const RunRecord& record) {
     if (!fs::exists(options.output / "config.yaml")) write_settings();  // deleted during the run
     write_estimated_rig(options, rig, record, results);
-    return conclude(options, config, robot, watch, result, record, room, results);
+    return conclude(options, config, robot, watch, result, record, room, results, signals);
   };
   if (result.is_left_behind("recorder"))
     results.note(options.output, "what was recorded is lost with the recorder, which hangs");

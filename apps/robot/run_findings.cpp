@@ -157,6 +157,10 @@ class FindingsOfRun {
  public:
   FindingsOfRun(const RunFacts& facts, std::vector<Finding>& findings)
       : facts_(facts), run_(facts.summary), findings_(findings) {
+    for (Finding finding : run_.noticed) {
+      finding.what = run_.name + ": " + finding.what;
+      findings_.push_back(std::move(finding));
+    }
     add_team();
     add_input();
     add_odometry();

@@ -257,6 +257,7 @@ struct RunSummary {
   /// By name, robots that describe keypoints by another network, with the number of keyframes that
   /// were compared by ORB for this reason.
   std::map<std::string, std::uint64_t> other_network;
+  std::vector<Finding> noticed;  ///< Findings on sensors and network, without the robot's name.
   std::string exit_reason;
   std::vector<Finding> findings;  ///< Findings, the gravest first: see findings_of().
 
@@ -270,7 +271,7 @@ struct RunSummary {
                "process", process, "seconds", seconds, "lost_peers", lost_peers, "apart_peers",
                apart_peers, "unmet_peers", unmet_peers, "forged_announcements",
                forged_announcements, "other_vocabulary", other_vocabulary, "other_network",
-               other_network, "exit_reason", exit_reason, "findings", findings);
+               other_network, "noticed", noticed, "exit_reason", exit_reason, "findings", findings);
   }
 };
 

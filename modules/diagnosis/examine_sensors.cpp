@@ -8,6 +8,7 @@
 #include "modules/core/lie.hpp"
 #include "modules/core/text_table.hpp"
 #include "modules/diagnosis/acceleration_fit.hpp"
+#include "modules/diagnosis/doubt_finding.hpp"
 #include "modules/diagnosis/finding.hpp"
 #include "modules/diagnosis/focal_fit.hpp"
 #include "modules/diagnosis/image_rotation.hpp"
@@ -59,11 +60,6 @@ double usable_count(ReaderFault fault, const SensorSample& sample) {
   }
 }
 
-void add_doubt(const Doubt& doubt, Severity severity, Examination& result) {
-  result.add(doubt.is_explained ? kError : severity, doubt.id, doubt.what, doubt.means,
-             doubt.to_do);
-}
-
 void examine_rate(const char* sensor, const std::string& id, const std::vector<Stamp>& stamps,
                   double least_hz, double longest_gap_s, Examination& result) {
   const StampStatistics found = stamp_statistics(stamps);
@@ -72,7 +68,7 @@ void examine_rate(const char* sensor, const std::string& id, const std::vector<S
                                                     milliseconds(found.jitter_s));
   const UsualNumber rate = id == "imu" ? UsualNumber::kImuRate_hz : UsualNumber::kImageRate_hz;
   if (const auto unusual = doubt(rate, found.rate_hz); unusual && found.rate_hz > least_hz)
-    add_doubt(*unusual, kWarning, result);
+    result.findings.push_back(finding_of(*unusual));
   if (!(found.rate_hz >= least_hz))
     result.add(kWarning, id + ".rate",
                std::string(sensor) + " at " + fixed(found.rate_hz, 1) + " Hz, less than " +
@@ -268,7 +264,7 @@ bool examine_gravity(const SensorSample& sample, Examination& result) {
   const double found = median_acceleration(sample.imu);
   result.figure("accelerometer", "median norm " + fixed(found, 2) + " m/s^2");
   const auto unusual = doubt(UsualNumber::kGravity_mps2, found);
-  if (unusual) add_doubt(*unusual, kError, result);
+  if (unusual) result.findings.push_back(finding_of(*unusual));
   return !unusual;
 }
 
@@ -395,7 +391,7 @@ Examination examine_words(std::span<const std::vector<BinaryDescriptor>> images,
 
 Examination examine_stereo(const SensorSample& sample, const StereoRig& rig) {
   Examination result;
-  for (const Doubt& unusual : rig_doubts(rig)) add_doubt(unusual, kWarning, result);
+  for (const Doubt& unusual : rig_doubts(rig)) result.findings.push_back(finding_of(unusual));
   if (rig.depth_source != DepthSource::kRightImage) return result;
   const StereoFit given = fit_of(sample.stereo, rig);
   if (given.points < kLeastStereoPoints) {
@@ -426,7 +422,7 @@ Examination examine_depth(const SensorSample& sample, const StereoRig& rig) {
   const double depth_m = quantile(std::move(depths_m), 0.5);
   result.figure("depth images", "median depth " + fixed(depth_m, 2) + " m at corners");
   if (const auto unusual = doubt(UsualNumber::kDepth_m, depth_m))
-    add_doubt(*unusual, kWarning, result);
+    result.findings.push_back(finding_of(*unusual));
   if (ratios.size() < kLeastStereoPoints) return result;
   const double ratio = quantile(std::move(ratios), 0.5);
   constexpr double kMostOff = 1.25;

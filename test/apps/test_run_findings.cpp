@@ -2,6 +2,7 @@
 #include <functional>
 
 #include "apps/robot/run_findings.hpp"
+#include "modules/diagnosis/doubt_finding.hpp"
 
 namespace km {
 namespace {
@@ -187,6 +188,8 @@ TEST_CASE("A finding on a run is reported with its severity and its number", "[r
       {nullptr, kNote, "rare faults", of([](auto& s) {
          s.sensor_faults = {{"images missing between others", 5}};
        })},
+      {"stereo.baseline", kError, ": a baseline of 110 m",
+       of([](auto& s) { s.noticed = {finding_of(*doubt(UsualNumber::kBaseline_m, 110.0))}; })},
       {"trajectory.hole", kWarning, "no pose for 6.3 s, from 12.1 s on",
        of([=](auto& s) { s.holes = hole; })},
       {"trajectory.hole", kWarning, "the longest of 3 holes of 9.0 s in all",

@@ -105,6 +105,8 @@ TEST_CASE("summary.json has the keys that others read", "[robot][summary]") {
         "/process/memory_at_end_bytes /process/memory_growth_bytes_per_minute "
         "/seconds /lost_peers/x /apart_peers/x /unmet_peers/x "
         "/forged_announcements /other_vocabulary/x /other_network/x "
+        "/noticed/0/id /noticed/0/severity /noticed/0/what /noticed/0/means /noticed/0/to_do "
+        "/noticed/1/id /noticed/1/severity /noticed/1/what /noticed/1/means /noticed/1/to_do "
         "/exit_reason "
         "/findings/0/id /findings/0/severity /findings/0/what /findings/0/means /findings/0/to_do "
         "/findings/1/id /findings/1/severity /findings/1/what /findings/1/means "

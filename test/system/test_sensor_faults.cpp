@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <functional>
 #include <optional>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -208,6 +209,28 @@ TEST_CASE("A robot survives what happens to its sensors", "[faults]") {
     REQUIRE(outcome.summary.odometry);
     CHECK((outcome.summary.odometry->vision_losses > 0) == fault.is_blind);
   }
+}
+
+TEST_CASE("A run names the unit and the sign that made its odometry fail", "[faults]") {
+  const auto recording = shared_data("euroc/MH_01_easy");
+  if (!recording) return;
+  const TemporaryFolder folder;
+  EurocCopy copy = first_seconds(fs::absolute(*recording), 12.0);
+  for (EurocCopy::Sample& sample : copy.samples) {
+    std::istringstream fields(sample.values);
+    std::string text, field;
+    for (int k = 0; std::getline(fields, field, ','); ++k)
+      text += (k == 0 ? "" : ",") + (k < 3 ? field : std::to_string(-std::stod(field)));
+    sample.values = text;
+  }
+  copy.write(folder.path() / "negated");
+  const CommandResult run = run_robot(folder, "negated", "out");
+  CAPTURE(run.output);
+  const auto findings = read_summary(folder.path() / "out/summary.json").findings;
+  const auto found = std::ranges::find(findings, "imu.accel_negated", &Finding::id);
+  REQUIRE(found != findings.end());
+  CHECK(found->severity == Severity::kError);
+  CHECK_THAT(found->what, Catch::Contains("its sign is inverted"));
 }
 
 TEST_CASE("A driver that restarts does not end a live robot", "[faults][live]") {

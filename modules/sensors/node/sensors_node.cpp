@@ -62,7 +62,7 @@ void SensorsNode::decode() {
     }();
     if (!std::exchange(has_remarked, true))
       for (const std::string& remark : reader_->remarks()) log::info(name()) << remark;
-    if (packet) log_doubts(*packet);
+    if (packet) note_doubts(*packet);
     count_faults();
     if (!packet) {
       post(reader_->report());
@@ -72,7 +72,7 @@ void SensorsNode::decode() {
   }
 }
 
-void SensorsNode::log_doubts(const SensorPacket& packet) {
+void SensorsNode::note_doubts(const SensorPacket& packet) {
   std::vector<Doubt> doubts = first_.add(packet);
   if (!std::exchange(has_looked_, true)) {
     const std::vector<Doubt> of_rig = rig_doubts(reader_->rig().stereo);
@@ -80,6 +80,8 @@ void SensorsNode::log_doubts(const SensorPacket& packet) {
   }
   for (const Doubt& doubt : doubts)
     log::warn(name()) << doubt.what << ": " << doubt.means << "; " << doubt.to_do;
+  const std::lock_guard lock(faults_mutex_);
+  doubts_.insert(doubts_.end(), doubts.begin(), doubts.end());
 }
 
 void SensorsNode::count_faults() {

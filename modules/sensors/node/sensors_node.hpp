@@ -75,6 +75,11 @@ class SensorsNode final : public WorkerNode<SensorsInput> {
     const std::lock_guard lock(faults_mutex_);
     return faults_;
   }
+  /// Numbers of the rig and of the first packets that are unusual. Thread-safe.
+  std::vector<Doubt> doubts() const {
+    const std::lock_guard lock(faults_mutex_);
+    return doubts_;
+  }
   /// Number of pairs of the recording, or the number so far if that is larger. Thread-safe.
   std::size_t listed() const { return std::max<std::size_t>(listed_, published_ + skipped_); }
 
@@ -86,7 +91,7 @@ class SensorsNode final : public WorkerNode<SensorsInput> {
   /// Packets that are decoded but not yet due are dropped.
   void stop_sources() noexcept override;
   void decode();
-  void log_doubts(const SensorPacket& packet);
+  void note_doubts(const SensorPacket& packet);
   void count_faults();
   void take_faults();
   [[nodiscard]] FrameUse choose_use(Stamp stamp, Stamp arrival);
@@ -109,8 +114,9 @@ class SensorsNode final : public WorkerNode<SensorsInput> {
   std::atomic<std::size_t> published_ = 0;
   std::atomic<std::size_t> skipped_ = 0;
   std::atomic<bool> stopped_ = false;
-  mutable std::mutex faults_mutex_;
+  mutable std::mutex faults_mutex_;  // guards the two members below
   ReaderReport faults_;
+  std::vector<Doubt> doubts_;
   std::string logged_faults_;  // last logged faults of a live source
   double counted_s_ = 0.0;
   FirstPackets first_;       // used by the decoder, like has_looked_
