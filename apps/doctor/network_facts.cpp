@@ -1,6 +1,7 @@
 #include "apps/doctor/network_facts.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <set>
 
@@ -152,6 +153,16 @@ void examine_silence(const DiscoveredRobot& robot, Examination& result) {
                "open its UDP ports from 7400 + 250 * domain upwards; across NAT use a VPN");
 }
 
+void examine_keys(const std::vector<DiscoveredRobot>& robots, Examination& result) {
+  std::array<std::set<std::string>, 2> names;  // without keys, with keys
+  for (const DiscoveredRobot& robot : robots) names[robot.has_keys ? 1 : 0].insert(name_of(robot));
+  if (!names[0].empty() && !names[1].empty())
+    result.add(kError, "network.keys",
+               joined(names[1]) + " have keys of a team, " + joined(names[0]) + " have none",
+               "the two groups ignore each other",
+               "give each robot its folder of kimera_multi_keys (--security), or none any");
+}
+
 void examine_robots(const NetworkFacts& facts, Examination& result) {
   std::set<std::string> names;
   for (const DiscoveredRobot& robot : facts.robots) {
@@ -172,6 +183,7 @@ void examine_robots(const NetworkFacts& facts, Examination& result) {
                                        std::to_string(facts.config.domain) + ", in " +
                                        fixed(facts.listened_s, 1) + " s");
   examine_ids(facts.robots, result);
+  examine_keys(facts.robots, result);
   const bool is_alone = facts.robots.empty();
   examine_elsewhere(facts, is_alone, result);
   if (is_alone)

@@ -19,6 +19,7 @@ namespace km {
 struct DiscoveredRobot {
   std::string address = {};                    ///< As DDS states it: "udp/10.0.0.2:7411".
   std::optional<RobotIdentity> identity = {};  ///< Absent if its announcement is not readable.
+  bool has_keys = false;
   double unanswered_s = 0.0;  ///< Time for which it was heard, without an answer; 0: it answers.
 };
 

@@ -295,6 +295,7 @@ class DiscoveryObserver {
       heard_.push_back({info.instance_handle, steady_now_s()});
       if (const auto announcement = parse_user_data(user_data).value) {
         robot.identity = announcement->identity;
+        robot.has_keys = !announcement->credentials.empty();
         of_participant_[info.instance_handle] = to_string(*robot.identity);
       }
     });

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdlib>
+#include <limits>
 #include <map>
 #include <optional>
 #include <set>
@@ -143,6 +144,7 @@ class Watch {
       robot_.set_settled(reported);
       absentees_.update(now_s, known_peers(), team);
       unmet_ = robot_.bridge().peers().ask(&PeerTable::unmet);
+      log_unmet(now_s);
       const auto running = [](const auto& peer) { return peer.phase == RobotPhase::kRunning; };
       if (reported.phase == RobotPhase::kSettled && std::ranges::none_of(present, running))
         robot_.expect_no_more_closures();
@@ -202,6 +204,17 @@ class Watch {
       robot_.freeze_record();
     }
     return robot_.bridge().peers().list().empty() || now_s - *leaving_since_s_ >= kLeaveNotice_s;
+  }
+
+  // Once for each robot that has been unmet for some time: discovery takes less.
+  void log_unmet(double now_s) {
+    constexpr double kUnmet_s = 5.0;
+    for (const auto& [name, why] : unmet_) {
+      double& since_s = unmet_since_s_.try_emplace(name, now_s).first->second;
+      if (now_s - since_s < kUnmet_s) continue;
+      since_s = std::numeric_limits<double>::infinity();
+      log::warn("peers") << name << " is not met: " << why;
+    }
   }
 
   // Less often than poll(), because the time to count closures grows with their number.
@@ -276,6 +289,7 @@ class Watch {
   Departure departure_;
   Absentees absentees_;
   std::map<std::string, std::string> unmet_;
+  std::map<std::string, double> unmet_since_s_;  // by name; infinite once it is logged
   double start_s_;
   GrowingFile traffic_file_;
   TrafficCsv traffic_csv_;

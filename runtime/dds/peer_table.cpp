@@ -79,7 +79,10 @@ std::string PeerTable::why_refused(const Announcement& announcement) const {
     return "uses protocol version " + std::to_string(identity.protocol) + ", this robot " +
            std::to_string(self_.protocol);
   if (!admit_)
-    return credentials.empty() ? "" : "it has keys of a team, and this robot has none (--security)";
+    return credentials.empty()
+               ? ""
+               : "it has keys of a team and this robot has none: see kimera_multi_keys and "
+                 "--security";
   const char* reason = admit_(identity, credentials);
   return reason == nullptr ? "" : reason;
 }
@@ -91,11 +94,10 @@ void PeerTable::take_announcement(const Guid& guid, Participant& participant,
   const std::string refusal = decoded.value ? why_refused(*decoded.value) : decoded.refusal;
   if (!refusal.empty()) {
     if (participant.identity || std::exchange(participant.refusal, refusal) == refusal) return;
+    if (decoded.value) participant.claimed = to_string(identity);
     if (!participant.forged)
       events_.push_back(
-          {PeerEventKind::kRefused, identity,
-           (decoded.value ? to_string(identity) : "a robot at " + participant.addresses) +
-               " refused: " + refusal});
+          {PeerEventKind::kRefused, identity, name_of(participant) + " refused: " + refusal});
     return;
   }
   participant.refusal.clear();
@@ -264,10 +266,13 @@ bool PeerTable::is_isolated() const {
 std::map<std::string, std::string> PeerTable::unmet() const {
   std::map<std::string, std::string> unmet;
   for (const auto& [guid, participant] : participants_)
-    if (const char* why = why_unmet(guid, participant))
-      unmet[participant.identity ? to_string(*participant.identity)
-                                 : "a robot at " + participant.addresses] = why;
+    if (const char* why = why_unmet(guid, participant)) unmet[name_of(participant)] = why;
   return unmet;
+}
+
+std::string PeerTable::name_of(const Participant& participant) {
+  if (participant.identity) return to_string(*participant.identity);
+  return participant.claimed.empty() ? "a robot at " + participant.addresses : participant.claimed;
 }
 
 // Null for a robot of the team, present or lost, and for programs that are no robots.
@@ -284,7 +289,10 @@ const char* PeerTable::why_unmet(const Guid& guid, const Participant& participan
     return nullptr;
   if (participant.forged) return "its announcements are forged";
   if (!participant.refusal.empty()) return participant.refusal.c_str();
-  if (is_mute) return "it is announced, but nothing arrives from it";
+  if (is_mute)
+    return "it is announced, but sends nothing to this robot: it does not receive it (firewall, "
+           "NAT, "
+           "or dds.peers on one side)";
   return participant.identity ? "it has not proven its identity" : "it is not announced as a robot";
 }
 

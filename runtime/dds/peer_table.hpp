@@ -177,6 +177,7 @@ class PeerTable {
     std::optional<RobotIdentity> identity;  // identity; nullopt until accepted
     std::optional<RobotIdentity> later;     // last accepted identity, if it contradicts the first
     std::string addresses;
+    std::string claimed;   // name and id of the last refused announcement
     std::string refusal;   // reason of the last refusal; empty once an identity is accepted
     std::size_t data = 0;  // hash of the last user data; 0: none, 1: not that of a robot
     bool forged = false;   // announced with contradicting data
@@ -196,6 +197,7 @@ class PeerTable {
     std::vector<std::uint64_t> former = {};  // boot ids of former processes, oldest first
   };
 
+  [[nodiscard]] static std::string name_of(const Participant& participant);
   [[nodiscard]] const char* why_unmet(const Guid& guid, const Participant& participant) const;
   [[nodiscard]] std::string why_refused(const Announcement& announcement) const;
   void take_announcement(const Guid& guid, Participant& participant, std::string_view user_data);

@@ -143,7 +143,9 @@ void Peers::open() {
 
 // PeerTable calls this function, while the calling member function of Peers holds the mutex.
 const char* Peers::admit(const RobotIdentity& identity, std::string_view credentials) {
-  if (credentials.empty()) return "announces no keys";
+  if (credentials.empty())
+    return "it has no keys, and this robot has those of a team: see kimera_multi_keys and "
+           "--security";
   const auto now_s = static_cast<std::int64_t>(wall_now_s());
   if (const char* reason =
           seal_->with([&](TeamSeal& seal) { return seal.admit(identity, credentials, now_s); }))

@@ -228,6 +228,11 @@ TEST_CASE("The reason that keeps robots apart on a network is named", "[doctor]"
            [](auto& facts) {
              facts.elsewhere = {{{42, "wlan0"}, {"10.1.0.2"}}};
            }},
+      Case{"error network.keys ",
+           [](auto& facts) {
+             facts.robots.push_back(robot(7, "alice"));
+             facts.robots.back().has_keys = true;
+           }},
       Case{"error network.one_sided ", [](auto& facts) { facts.robots[0].unanswered_s = 4.0; }},
       Case{"error network.path_mtu ", echo({.host = {},
                                             .sent = 20,
