@@ -12,7 +12,6 @@ struct PlaceRecognitionConfig {
   double similarity_threshold = 0.4;
   int max_candidates = 5;
   double new_view_score = 0.24;
-  bool known_places = true;
 
   void visit_fields(auto& visitor) {
     visitor.field("word_keypoints", word_keypoints, {50, 4000},
@@ -27,11 +26,6 @@ struct PlaceRecognitionConfig {
                   "the words of a keyframe are sent and searched if its score against the last "
                   "keyframe so sent is below this; otherwise it shows nearly the view of that one; "
                   "lower: fewer bytes and fewer closures between robots; 2: send all");
-    visitor.field(
-        "known_places", known_places,
-        "neither send nor search the words of keyframes at places that earlier keyframes "
-        "of this robot show from nearly the same pose; false: a robot that moves at known "
-        "places sends and keeps as much as at new ones");
   }
 };
 

@@ -119,7 +119,6 @@ BagOfWords PlaceRecognitionNode::words_of(const KeyframeFeatures& features) cons
 
 PlaceNovelty PlaceRecognitionNode::novelty_of(const OdometryPose& keyframe,
                                               const CandidateSearch& search) const {
-  if (!config_.known_places) return PlaceNovelty::kNew;
   std::vector<KeyframeIndex> similar;
   for (const PlaceCandidate& found : search.candidates)
     similar.push_back(own_ids_[found.index].index);

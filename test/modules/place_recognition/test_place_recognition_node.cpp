@@ -158,8 +158,7 @@ Keyframe view(KeyframeIndex index) {
 
 TEST_CASE("A keyframe at a known place has no words for the peers and is no match",
           "[place_recognition][node]") {
-  const bool known_places = GENERATE(true, false);
-  Robot robot(kSelf, {.new_view_score = 2.0, .known_places = known_places});
+  Robot robot(kSelf, {.new_view_score = 2.0});
   robot.node.step(view(0));
   robot.node.step(view(1));
   REQUIRE(robot.candidates.received.size() == 1);
@@ -172,13 +171,13 @@ TEST_CASE("A keyframe at a known place has no words for the peers and is no matc
   REQUIRE(robot.candidates.received.size() == 3);
   robot.node.step(verified);
   robot.node.step(view(3));
-  CHECK(robot.candidates.received.size() == (known_places ? 3 : 6));
+  CHECK(robot.candidates.received.size() == 3);
   CHECK(robot.own_bows.received[2].words.size() == 4);
   REQUIRE(robot.own_bows.received.size() == 4);
-  CHECK(robot.own_bows.received[3].words.empty() == known_places);
+  CHECK(robot.own_bows.received[3].words.empty());
   robot.candidates.received.clear();
   robot.node.step(bow({kPeer, 1}, {1, 2, 3, 4}));
-  CHECK(robot.candidates.received.size() == (known_places ? 3 : 4));
+  CHECK(robot.candidates.received.size() == 3);
 }
 
 TEST_CASE("A keyframe at a known place has two candidates if a closure is due, and otherwise none",
