@@ -7,6 +7,7 @@
 namespace km {
 
 void EstimateWatch::add(const ImageFit& fit) {
+  judges_all_ = judges_all_ && fit.points >= kMinPoints;
   if (fit.points < kMinPoints) return;
   const bool contradicts = fit.contradicting > kContradictingShare * fit.points;
   const double step = contradicts ? std::log(kTrueRate / kFalseRate)
@@ -18,12 +19,14 @@ void EstimateWatch::add(const ImageFit& fit) {
 }
 
 double EstimateWatch::variance_factor() const {
-  return images_ == 0 ? 1.0 : std::max(factors_ / images_, 1.0);
+  if (images_ == 0) return 1.0;
+  return std::max(factors_ / images_, judges_all_ ? 0.0 : 1.0);
 }
 
 void EstimateWatch::start_keyframe() {
   factors_ = 0.0;
   images_ = 0;
+  judges_all_ = true;
 }
 
 }  // namespace km

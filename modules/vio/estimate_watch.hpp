@@ -42,10 +42,10 @@ class EstimateWatch {
   [[nodiscard]] bool is_contradicted() const { return evidence_ >= kAlarm; }
   [[nodiscard]] double evidence() const { return evidence_; }
 
-  /// Factor by which errors in the images since start_keyframe() exceed the assumed variance, at
-  /// least 1. It is the mean over the images of the median squared error, divided by the median of
-  /// the chi-squared distribution of a point. A covariance of the estimate is honest if it is
-  /// multiplied by this variance factor. Outliers among the points do not change the factor.
+  /// Ratio of the errors in the images since start_keyframe() to the assumed variance. It is the
+  /// mean over the images of the median squared error, divided by the median of the chi-squared
+  /// distribution of a point. Outliers among the points do not change the factor. 1 if no image was
+  /// judged, and at least 1 if some were not judged.
   [[nodiscard]] double variance_factor() const;
 
   void start_keyframe();
@@ -54,6 +54,7 @@ class EstimateWatch {
   double evidence_ = 0.0;  // the cumulative sum
   double factors_ = 0.0;   // sum over the judged images since start_keyframe()
   int images_ = 0;
+  bool judges_all_ = true;  // all images since start_keyframe() were judged
 };
 
 }  // namespace km

@@ -59,6 +59,8 @@ TEST_CASE("The variance factor is the squared ratio of errors to their assumed d
   CHECK(watch.variance_factor() == Approx(kRatio * kRatio).epsilon(0.03));
   watch.start_keyframe();
   watch.add({.points = 101, .median_square = 0.2});
+  CHECK(watch.variance_factor() == Approx(0.2 / kMedianSquare));
+  watch.add({.points = EstimateWatch::kMinPoints - 1});
   CHECK(watch.variance_factor() == 1.0);
 }
 
