@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdlib>
-#include <limits>
 #include <map>
 #include <optional>
 #include <set>
@@ -143,8 +142,7 @@ class Watch {
                                     .awaits_peers = ended && awaits_peers(team)});
       robot_.set_settled(reported);
       absentees_.update(now_s, known_peers(), team);
-      unmet_ = robot_.bridge().peers().ask(&PeerTable::unmet);
-      log_unmet(now_s);
+      note_unmet(now_s);
       const auto running = [](const auto& peer) { return peer.phase == RobotPhase::kRunning; };
       if (reported.phase == RobotPhase::kSettled && std::ranges::none_of(present, running))
         robot_.expect_no_more_closures();
@@ -167,9 +165,19 @@ class Watch {
   [[nodiscard]] double seconds() const { return steady_now_s() - start_s_; }
   [[nodiscard]] const char* reason() const { return departure_.reason(); }
   [[nodiscard]] std::vector<MissedPeer> missed() const { return absentees_.missed(kSecondHand_s); }
-  [[nodiscard]] const std::map<std::string, std::string>& unmet() const { return unmet_; }
+  [[nodiscard]] std::map<std::string, std::string> unmet() const {
+    std::map<std::string, std::string> reasons;
+    for (const auto& [name, unmet] : unmet_) reasons[name] = unmet.why;
+    return reasons;
+  }
 
  private:
+  struct Unmet {
+    std::string why = {};
+    double since_s = 0.0, last_s = 0.0;
+    bool is_logged = false;
+  };
+
   static constexpr double kInterval_s = 1.0;  // between rows of a CSV, and status lines
   // Threads free what other threads allocate, so that free memory spreads over the heaps of all
   // threads. Returned each minute, it costs a robot the page faults of a few images.
@@ -206,15 +214,22 @@ class Watch {
     return robot_.bridge().peers().list().empty() || now_s - *leaving_since_s_ >= kLeaveNotice_s;
   }
 
-  // Once for each robot that has been unmet for some time: discovery takes less.
-  void log_unmet(double now_s) {
-    constexpr double kUnmet_s = 5.0;
-    for (const auto& [name, why] : unmet_) {
-      double& since_s = unmet_since_s_.try_emplace(name, now_s).first->second;
-      if (now_s - since_s < kUnmet_s) continue;
-      since_s = std::numeric_limits<double>::infinity();
-      log::warn("peers") << name << " is not met: " << why;
+  // Logs a robot once that has been unmet for some time: discovery takes less. Keeps a named one
+  // while a new participant discovers it again.
+  void note_unmet(double now_s) {
+    constexpr double kUnmet_s = 5.0, kKept_s = 10.0;
+    for (const auto& [name, why] : robot_.bridge().peers().ask(&PeerTable::unmet)) {
+      Unmet& unmet = unmet_.try_emplace(name, Unmet{.since_s = now_s}).first->second;
+      unmet.why = why;
+      unmet.last_s = now_s;
+      if (now_s - unmet.since_s >= kUnmet_s && !std::exchange(unmet.is_logged, true))
+        log::warn("peers") << name << " is not met: " << why;
     }
+    std::erase_if(unmet_, [now_s](const auto& entry) {
+      const double gone_s = now_s - entry.second.last_s;
+      return gone_s > (entry.first.ends_with(')') ? kKept_s : 0.0);
+    });
+    for (const Peer& peer : robot_.bridge().peers().list()) unmet_.erase(to_string(peer.identity));
   }
 
   // Less often than poll(), because the time to count closures grows with their number.
@@ -288,8 +303,7 @@ class Watch {
   const double serve_limit_s_;
   Departure departure_;
   Absentees absentees_;
-  std::map<std::string, std::string> unmet_;
-  std::map<std::string, double> unmet_since_s_;  // by name; infinite once it is logged
+  std::map<std::string, Unmet> unmet_;  // by name
   double start_s_;
   GrowingFile traffic_file_;
   TrafficCsv traffic_csv_;
@@ -560,9 +574,9 @@ int conclude(const RobotOptions& options, const RobotConfig& config, Robot& robo
                        << ": the poses of this run are those of odometry, apart from those before";
   room.release_trajectories();
   write_all(options, config, robot, record, result, results);
-  if (summary.odometry && summary.odometry->divergences > 0 && !result.interrupted) {
-    log::warn("robot") << "odometry failed " << summary.odometry->divergences
-                       << " times: looking at the recording for the cause";
+  if (summary.odometry && !result.interrupted &&
+      (summary.odometry->divergences > 0 || summary.odometry->starts == 0)) {
+    log::warn("robot") << "odometry failed: looking at the recording for the cause";
     for (Finding& found : causes_of_failed_odometry(options, config, signals))
       if (std::ranges::find(summary.noticed, found.id, &Finding::id) == summary.noticed.end())
         summary.noticed.push_back(std::move(found));

@@ -3,6 +3,7 @@
 //   ping FIRST LAST    events with these indices, to all
 //   large INDEX        an event of 60 kB, to all
 //   one ROBOT INDEX    to one robot
+//   unmet              prints a robot that is announced and not met, as "unmet NAME: REASON"
 //   quit
 // It prints what happens: "joined 7", "lost 7", ..., "ping 7 INDEX", "one 7 INDEX", and at the end
 // "summary RECEIVED DUPLICATES".
@@ -72,6 +73,11 @@ void obey(TestRobot& robot) {
     std::uint32_t a = 0, b = 0;
     words >> command >> a >> b;
     if (command == "quit") return;
+    if (command == "unmet") {
+      const auto unmet = [&robot] { return robot.bridge.peers().ask(&PeerTable::unmet); };
+      if (eventually([&] { return !unmet().empty(); }))
+        print_line("unmet " + unmet().begin()->first + ": " + unmet().begin()->second);
+    }
     if (command == "one") robot.ping_one(static_cast<RobotId>(a), b);
     if (command == "large") robot.ping(a, std::vector<std::uint8_t>(60000));
     if (command == "ping")

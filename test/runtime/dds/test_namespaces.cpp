@@ -4,6 +4,7 @@
 #include <sstream>
 
 #include "test/runtime/dds/peer_process.hpp"
+#include "test/support/command.hpp"
 #include "test/support/network.hpp"
 
 namespace km {
@@ -18,7 +19,7 @@ std::vector<std::string> discovery_settings(const std::string& discovery) {
 }
 
 struct Pair {
-  Pair(VirtualNetwork& network, const std::vector<std::string>& settings,
+  Pair(const VirtualNetwork& network, const std::vector<std::string>& settings,
        std::unique_ptr<TeamOfTwo> team_keys = nullptr)
       : keys(std::move(team_keys)),
         a(start(network, 1, settings)),
@@ -28,7 +29,7 @@ struct Pair {
   std::unique_ptr<Process> a, b;
 
  private:
-  [[nodiscard]] std::unique_ptr<Process> start(VirtualNetwork& network, int host,
+  [[nodiscard]] std::unique_ptr<Process> start(const VirtualNetwork& network, int host,
                                                const std::vector<std::string>& settings) const {
     const auto robot = static_cast<RobotId>(2 + host);
     return start_peer(robot, settings, network.host(host),
@@ -88,6 +89,20 @@ TEST_CASE("Without configuration a robot uses the interface with a carrier, and 
   }
   CHECK(robots.a->wait_for("joined 4"));
   CHECK(robots.b->wait_for("joined 3"));
+}
+
+TEST_CASE("A robot that is received but does not receive this one is unmet, with the cause",
+          "[dds][namespaces]") {
+  if (!VirtualNetwork::available()) return;
+  const VirtualNetwork network(2);
+  // Only its multicast leaves host 1, and nothing arrives from host 2.
+  const std::string route = "ip route add blackhole " + VirtualNetwork::address(2);
+  REQUIRE(Process(words_of(route), network.host(1)).wait() == 0);
+  const Pair robots(network, own_team());
+  robots.b->send_line("unmet");
+  const auto line = robots.b->wait_for_prefix("unmet ");
+  REQUIRE(line);
+  CHECK_THAT(line->text, Catch::Contains("robot3 (id 3): ") && Catch::Contains("firewall"));
 }
 
 TEST_CASE("Large messages pass a network that drops fragments of packets", "[dds][namespaces]") {
