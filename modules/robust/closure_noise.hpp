@@ -50,19 +50,12 @@ struct ClosureNoiseRecord {
 };
 
 /// Estimates how many times larger than claimed the standard deviations of the closures of one pair
-/// of robots are. `usual` is the factor of the whole team.
-///
-/// Model: the error of a cycle is normal with covariance Sigma_o + s^2 Sigma_c, or one of its
-/// closures is false (see cycle_mixture.hpp). If `usual` is below 2/3, Sigma_o is scaled by (1.5
-/// usual)^2. The estimate of this variance component (Foerstner 1979) is the smallest s >= `usual`
-/// whose log posterior density is within 0.5 of the largest one. The prior of log s is a Cauchy
-/// distribution around log usual of width log 3. The two kinds of cycles are fitted separately,
-/// because an error that all closures of a place share shows only between places. The larger
-/// estimate counts. The result is `usual`, unless the odds against it are 1000 to 1 and the
-/// estimate is at least 1.3 times as large. The odds must also be 1000 to 1 with odometry that is
-/// 1.5 times noisier. The result is also `usual` if odometry of another length explains the errors
-/// better than noise of closures does. It is also `usual` with fewer than five places, if `usual`
-/// is above 1.5, or if more than 80 % of the cycles agree with `usual`. O(cycles^2).
+/// of robots are, see Noise in METHOD.md. `usual` is the factor of the whole team, and the result
+/// without strong evidence. The estimate of this variance component (Foerstner 1979) is the
+/// smallest s >= `usual` whose log posterior density is within 0.5 of the largest one. The prior of
+/// log s is a Cauchy distribution around log usual of width log 3. The two kinds of cycles are
+/// fitted separately, because an error that all closures of a place share shows only between
+/// places. The larger estimate counts. O(cycles^2).
 [[nodiscard]] double estimate_closure_noise(const PairCycles& cycles, double usual);
 
 /// True if the pair has enough places for estimate_closure_noise().

@@ -58,52 +58,16 @@ bool Corroboration::same_runs(const Upward& one, const Upward& other) const {
   return run_of(one.lower) == run_of(other.lower) && run_of(one.upper) == run_of(other.upper);
 }
 
-double Corroboration::cycle_length(const Upward& one, const Upward& other) const {
-  const auto chain = [&](const KeyframeId& from, const KeyframeId& to) {
-    const auto step = step_.find(from.robot);
-    const Precision precision = step == step_.end() ? Precision{} : step->second;
-    return UncertainPose{pose_(from).inverse() * pose_(to),
-                         steps_between(from, to) * covariance_in(precision, dimension_)};
-  };
-  const auto measured = [&](const Upward& c) {
-    return UncertainPose{c.T_lower_upper, covariance_in(c.precision, dimension_)};
-  };
-  const TwoClosureCycle cycle{measured(one), chain(one.upper, other.upper),
-                              inverse(measured(other)), chain(other.lower, one.lower)};
-  const SE3 T = cycle.T();
-  if (!(angle_of(T.linear()) <= kLargestTurn)) return std::numeric_limits<double>::infinity();
-  return std::sqrt(mahalanobis_length(se3_log(T), cycle.covariance(), dimension_).squared);
+Precision Corroboration::step_of(RobotId robot, const Precision& otherwise) const {
+  const auto step = step_.find(robot);
+  return step == step_.end() ? otherwise : step->second;
 }
 
-void Corroboration::count_lengths(NoiseHistogram& histogram, std::size_t most) const {
-  struct Cycle {
-    std::uint32_t steps;
-    std::size_t a;
-    std::size_t b;
-  };
-  std::vector<Cycle> cycles;
-  for (std::size_t a = 0; a < closures_.size(); ++a)
-    for (std::size_t b = a + 1; b < closures_.size(); ++b) {
-      if (steps_between(closures_[a].lower, closures_[b].lower) > kSteps) break;
-      const std::uint32_t steps = steps_between(closures_[a].lower, closures_[b].lower) +
-                                  steps_between(closures_[a].upper, closures_[b].upper);
-      if (steps <= kSteps && same_runs(closures_[a], closures_[b])) cycles.push_back({steps, a, b});
-    }
-  std::stable_sort(cycles.begin(), cycles.end(),
-                   [](const Cycle& x, const Cycle& y) { return x.steps < y.steps; });
-  if (cycles.size() > most) cycles.resize(most);
-  for (const Cycle& c : cycles)
-    count_length(histogram, cycle_length(closures_[c.a], closures_[c.b]));
-}
-
-NoiseCycle Corroboration::noise_cycle(const Upward& one, const Upward& other, double volume) const {
+TwoClosureCycle Corroboration::cycle_of(const Upward& one, const Upward& other, bool levers) const {
   const auto chain = [&](const KeyframeId& from, const KeyframeId& to) {
-    const auto step = step_.find(from.robot);
     const SE3 T = pose_(from).inverse() * pose_(to);
-    const double steps = steps_between(from, to);
-    Matrix6 Sigma =
-        steps * covariance_in(step == step_.end() ? Precision{} : step->second, dimension_);
-    const double lever = Sigma(2, 2) * T.translation().squaredNorm() / 3.0;
+    Matrix6 Sigma = steps_between(from, to) * covariance_in(step_of(from.robot), dimension_);
+    const double lever = levers ? Sigma(2, 2) * T.translation().squaredNorm() / 3.0 : 0.0;
     Sigma.diagonal().segment<2>(3).array() += lever;
     if (dimension_ == 3) Sigma(5, 5) += lever;
     return UncertainPose{T, Sigma};
@@ -111,8 +75,34 @@ NoiseCycle Corroboration::noise_cycle(const Upward& one, const Upward& other, do
   const auto measured = [&](const Upward& c) {
     return UncertainPose{c.T_lower_upper, covariance_in(c.precision, dimension_)};
   };
-  const TwoClosureCycle cycle{measured(one), chain(one.upper, other.upper),
-                              inverse(measured(other)), chain(other.lower, one.lower)};
+  return {measured(one), chain(one.upper, other.upper), inverse(measured(other)),
+          chain(other.lower, one.lower)};
+}
+
+double Corroboration::cycle_length(const Upward& one, const Upward& other) const {
+  const TwoClosureCycle cycle = cycle_of(one, other, false);
+  const SE3 T = cycle.T();
+  if (!(angle_of(T.linear()) <= kLargestTurn)) return std::numeric_limits<double>::infinity();
+  return std::sqrt(mahalanobis_length(se3_log(T), cycle.covariance(), dimension_).squared);
+}
+
+void Corroboration::count_lengths(NoiseHistogram& histogram, std::size_t most) const {
+  std::vector<Near> cycles;
+  for (std::size_t a = 0; a < closures_.size(); ++a)
+    for (std::size_t b = a + 1; b < closures_.size(); ++b) {
+      if (steps_between(closures_[a].lower, closures_[b].lower) > kSteps) break;
+      const std::uint32_t steps = steps_between(closures_[a].lower, closures_[b].lower) +
+                                  steps_between(closures_[a].upper, closures_[b].upper);
+      if (steps <= kSteps && same_runs(closures_[a], closures_[b])) cycles.push_back({steps, a, b});
+    }
+  std::ranges::stable_sort(cycles, {}, &Near::steps);
+  if (cycles.size() > most) cycles.resize(most);
+  for (const Near& c : cycles)
+    count_length(histogram, cycle_length(closures_[c.a], closures_[c.b]));
+}
+
+NoiseCycle Corroboration::noise_cycle(const Upward& one, const Upward& other, double volume) const {
+  const TwoClosureCycle cycle = cycle_of(one, other, true);
   const Vector6 error = se3_log(cycle.T());
   // Derivative of the error by the relative length of one chain of odometry.
   const auto by_length = [&](UncertainPose TwoClosureCycle::*chain_of) {
@@ -137,21 +127,13 @@ double Corroboration::volume() const {
 // Standard deviation of the rotation of the odometry between two closures, on each axis.
 double Corroboration::turn_rad(const Upward& one, const Upward& other) const {
   double variance = 0.0;
-  for (const auto& [from, to] : {std::pair(one.lower, other.lower), {one.upper, other.upper}}) {
-    const auto step = step_.find(from.robot);
-    const Precision precision = step == step_.end() ? Precision{} : step->second;
-    variance += steps_between(from, to) * covariance_in(precision, dimension_)(2, 2);
-  }
+  for (const auto& [from, to] : {std::pair(one.lower, other.lower), {one.upper, other.upper}})
+    variance += steps_between(from, to) * covariance_in(step_of(from.robot), dimension_)(2, 2);
   return std::sqrt(variance);
 }
 
 void Corroboration::count_cycles(PairCycles& cycles) const {
   if (closures_.size() < 2) return;
-  struct Pair {
-    std::uint32_t steps;
-    std::size_t a;
-    std::size_t b;
-  };
   const ClosurePlaces places = find_places(edges_);
   std::vector<bool> is_first;  // the closure is the first one of its place
   std::vector<bool> seen(places.sizes.size(), false);
@@ -160,7 +142,7 @@ void Corroboration::count_cycles(PairCycles& cycles) const {
     is_first.push_back(!seen[place]);
     seen[place] = true;
   }
-  std::vector<Pair> inside, between;
+  std::vector<Near> inside, between;
   for (std::size_t a = 0; a < closures_.size(); ++a)
     for (std::size_t b = a + 1; b < closures_.size(); ++b) {
       const std::uint32_t lower = steps_between(closures_[a].lower, closures_[b].lower);
@@ -176,9 +158,9 @@ void Corroboration::count_cycles(PairCycles& cycles) const {
         between.push_back({steps, a, b});
     }
   const double room = volume();
-  const auto count = [&](std::vector<Pair>& pairs, std::vector<NoiseCycle>& counted) {
-    std::ranges::stable_sort(pairs, {}, &Pair::steps);
-    for (const Pair& pair : pairs) {
+  const auto count = [&](std::vector<Near>& pairs, std::vector<NoiseCycle>& counted) {
+    std::ranges::stable_sort(pairs, {}, &Near::steps);
+    for (const Near& pair : pairs) {
       if (counted.size() >= kMostNoiseCycles) break;
       counted.push_back(noise_cycle(closures_[pair.a], closures_[pair.b], room));
     }
@@ -201,8 +183,7 @@ bool Corroboration::agree(const Upward& one, const Upward& other, double barc) c
   // end of a closure.
   double turn = 2.0, shift = 2.0;
   for (const auto& [from, to] : {std::pair(one.lower, other.lower), {one.upper, other.upper}}) {
-    const auto step = step_.find(from.robot);
-    const Precision precision = step == step_.end() ? one.precision : step->second;
+    const Precision precision = step_of(from.robot, one.precision);
     turn += steps_between(from, to) * std::max(1.0, kappa / precision.kappa);
     shift += steps_between(from, to) * std::max(1.0, tau / precision.tau);
   }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <map>
 #include <span>
@@ -8,6 +9,7 @@
 
 #include "modules/robust/closure_noise.hpp"
 #include "modules/robust/noise_histogram.hpp"
+#include "modules/robust/odometry_cycles.hpp"
 #include "modules/tree_newton/pose_edge.hpp"
 
 namespace km {
@@ -56,6 +58,16 @@ class Corroboration {
     Precision precision;
   };
 
+  // Two closures with few steps of odometry between them, by their indices in closures_.
+  struct Near {
+    std::uint32_t steps = 0;
+    std::size_t a = 0;
+    std::size_t b = 0;
+  };
+
+  [[nodiscard]] Precision step_of(RobotId robot, const Precision& otherwise = {}) const;
+  // `levers`: the covariance of odometry contains the lever arms of its rotations.
+  [[nodiscard]] TwoClosureCycle cycle_of(const Upward& one, const Upward& other, bool levers) const;
   [[nodiscard]] bool same_runs(const Upward& one, const Upward& other) const;
   [[nodiscard]] double cycle_length(const Upward& one, const Upward& other) const;
   [[nodiscard]] NoiseCycle noise_cycle(const Upward& one, const Upward& other, double volume) const;

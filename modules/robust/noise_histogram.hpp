@@ -27,14 +27,9 @@ void count_length(NoiseHistogram& histogram, double length);
 /// The result is the scale nearest to 1 among those about as likely as the best one. nullopt if
 /// there are too few lengths.
 ///
-/// If this scale exceeds 10, it may be the size of false cycles, which are often most cycles:
-/// false closures between parts of the environment that look alike agree roughly. The lengths are
-/// then fitted by two populations. The longer one has at least four times the size of the other,
-/// and its lengths may spread more than those of noise, by a log-normal factor. If the odds of two
-/// populations against a single one are 1000 to 1, the shorter one is the noise, however small it
-/// is. With 300 cycles of which 95 % are false, this finds noise of a seventh of their size, and of
-/// a twentieth if this factor is e^0.8. Smaller scales are not examined: recorded closures are up
-/// to four times as noisy as they claim.
+/// If this scale exceeds 10, it may be the size of false cycles. The lengths are then fitted by two
+/// populations, see METHOD.md. Smaller scales are not examined: recorded closures are up to four
+/// times as noisy as they claim.
 [[nodiscard]] std::optional<NoiseScale> fit_noise(const NoiseHistogram& histogram, int dimension);
 
 }  // namespace km

@@ -19,16 +19,8 @@ struct OdometryBreak {
   std::size_t places = 0;    ///< Number of places that agree.
 };
 
-/// Finds wrong steps of the odometry of one robot from the closures inside it. `steps[k]` is from
-/// keyframe k to keyframe k + 1, and some closures may be false.
-///
-/// A wrong step makes every cycle of odometry and a closure that contains it inconsistent, and each
-/// of these cycles yields the jump that would close it. A step is wrong if the cycles of at least
-/// three places agree on the jump, and if at most 10 % of the cycles that contain the step are
-/// consistent. At least three places must have cycles without the step, for comparison. The correct
-/// step must be a possible motion of the robot: at most three times as fast as 95 % of its steps.
-/// Rows of closures between two parts of the environment that look alike agree on a jump, too, but
-/// such a jump hardly ever leaves a possible step.
+/// Finds wrong steps of the odometry of one robot from the closures inside it, some of which may be
+/// false; see Noise in METHOD.md. `steps[k]` is from keyframe k to keyframe k + 1.
 ///
 /// Cycles are consistent, and jumps agree, up to the 99.9 % quantile of chi-squared at the claimed
 /// noise. The limit is larger if the median error of the cycles without the step exceeds the

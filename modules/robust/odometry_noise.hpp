@@ -25,29 +25,12 @@ struct OdometryNoise {
   }
 };
 
-/// Estimates the noise of the odometry of a robot from the closures inside it. Each closure forms a
-/// cycle with the chain of steps between its ends. If these cycles show noise, cycles of two
-/// successive closures are added, see METHOD.md. `steps[k]` is from keyframe k to keyframe k + 1 of
-/// one robot, and `closures` are between two of its keyframes. Some closures may be false.
-/// `dimension` 2: poses are planar.
-///
-/// Model: the error e of a cycle (tangent vector) is normal with covariance
-///     v_R C_R + v_t C_t + v_c S,
-/// C_R and C_t are the claimed rotation and translation noise of the steps, accumulated along the
-/// chain to first order with lever arms. S is the claimed covariance of the closure. If the closure
-/// is false, its rotation is uniform and its end is uniform in a box with twice the sides of the
-/// trajectory. The variance factors v maximise the posterior of this mixture. The priors are normal
-/// with mean 0: that of log sqrt(v) has standard deviation log 3, and that of log sqrt(v_R / v_t)
-/// log 2. With few cycles the factors therefore remain near 1. Variance components: Foerstner, "Ein
-/// Verfahren zur Schaetzung von Varianz- und Kovarianzkomponenten", 1979; v_R and v_t are at least
-/// 1. They are 1 unless the odds that odometry is noisier than it claims are at least 1000 to 1.
-///
-/// A second model has one factor for all rotations and one for all translations, of steps and of
-/// closures. If its posterior is 1000 times as high, it counts: OdometryNoise::of_closures.
-///
-/// Closures near each other at both ends share most of their chain, and false closures between two
-/// similar parts of the environment come in groups. Such closures form a place, which counts as one
-/// cycle. Deterministic. O(steps + closures).
+/// Estimates the noise of the odometry of a robot from the closures inside it, by cycles of one
+/// closure and of two successive ones: see Noise in METHOD.md. The factors of rotations and of
+/// translations are variance components (Foerstner 1979). The priors are normal with mean 0: that
+/// of log sqrt(v) has standard deviation log 3, and that of log sqrt(v_R / v_t) log 2. `steps[k]`
+/// is from keyframe k to keyframe k + 1 of one robot, and `closures` are between two of its
+/// keyframes. Some closures may be false. `dimension` 2: poses are planar. O(steps + closures).
 [[nodiscard]] OdometryNoise estimate_odometry_noise(std::span<const PoseEdge> steps,
                                                     std::span<const PoseEdge> closures,
                                                     int dimension);

@@ -15,40 +15,22 @@
 namespace km {
 
 /// The part of one robot in a robust Newton method for the pose graph of a team, up and down a tree
-/// of robots (see TreeFront).
+/// of robots. README.md describes a round, and METHOD.md the weights.
 ///
-/// A round is one pass up and one pass down. The pass up carries the equations at the present
-/// poses, eliminated onto the poses that other robots use, and the sums of cost and residuals. The
-/// root solves and decides, and the pass down carries the steps of the poses sent. One round is one
-/// Newton step of the whole team, exact except for what is sent in single precision. A step
-/// is accepted once the next pass up has brought its cost to the root. If the cost has risen, the
-/// step is shortened; while weights change, the cost may rise by half, twice in a row. Only the
-/// root decides.
+/// A step is accepted once the next pass up has brought its cost to the root. If the cost has
+/// risen, the step is shortened; while weights change, the cost may rise by half, twice in a row.
+/// Only the root decides. Second derivatives hardly change (see edge_model.hpp), so old ones serve
+/// several steps (Shamanskii's variant of Newton's method). The first ones are those of
+/// Gauss-Newton, which cannot be indefinite.
 ///
-/// Second derivatives hardly change (see edge_model.hpp). They are sent again only when the weights
-/// of their edges change, or when the old ones slow down convergence (Shamanskii's variant of
-/// Newton's method). The first ones are those of Gauss-Newton, which cannot be indefinite.
-///
-/// Every closure has a weight: graduated non-convexity with truncated least squares (Yang et al.,
-/// RA-L 2020) sets the weights between two steps. The result is the plain optimum of the closures
-/// that are kept. The team estimates the largest admissible residual from closures near each other
-/// (see Corroboration). If most of these agree, closures that stand alone are deferred at first. In
-/// a second look (SessionGraph::again), a pair with undecided closures weighs its closures again,
-/// except for the rejected ones. A closure to a held pose is left out if an earlier session has
-/// rejected it, and otherwise has weight 1.
-///
-/// If closures inside a robot mostly_fit() its start, the start decides them. The second
-/// derivatives of the robot then change with the weights of fewer edges. The team weighs such a
-/// closure only if the solution contradicts the decision. It weighs all closures together if nine
-/// of ten are between robots, or if several closures between robots are rejected.
+/// In a second look (SessionGraph::again), a pair with undecided closures weighs its closures
+/// again, except for the rejected ones. A closure to a held pose is left out if an earlier session
+/// has rejected it, and otherwise has weight 1.
 ///
 /// Exactly one of two robots weighs a closure between them and has it among its own edges. The
 /// system up the tree contains the pose at the other end. Between a parent and its child the parent
 /// weighs, so that the second derivatives of the child do not change with weights. In other pairs
 /// one end of each closure is chosen by a vertex cover, equal on both robots.
-///
-/// The last pass down carries the blocks of the inverse of the second derivatives that each front
-/// needs for the covariances of its poses.
 class TreeNewton final : public MemberSolver {
  public:
   /// Throws std::invalid_argument if an edge is not usable or a public pose is missing.

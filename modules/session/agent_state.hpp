@@ -16,7 +16,6 @@
 #include "modules/session/frame_ties.hpp"
 #include "modules/session/own_graph.hpp"
 #include "modules/session/own_poses.hpp"
-#include "modules/session/refinement_schedule.hpp"
 #include "modules/session/session_part.hpp"
 #include "modules/session/session_schedule.hpp"
 #include "modules/session/team_notices.hpp"
@@ -32,6 +31,13 @@ struct [[nodiscard]] TeamOutput {
   std::optional<ClosureVerdicts> verdicts = {};  ///< After a session.
   std::vector<std::string> notices = {};         ///< Messages for a person.
   bool more = false;  ///< The next step has work even without further input.
+};
+
+/// Pose of `world`, the frame in which robots publish, in the frame of a solution. `world` is the
+/// odometry frame of `anchor`.
+struct World {
+  RobotId anchor = 0;
+  SE3 T_frame_world = SE3::Identity();
 };
 
 /// The cost of a session and its gradient, see SolverState.
@@ -61,7 +67,7 @@ struct AgentState {
         roster(peer, config.method),
         notices(peer.robot),
         schedule(config),
-        frame(peer),
+        frame{.coordinator = peer},
         refinement(config.refinement_period_s) {}
 
   PoseGraphConfig config;
@@ -91,7 +97,8 @@ struct AgentState {
   double optimising_s = 0.0;        ///< In earlier sessions.
   std::uint64_t sent_bytes = 0;     ///< For sessions.
 
-  OwnFrame frame;
+  TeamFrame frame;                  ///< The frame of `poses`.
+  std::optional<World> world = {};  ///< Unknown before the first solution.
   OwnPoses poses = {};
   std::optional<RobotId> solution_anchor = {};  ///< Anchor of the last session with a solution.
   FixPlacement placement = {};                  ///< In the present or last session.
@@ -145,6 +152,9 @@ void refine_alone(AgentState& s);
 [[nodiscard]] std::uint64_t own_datum(const AgentState& s);
 /// Identity of the datum in which a robot is located; 0: it is not located.
 [[nodiscard]] std::uint64_t datum_of(const AgentState& s, RobotId robot);
+/// `world` with this anchor. It follows from the pose of keyframe 0 that the anchor has sent to all
+/// robots, so all compute the same `world` to the last bit. nullopt if the poses of the anchor are
+/// unknown or in another frame.
 [[nodiscard]] std::optional<World> world_of(const AgentState& s, RobotId anchor);
 /// The frame in which this robot publishes. If no closure ties it to the anchor of the session,
 /// this is the frame of the lowest robot that closures tie to it.

@@ -49,7 +49,7 @@ void leave(AgentState& s, bool with_solution) {
   const Session& session = s.part->session();
   const SessionResult& result = s.part->result();
   s.poses.set(result.poses, result.covariances);
-  s.frame.enter(session.plan.frame);
+  s.frame = session.plan.frame;
   s.decisions.begin_result(s.part->members());
   decide(s, result.verdicts.closures);
   for (const RobotId member : s.part->members())
@@ -57,8 +57,8 @@ void leave(AgentState& s, bool with_solution) {
       s.roster.keep_result(member);
       if (member != s.self.robot) decide_with(s, *published);
     }
-  s.frame.set_world(session.T_frame_world ? World{session.anchor, *session.T_frame_world}
-                                          : world_of(s, session.anchor));
+  s.world = session.T_frame_world ? World{session.anchor, *session.T_frame_world}
+                                  : world_of(s, session.anchor);
   s.solution_anchor = session.anchor;
   if (session.plan.members.size() > 1) s.solved = session.plan;
   s.notices.closures(result.noise);
@@ -74,7 +74,7 @@ void publish_poses(AgentState& s, TeamOutput& output) {
   message.T_frame_kf = s.part->public_poses();
   for (const WeighedClosure& verdict : s.part->result().verdicts.closures)
     if (verdict.id.from.robot != verdict.id.to.robot) message.verdicts.push_back(verdict);
-  message.sent_bytes = s.part->sent_bytes();
+  message.sent_bytes = s.part->cost().sent_bytes;
   for (const TeamMessage& unsent : output.messages)
     if (const auto* reliable = std::get_if<ReliableMessage>(&unsent); reliable && reliable->bytes)
       message.sent_bytes += reliable->bytes->size();
@@ -94,7 +94,7 @@ void conclude(AgentState& s, TeamOutput& output) {
     session.gradient = state.gradient;
     session.finished = true;
     leave(s, true);
-    if (s.frame.world()) session.T_frame_world = s.frame.world()->T_frame_world;
+    if (s.world) session.T_frame_world = s.world->T_frame_world;
     announce(s, output);
   } else if (has_failed(s)) {
     session.finished = coordinates;
@@ -213,11 +213,11 @@ bool join(AgentState& s, const Session& session) {
   if (!part) return false;
   if (s.in_session()) leave(s, s.all_solved());
   const bool continues = session.plan.frame != session.id;
-  if (continues && part->in_frame && session.plan.frame != s.frame.frame()) return false;
+  if (continues && part->in_frame && session.plan.frame != s.frame) return false;
   if (s.part) {
     s.objective_before = objective(s);
     s.rounds_before += s.part->progress().round;
-    s.optimising_s += s.part->last_activity_s() - s.part->started_s();
+    s.optimising_s += s.part->cost().last_activity_s - s.part->cost().started_s;
   }
   s.poses.extend(s.graph, s.self.robot);
   set_start(s, session, part->graph);
@@ -260,13 +260,14 @@ void consider(AgentState& s, const Session& session) {
 void advance(AgentState& s, TeamOutput& output) {
   if (!s.in_session()) return;
   const auto stage = s.part->stage();
-  for (ReliableMessage& message : s.part->advance(s.roster.public_poses(), s.now_s)) {
+  SessionWork work = s.part->advance(s.roster.public_poses(), s.now_s);
+  for (ReliableMessage& message : work.messages) {
     if (message.bytes) s.notices.message(message.bytes->size());
     output.messages.emplace_back(std::move(message));
   }
-  for (const RobotId sender : s.part->take_refused())
+  for (const RobotId sender : work.refused)
     s.notices.refuse("a message of robot " + std::to_string(sender) + " that is of no use");
-  output.more |= s.part->worked();
+  output.more |= work.any;
   if (s.part->stage() != stage) {
     output.more = true;
     if (s.part->stage() == MemberStage::kFailed)
@@ -287,7 +288,7 @@ void refine_alone(AgentState& s) {
       !s.graph.fixes().empty())
     return;
   Session alone;
-  alone.plan.frame = s.frame.frame();
+  alone.plan.frame = s.frame;
   alone.plan.members.emplace_back().peer = s.self;
   alone.upright = s.part->session().upright;
   alone.anchor = s.self.robot;

@@ -20,8 +20,7 @@ void make_plan(AgentState& s) {
   const std::map<RobotId, TeamStatus> statuses = s.roster.statuses(make_status(s));
   SessionPlan plan = plan_session(statuses, s.self.robot);
   // If the anchor leaves while no closure ties this robot to it, it stays in another frame.
-  if (s.frame.world() && !plan.has_member(s.frame.world()->anchor))
-    s.frame.set_world(tied_world(s));
+  if (s.world && !plan.has_member(s.world->anchor)) s.world = tied_world(s);
   const bool graph_changed = !same_graph(plan, s.plan);
   const std::uint64_t closures =
       plan.members.size() == 1 ? s.closures_inside() : closures_between(plan, statuses);
@@ -50,7 +49,7 @@ bool all_upright(const AgentState& s, const SessionPlan& plan) {
 // Bytes of the member that has sent most in the last session, because the budget applies to every
 // robot.
 std::uint64_t price_bytes(const AgentState& s) {
-  std::uint64_t most = s.part->sent_bytes();
+  std::uint64_t most = s.part->cost().sent_bytes;
   for (const RobotId member : s.part->members())
     if (const MemberPoses* published = s.poses_of(member, MemberStage::kSolved))
       most = std::max(most, published->sent_bytes);
@@ -58,11 +57,11 @@ std::uint64_t price_bytes(const AgentState& s) {
 }
 
 bool is_next_due(const AgentState& s) {
-  if (!s.schedule.is_within_budget(price_bytes(s), s.part->last_activity_s(), s.now_s))
+  if (!s.schedule.is_within_budget(price_bytes(s), s.part->cost().last_activity_s, s.now_s))
     return false;
   const bool costs_nothing = s.plan.members.size() == 1 && s.closures_inside() == 0;
   return costs_nothing || !same_members(s.part->session().plan, s.plan) ||
-         s.schedule.is_worthwhile(s.part->last_activity_s(), s.now_s);
+         s.schedule.is_worthwhile(s.part->cost().last_activity_s, s.now_s);
 }
 
 // True if a member has been in another session since the last one.
@@ -77,7 +76,7 @@ bool should_open(const AgentState& s) {
   if (!s.part) return true;
   const Session& session = s.part->session();
   const bool hopeless =
-      s.now_s - s.part->last_activity_s() > kHopelessPeriods * kTeamStatusPeriod_s;
+      s.now_s - s.part->cost().last_activity_s > kHopelessPeriods * kTeamStatusPeriod_s;
   const bool stalled = s.in_session() && (s.deserted || hopeless);
   if (same_graph(session.plan, s.plan))
     return session.finished ? has_moved_on(s) : !s.in_session() || stalled;
@@ -92,7 +91,7 @@ TeamFrame choose_frame(const AgentState& s, const Session& session) {
   const RobotId first = session.plan.members.front().peer.robot;
   const auto of_first = results.find(first);
   if (first != s.self.robot && of_first == results.end()) return session.id;
-  const TeamFrame& frame = first == s.self.robot ? s.frame.frame() : of_first->second.frame;
+  const TeamFrame& frame = first == s.self.robot ? s.frame : of_first->second.frame;
   const bool holds = std::ranges::any_of(results, [&](const auto& result) {
     return result.second.frame == frame && !session.plan.has_member(result.first);
   });
@@ -108,8 +107,8 @@ void open_session(AgentState& s, TeamOutput& output) {
   session.plan.frame = choose_frame(s, session);
   session.anchor = coordinator_of(s.plan);
   // `world` keeps its place when its robot is no longer a member.
-  const std::optional<World>& world = s.frame.world();
-  if (world && world->anchor < session.anchor && s.frame.frame() == session.plan.frame) {
+  const std::optional<World>& world = s.world;
+  if (world && world->anchor < session.anchor && s.frame == session.plan.frame) {
     session.anchor = world->anchor;
     session.T_frame_world = world->T_frame_world;
   }

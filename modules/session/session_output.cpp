@@ -4,6 +4,7 @@
 
 #include "modules/robust/closure_places.hpp"
 #include "modules/session/agent_state.hpp"
+#include "modules/tree_newton/vertical_prior.hpp"
 
 // Frames, and the messages to the own robot.
 
@@ -75,7 +76,7 @@ std::map<KeyframeId, SE3> held_poses(const AgentState& s, const SE3& T_world_fra
   std::map<KeyframeId, SE3> held;
   for (const auto& [robot, poses] : s.roster.results())
     for (std::size_t k = 0; k < poses.keyframes.size(); ++k)
-      if (robot != s.self.robot && poses.frame == s.frame.frame())
+      if (robot != s.self.robot && poses.frame == s.frame)
         held[{robot, poses.keyframes[k]}] = T_world_frame * poses.T_frame_kf[k].pose();
   return held;
 }
@@ -118,13 +119,24 @@ std::uint64_t datum_of(const AgentState& s, RobotId robot) {
   return peer != nullptr && peer->status ? peer->status->datum : 0;
 }
 
+// If the solution is upright, `world` is rotated so that z is up, because the optimum has a better
+// estimate of the tilt of keyframe 0 than its own vertical.
 std::optional<World> world_of(const AgentState& s, RobotId anchor) {
-  return s.frame.world_of(anchor, s.roster, s.graph.T_odom_first(),
-                          s.part && s.part->session().upright);
+  const auto poses = s.roster.results().find(anchor);
+  if (poses == s.roster.results().end() || poses->second.frame != s.frame) return std::nullopt;
+  const TeamRoster::Peer* peer = s.roster.find(anchor);
+  const bool own = anchor == s.self.robot;
+  if (!own && (peer == nullptr || !peer->status)) return std::nullopt;
+  const SE3& T_odom_kf = own ? s.graph.T_odom_first() : peer->status->T_odom_first;
+  const SE3 T_frame_world = poses->second.T_frame_kf.front().pose() * T_odom_kf.inverse();
+  if (!s.part || !s.part->session().upright) return World{anchor, T_frame_world};
+  const Eigen::MatrixXd turned =
+      level(T_frame_world.matrix().topRows<3>(), T_odom_kf.translation());
+  return World{anchor, make_pose(turned.leftCols<3>(), turned.col(3))};
 }
 
 std::optional<World> tied_world(const AgentState& s) {
-  const std::optional<World>& world = s.frame.world();
+  const std::optional<World>& world = s.world;
   if (auto of_datum = world ? world_of_datum(s) : std::nullopt) return of_datum;
   if (!world || !std::ranges::binary_search(s.ties.not_joined, world->anchor)) return world;
   return world_of(s, lowest_tied(s.self.robot, s.plan, s.ties));
@@ -163,14 +175,14 @@ OptimizerProgress make_progress(const AgentState& s) {
   progress.round += s.part->progress().round;
   progress.odometry_rotation_noise *= s.part->progress().odometry_noise;
   progress.odometry_translation_noise *= s.part->progress().odometry_noise;
-  progress.seconds += s.part->last_activity_s() - s.part->started_s();
+  progress.seconds += s.part->cost().last_activity_s - s.part->cost().started_s;
   progress.settled =
       !s.in_session() && session.finished && !s.publish_due && holds_all(s, session.plan);
   return progress;
 }
 
 void publish(AgentState& s, TeamOutput& output) {
-  const auto world = s.frame.world() ? tied_world(s) : std::nullopt;
+  const auto world = s.world ? tied_world(s) : std::nullopt;
   if (!world || (!s.publish_due && s.published_anchor == world->anchor)) return;
   s.publish_due = false;
   s.published_anchor = world->anchor;

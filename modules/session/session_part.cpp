@@ -31,6 +31,21 @@ void add_absent(const MemberPoses& poses, RobotId self, const std::vector<PoseEd
 // inlier. It exceeds 1 because the solution was computed without these closures.
 constexpr double kSecondLook = 5.0;
 
+// Opens the rejected closures that nearly fit. For a closure between robots, both robots use the
+// poses and the verdict that are sent, and so decide equally.
+void reopen_closures(SessionGraph& graph, double limit) {
+  const auto pose = [&](const KeyframeId& id) {
+    return id.robot == graph.self ? graph.start[id.index] : graph.public_poses.at(id);
+  };
+  for (const auto* edges : {&graph.own, &graph.between})
+    for (const PoseEdge& e : *edges) {
+      const auto decided = graph.decided.find(e.id());
+      if (decided != graph.decided.end() && !decided->second &&
+          residual_of(e, pose(e.from), pose(e.to)) <= limit)
+        graph.decided.erase(decided);
+    }
+}
+
 // Limit of the messages kept before there is a solver. Senders repeat the messages beyond it.
 constexpr std::size_t kMaxEarlyMessages = 1000;
 constexpr std::size_t kMaxEarlyBytes = 1U << 26U;
@@ -83,8 +98,7 @@ SessionPart::SessionPart(Session session, TeamPeer self, FrozenPart part,
       public_(std::move(part.public_keyframes)),
       factory_(std::move(factory)),
       channel_(self, session_.id, kTeamStatusPeriod_s),
-      started_s_(now_s),
-      last_activity_s_(now_s) {
+      cost_{now_s, now_s} {
   for (const SessionMember& member : session_.plan.members)
     boot_of_[member.peer.robot] = member.peer.boot;
   for (const PoseEdge& e : graph_.between) between_.push_back(e.id());
@@ -113,20 +127,19 @@ bool SessionPart::joins_members(const ClosureId& closure) const {
   return std::binary_search(between_.begin(), between_.end(), closure);
 }
 
-std::vector<ReliableMessage> SessionPart::advance(const PublicPoses& published, double now_s) {
-  worked_ = false;
+SessionWork SessionPart::advance(const PublicPoses& published, double now_s) {
   if (state_ == SessionState::kEntering) {
-    worked_ = enter(published);
+    work_.any = enter(published);
   } else if (state_ == SessionState::kGathering || state_ == SessionState::kLooking) {
-    worked_ = gather(published);
-    if (worked_) start_solver(now_s);
-  } else if (solver_ && (solver_->ready() || solver_->done())) {
-    worked_ = true;
+    work_.any = gather(published);
+    if (work_.any) start_solver(now_s);
+  } else if (solver_ && state_ != SessionState::kFailed && (solver_->ready() || solver_->done())) {
+    work_.any = true;
     solve(now_s);
   }
-  if (worked_) last_activity_s_ = now_s;
-  for (ReliableMessage& message : channel_.due(now_s)) to_send_.push_back(std::move(message));
-  return std::exchange(to_send_, {});
+  if (work_.any) cost_.last_activity_s = now_s;
+  for (ReliableMessage& message : channel_.due(now_s)) work_.messages.push_back(std::move(message));
+  return std::exchange(work_, {});
 }
 
 // A pose that is rounded twice may differ from the pose that is rounded once, because the
@@ -197,27 +210,11 @@ bool SessionPart::gather(const PublicPoses& published) {
       if (graph_.again && joins_members(id)) graph_.decided[id] = kept;
   }
   if (graph_.again)
-    reopen_closures();
+    reopen_closures(graph_, kSecondLook * result_.state.barc);
   else if (closures_may_be_false_)
     limit_precisions(graph_);
   take(SessionEvent::kGathered);
   return true;
-}
-
-// For a closure between robots, both robots use the poses and the verdict that are sent, and so
-// decide equally.
-void SessionPart::reopen_closures() {
-  const double limit = kSecondLook * result_.state.barc;
-  const auto pose = [this](const KeyframeId& id) {
-    return id.robot == self_.robot ? graph_.start[id.index] : graph_.public_poses.at(id);
-  };
-  for (const auto* edges : {&graph_.own, &graph_.between})
-    for (const PoseEdge& e : *edges) {
-      const auto decided = graph_.decided.find(e.id());
-      if (decided != graph_.decided.end() && !decided->second &&
-          residual_of(e, pose(e.from), pose(e.to)) <= limit)
-        graph_.decided.erase(decided);
-    }
 }
 
 void SessionPart::start_solver(double now_s) {
@@ -230,9 +227,9 @@ void SessionPart::start_solver(double now_s) {
   } catch (const std::exception& e) {
     return fail(e.what());
   }
-  last_activity_s_ = now_s;
+  cost_.last_activity_s = now_s;
   for (const auto& [from, message] : std::exchange(early_, {}))
-    if (!pass_to_solver(message, now_s)) refused_.push_back(from.first);
+    if (!pass_to_solver(message, now_s)) work_.refused.push_back(from.first);
 }
 
 void SessionPart::solve(double now_s) {
@@ -244,7 +241,7 @@ void SessionPart::solve(double now_s) {
   }
   for (SolverMessage& message : messages)
     if (boot_of_.contains(message.to) && message.to != self_.robot)
-      to_send_.push_back(channel_.write(std::move(message), now_s));
+      work_.messages.push_back(channel_.write(std::move(message), now_s));
   if (!solver_->done()) return;
   const SolverState state = solver_->state();
   if (state.failed) return fail("the team's equations cannot be solved");
@@ -286,7 +283,10 @@ bool SessionPart::receive(const ReliableMessage& message, double now_s) {
       break;
   }
   if (solver_ || stage() == MemberStage::kSolved) return pass_to_solver(message, now_s);
-  store_early(message);
+  const std::size_t bytes = early_bytes_ + message.bytes->size();
+  if (early_.size() >= kMaxEarlyMessages || bytes > kMaxEarlyBytes) return true;
+  if (early_.try_emplace({message.sender.robot, message.number}, message).second)
+    early_bytes_ = bytes;
   return true;
 }
 
@@ -294,15 +294,8 @@ bool SessionPart::receive(const ReliableMessage& message, double now_s) {
 bool SessionPart::pass_to_solver(const ReliableMessage& message, double now_s) {
   if (solver_ && !solver_->receive(message.sender.robot, *message.bytes)) return false;
   channel_.take(message);
-  last_activity_s_ = now_s;
+  cost_.last_activity_s = now_s;
   return true;
-}
-
-void SessionPart::store_early(const ReliableMessage& message) {
-  const std::size_t bytes = early_bytes_ + message.bytes->size();
-  if (early_.size() >= kMaxEarlyMessages || bytes > kMaxEarlyBytes) return;
-  if (early_.try_emplace({message.sender.robot, message.number}, message).second)
-    early_bytes_ = bytes;
 }
 
 bool SessionPart::follow(const Session& session) {

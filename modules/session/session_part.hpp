@@ -55,6 +55,22 @@ struct SessionResult {
   std::vector<SE3> poses = {};
 };
 
+/// The outcome of a piece of work of a session.
+struct [[nodiscard]] SessionWork {
+  std::vector<ReliableMessage> messages = {};  ///< To send.
+  bool any = false;                            ///< Something has changed; there may be more to do.
+  std::vector<RobotId> refused = {};  ///< Senders of early messages that the solver then refused.
+};
+
+/// Time and bytes of a session at one robot.
+struct SessionCost {
+  double started_s = 0.0;
+  double last_activity_s = 0.0;  ///< Time of the last work or message of the session.
+  /// Bytes of all messages of the session that this robot has sent or forwarded. A message counts
+  /// once for each neighbour that receives it.
+  std::uint64_t sent_bytes = 0;
+};
+
 /// The part of one robot in one session, from joining it to its end: see SessionState.
 ///
 /// First the robot enters the frame of the session. If it is in another frame, it waits for its
@@ -71,18 +87,13 @@ class SessionPart {
   SessionPart(Session session, TeamPeer self, FrozenPart part, MemberSolverFactory factory,
               double now_s);
 
-  /// Does one piece of work, if there is any, and returns the messages to send.
-  [[nodiscard]] std::vector<ReliableMessage> advance(const PublicPoses& published, double now_s);
-  /// True if the last advance() has changed anything; there may then be more to do.
-  [[nodiscard]] bool worked() const { return worked_; }
+  /// Does one piece of work, if there is any.
+  SessionWork advance(const PublicPoses& published, double now_s);
 
   /// Processes a message of a member. It is acknowledged once the solver has taken it. Messages
   /// that arrive before there is a solver are kept if there is room. Otherwise the sender repeats
   /// them. False if the sender is not a member, or if the solver cannot use the message at present.
   bool receive(const ReliableMessage& message, double now_s);
-  /// Returns the senders of early messages that the solver then refused, and removes them from the
-  /// list.
-  [[nodiscard]] std::vector<RobotId> take_refused() { return std::exchange(refused_, {}); }
   void reachable_again(RobotId robot) { channel_.reachable_again(robot); }
 
   /// Takes the newest message of the coordinator. True if it ends the session.
@@ -114,14 +125,8 @@ class SessionPart {
   [[nodiscard]] SolverState progress() const;
   /// That of the last solver that has finished.
   [[nodiscard]] const SessionResult& result() const { return result_; }
-  /// Time of the last activity or message of the session [s].
-  [[nodiscard]] double last_activity_s() const { return last_activity_s_; }
-  void note_activity(double now_s) { last_activity_s_ = now_s; }
-  [[nodiscard]] double started_s() const { return started_s_; }
-  /// Bytes of all messages of the session that this robot has sent or forwarded. A message counts
-  /// once for each neighbour that receives it.
-  [[nodiscard]] std::uint64_t sent_bytes() const { return sent_bytes_; }
-  void count_sent(std::size_t bytes) { sent_bytes_ += bytes; }
+  [[nodiscard]] SessionCost& cost() { return cost_; }
+  [[nodiscard]] const SessionCost& cost() const { return cost_; }
 
  private:
   [[nodiscard]] bool enter(const PublicPoses& published);
@@ -131,9 +136,7 @@ class SessionPart {
   void take(SessionEvent event) { state_ = next_state(state_, event); }
   void start_solver(double now_s);
   void look_again();
-  void reopen_closures();
   [[nodiscard]] bool pass_to_solver(const ReliableMessage& message, double now_s);
-  void store_early(const ReliableMessage& message);
   void solve(double now_s);
   void fail(const std::string& why);
 
@@ -151,16 +154,12 @@ class SessionPart {
   ReliableChannel channel_;
   std::map<std::pair<RobotId, std::uint32_t>, ReliableMessage> early_;  // before there is a solver
   std::size_t early_bytes_ = 0;
-  std::vector<RobotId> refused_;  // senders of early messages that the solver refused
-  std::vector<ReliableMessage> to_send_;
+  SessionWork work_;  // since the last advance()
   std::unique_ptr<MemberSolver> solver_;
   SessionResult result_;
   SessionState state_ = SessionState::kEntering;
   std::string failure_;
-  bool worked_ = false;
-  double started_s_;
-  double last_activity_s_;
-  std::uint64_t sent_bytes_ = 0;
+  SessionCost cost_;
 };
 
 }  // namespace km

@@ -57,7 +57,7 @@ bool take(AgentState& s, const TeamPeer& sender, const MemberPoses& poses) {
   if (poses.stage == MemberStage::kSolved && !of_session) s.roster.keep_result(sender.robot);
   s.deserted |= was_member && poses.session != s.part->session().id;
   if (!is_member()) return true;
-  if (s.in_session()) s.part->note_activity(s.now_s);
+  if (s.in_session()) s.part->cost().last_activity_s = s.now_s;
   if (s.is_solved()) decide_with(s, poses);
   return true;
 }
@@ -134,12 +134,12 @@ void TeamAgent::restore(const TeamSolution& solution) {
   const Trajectory& own = solution.trajectory;
   s.awaited_keyframes = std::max<std::size_t>(own.T_world_kf.size(), 1);
   s.poses.restore(own.T_world_kf);
-  s.frame.set_world(World{own.anchor, SE3::Identity()});
+  s.world = World{own.anchor, SE3::Identity()};
   s.published_anchor = own.anchor;
   s.decisions.decide(solution.verdicts.closures);
   for (const TeamPeer& peer : solution.peers) {
     meet(s, peer);
-    MemberPoses held{.sender = peer, .stage = MemberStage::kSolved, .frame = s.frame.frame()};
+    MemberPoses held{.sender = peer, .stage = MemberStage::kSolved, .frame = s.frame};
     for (const auto& [id, T_world_kf] : own.public_poses) {
       if (id.robot != peer.robot) continue;
       held.keyframes.push_back(id.index);
@@ -189,7 +189,7 @@ bool TeamAgent::receive(const TeamMessage& message) {
 TeamOutput TeamAgent::step(double now_s, std::uint64_t sent_bytes) {
   AgentState& s = state_;
   s.now_s = now_s;
-  if (s.part) s.part->count_sent(sent_bytes - s.sent_bytes);
+  if (s.part) s.part->cost().sent_bytes += sent_bytes - s.sent_bytes;
   s.sent_bytes = sent_bytes;
   TeamOutput output;
   const bool is_complete = s.graph.keyframes() >= s.awaited_keyframes;

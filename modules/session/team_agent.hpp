@@ -12,48 +12,14 @@
 namespace km {
 
 /// The part of one robot in the pose graph optimisation of the team, as a state machine without
-/// threads and clocks.
+/// threads and clocks. README.md states the protocol.
 ///
 /// The team of a robot is all robots that links connect to it, directly or through other robots.
-/// Messages may arrive over any of them (see Overlay in runtime/overlay). Robots of a team that
-/// share inlier closures, directly or through other robots, optimise together in sessions. A
-/// session freezes the graph: its members, and for every pair of members the edge set that both
-/// hold. The member with the lowest id coordinates the session: it opens the session when the graph
-/// has changed, and ends it. A robot without partners coordinates its own sessions. SessionPart
-/// implements a session of one member; a factory supplies the solver of its graph.
-///
-/// New measurements do not interrupt a session; see SessionSchedule for the time of the next one.
-/// Until then each robot refines its poses alone: without a message, it solves its own graph with
-/// its new closures and the poses that the other robots have last sent. A
-/// session ends early when links to a member no longer exist. Links that return at once do no
-/// harm, because messages are repeated and find other ways. The members of the interrupted session
-/// keep the result of the last one.
-///
-/// A session decides from the measurements of its members alone: no pose, verdict or estimate of an
-/// earlier session is an input. The result therefore does not depend on the order in which robots
-/// have met. Exceptions are the poses of robots out of reach, and the verdicts on closures to them.
-///
-/// The other robots hold the last public poses of a robot that is out of reach, so that they keep
-/// their frame and its measurements. When this robot returns, it catches up. If it returns as
-/// another process, its poses are discarded; if it returns with another incarnation, closures to it
-/// are discarded, too.
-///
-/// A robot that closures at a single place tie to the others is joined tentatively; see FrameTies.
-/// If the team rejects all closures that tie some members, the robots on each side publish their
-/// poses in the frame of their lowest robot. Later closures join them again.
-///
-/// The keyframes after a step of unknown length (another run of the robot) are located once kept
-/// closures at two places tie them to the runs before. Until then, no trajectory is published,
-/// because the poses of these keyframes are unknown.
-///
-/// A datum is a frame outside the run: that of fixes or of a finished map. Keyframe 0 is its
-/// origin. Fixes (see place_fixes()) or closures with the map locate a robot in its datum. The
-/// robot and all members that closures tie to it then publish in the datum. Keyframes 0 of members
-/// in one datum are one pose, see datum_ties(). Robots in one datum share its frame also without
-/// closures.
-///
-/// If all members have verticals, these are part of the cost, and `world` has z up. Deterministic:
-/// equal inputs in equal order give equal outputs. Not thread-safe.
+/// Messages may arrive over any of them (see Overlay in runtime/overlay). The keyframes after a
+/// step of unknown length (another run of the robot) are located once kept closures at two places
+/// tie them to the runs before. Until then, no trajectory is published. If all members have
+/// verticals, these are part of the cost, and `world` has z up. Deterministic: equal inputs in
+/// equal order give equal outputs. Not thread-safe.
 class TeamAgent {
  public:
   /// `dimension` 2: poses and measurements are planar, as in TreeNewtonOptions. Throws ConfigError
@@ -99,7 +65,7 @@ class TeamAgent {
 
   /// Own poses in frame(): the last result, and odometry since.
   [[nodiscard]] const std::vector<SE3>& poses() const { return state_.poses.T_frame_kf(); }
-  [[nodiscard]] const TeamFrame& frame() const { return state_.frame.frame(); }
+  [[nodiscard]] const TeamFrame& frame() const { return state_.frame; }
   /// The present or last session of this robot.
   [[nodiscard]] const SessionPart* part() const { return state_.part ? &*state_.part : nullptr; }
   /// False if the session of part() has ended.

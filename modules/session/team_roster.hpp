@@ -6,7 +6,6 @@
 #include <set>
 #include <vector>
 
-#include "modules/core/geometry.hpp"
 #include "modules/core/team_links.hpp"
 #include "modules/session/pgo_method.hpp"
 #include "modules/session/team_messages.hpp"
@@ -70,41 +69,6 @@ class TeamRoster {
   PublicPoses public_poses_;
   PublicPoses results_;
   std::set<RobotId> component_;
-};
-
-/// Pose of `world`, the frame in which robots publish, in the frame of a solution. `world` is the
-/// odometry frame of `anchor`.
-struct World {
-  RobotId anchor = 0;
-  SE3 T_frame_world = SE3::Identity();
-};
-
-/// The frame of the present solution of one robot, and `world` in it. Not thread-safe.
-class OwnFrame {
- public:
-  explicit OwnFrame(TeamPeer self) : self_(self), frame_{.coordinator = self} {}
-
-  [[nodiscard]] const TeamFrame& frame() const { return frame_; }
-  /// nullopt before `world` is known in this frame.
-  [[nodiscard]] const std::optional<World>& world() const { return world_; }
-
-  /// To be called when the solution is in `frame`. If that is another frame, `world` is unknown
-  /// afterwards.
-  void enter(const TeamFrame& frame);
-  void set_world(const std::optional<World>& world) { world_ = world; }
-
-  /// `world` with this anchor. It follows from the pose of keyframe 0 that the anchor has sent to
-  /// all robots, so all compute the same `world` to the last bit. If the solution is `upright`,
-  /// `world` is rotated so that z is up, because the optimum has a better estimate of the tilt of
-  /// keyframe 0 than its own vertical. nullopt if the poses of the anchor are unknown or in another
-  /// frame.
-  [[nodiscard]] std::optional<World> world_of(RobotId anchor, const TeamRoster& roster,
-                                              const SE3& T_odom_first, bool upright) const;
-
- private:
-  TeamPeer self_;
-  TeamFrame frame_;
-  std::optional<World> world_;
 };
 
 }  // namespace km

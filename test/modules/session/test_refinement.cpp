@@ -1,7 +1,7 @@
 #include <catch2/catch.hpp>
 
 #include "modules/rbcd/solver_choice.hpp"
-#include "modules/session/refinement_schedule.hpp"
+#include "modules/session/session_schedule.hpp"
 #include "test/support/team_network.hpp"
 
 namespace km {

@@ -62,12 +62,13 @@ struct Correspondence {
     (void)part.advance(published, 0.0);
     REQUIRE(part.stage() == MemberStage::kEntered);
   }
-  // Lets the solver begin.
-  void begin(double now_s) {
+  // Lets the solver begin; the senders of early messages that it refuses.
+  std::vector<RobotId> begin(double now_s) {
     published[kOther.robot] = {.sender = kOther, .session = session.id, .keyframes = {0}};
     published[kOther.robot].T_frame_kf.resize(1);
-    (void)part.advance(published, now_s);
-    REQUIRE(part.worked());
+    const SessionWork work = part.advance(published, now_s);
+    REQUIRE(work.any);
+    return work.refused;
   }
   ReliableMessage write(const std::vector<std::uint8_t>& bytes, double now_s = 0.0) {
     return others.write({kSelf.robot, std::make_shared<const std::vector<std::uint8_t>>(bytes)},
@@ -81,7 +82,7 @@ struct Correspondence {
   void exchange(double from_s, double to_s) {
     for (double now_s = from_s; now_s < to_s; now_s += 0.1) {
       for (const ReliableMessage& message : others.due(now_s)) (void)part.receive(message, now_s);
-      for (const ReliableMessage& message : part.advance(published, now_s))
+      for (const ReliableMessage& message : part.advance(published, now_s).messages)
         (void)others.read(message, now_s);
     }
   }
@@ -91,7 +92,7 @@ struct Correspondence {
 
 TEST_CASE("a message that the solver cannot take yet is repeated", "[pose_graph][session]") {
   Correspondence c;
-  c.begin(0.0);
+  (void)c.begin(0.0);
   const ReliableMessage first = c.write_number(0), second = c.write_number(1);
   CHECK_FALSE(c.part.receive(second, 0.0));
   CHECK(c.part.receive(first, 0.0));
@@ -109,7 +110,7 @@ TEST_CASE("messages before the solver begins are not lost, in any number and ord
   for (std::uint32_t k = 0; k < kMessages; ++k) messages.push_back(c.write_number(k));
   std::shuffle(messages.begin(), messages.end(), std::mt19937(1));
   for (const ReliableMessage& message : messages) CHECK(c.part.receive(message, 0.0));
-  c.begin(0.1);
+  (void)c.begin(0.1);
   c.exchange(0.2, 60.0);
   CHECK(c.taken == kMessages);
   CHECK(c.others.due(1000.0).empty());
@@ -149,9 +150,7 @@ TEST_CASE("a robot computes with the public poses that the other robots receive,
 TEST_CASE("refused messages do not keep a session alive", "[pose_graph][session]") {
   Correspondence c;
   CHECK(c.part.receive(c.write({1, 2, 3}), 0.0));  // not detectable before the solver begins
-  CHECK(c.part.take_refused().empty());
-  c.begin(0.0);
-  CHECK(c.part.take_refused() == std::vector<RobotId>{2});
+  CHECK(c.begin(0.0) == std::vector<RobotId>{2});
   CHECK_FALSE(c.part.receive(c.write({1, 2, 3}), 5.0));
   ReliableMessage stranger = c.write_number(0);
   stranger.sender = {3, 1};
@@ -164,7 +163,7 @@ TEST_CASE("refused messages do not keep a session alive", "[pose_graph][session]
   impossible = c.write_number(0);
   impossible.received = 7;  // acknowledges messages that this robot has never sent
   CHECK_FALSE(c.part.receive(impossible, 5.0));
-  CHECK(c.part.last_activity_s() == 0.0);
+  CHECK(c.part.cost().last_activity_s == 0.0);
 }
 
 }  // namespace km

@@ -348,7 +348,7 @@ TEST_CASE("verdicts on unknown closures, or from robots outside the session, dec
   const TeamAgent& victim = network.agent(7);
   const std::map<ClosureId, bool> decided = victim.decided();
   const std::size_t verdicts = network.robots.at(7).verdicts.closures.size();
-  const double last_activity_s = victim.part()->last_activity_s();
+  const double last_activity_s = victim.part()->cost().last_activity_s;
   const auto known = std::find_if(decided.begin(), decided.end(), [](const auto& closure) {
     return closure.first.from.robot == 7 && closure.first.to.robot == 33;
   });
@@ -368,7 +368,7 @@ TEST_CASE("verdicts on unknown closures, or from robots outside the session, dec
   }
   CHECK(victim.decided() == decided);
   CHECK(network.robots.at(7).verdicts.closures.size() == verdicts);
-  CHECK(victim.part()->last_activity_s() == last_activity_s);  // the session is over
+  CHECK(victim.part()->cost().last_activity_s == last_activity_s);  // the session is over
 }
 
 TEST_CASE("a session with unknown closures is refused", "[pose_graph][agent]") {

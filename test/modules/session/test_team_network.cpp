@@ -276,7 +276,7 @@ TEST_CASE("after an interrupted session robots keep the last result", "[pose_gra
   network.on_step = [&](const TeamNetwork::Robot& robot) {
     const SessionPart* part = robot.agent->part();
     if (part == nullptr || part->members().size() < 5 || !part->stage()) return;
-    if (part->worked()) ++steps;
+    if (part->cost().last_activity_s == network.now_s()) ++steps;
     alone.try_emplace(robot.peer.robot, robot.agent->poses());
   };
   (void)network.run(600.0, [&] { return steps >= cut_after || network.all_settled(); });
