@@ -89,6 +89,7 @@ struct VoxelBlock {
   double last_seen_m = 0.0;         ///< Distance travelled by the camera at the last selection [m].
   KeyframeIndex changed_since = 0;  ///< First keyframe of the changes not yet meshed.
   bool changed = false;             ///< Changed since the block was last meshed.
+  bool has_mesh = false;  ///< Surface was seen from a distance that fits the voxels: it is meshed.
 };
 
 /// Hash and order of the positions of blocks; the order is by z, then y, then x.

@@ -96,7 +96,6 @@ struct SemanticMapper::State {
       const double voxel_m = std::ldexp(config.voxel_m(), static_cast<int>(level));
       maps.emplace_back(voxel_m, known_from(config, voxel_m));
     }
-    bands[space_level()].above_m = 0.0;
   }
 
   void integrate(std::size_t level, const DepthView& view, const BlockFusion& fusion,
@@ -139,8 +138,8 @@ std::size_t SemanticMapper::State::block_count() const {
   return count;
 }
 
-// Free space is followed in the finest map whose band contains its range. This map has also the
-// surface of smaller bands.
+// Free space is followed in the finest map whose band contains its range. This map also has
+// surface that is nearer than its band, without a mesh.
 std::size_t SemanticMapper::State::space_level() const {
   std::size_t level = 0;
   while (level + 1 < bands.size() && bands[level].to_m < SpaceTracker::kFreeRange_m) ++level;
@@ -165,18 +164,24 @@ std::vector<SemanticMapper::State::Update> SemanticMapper::State::select(
   std::vector<Update> updates;
   BlockMap& map = maps[level];
   const std::size_t others = block_count() - map.size();
-  const NearBlocks near = select_near_blocks(
-      view, T_odom_cam, bands[level],
-      std::max(static_cast<std::size_t>(config.max_blocks), others) - others, frame, keyframe, map);
-  report.blocks_refused += near.refused;
-  for (VoxelBlock* block : near.blocks) {
-    if (view.labelled && block->labels == nullptr)
-      block->labels = std::make_unique<std::array<VoxelLabels, kBlockVoxels>>();
-    if (!view.colors.empty() && block->colors == nullptr)
-      block->colors = std::make_unique<std::array<VoxelColor, kBlockVoxels>>();
-    block->last_seen_m = way_m;
-    updates.push_back({block, true, false});
-  }
+  const auto add_near = [&](const DepthBand& band, bool is_meshed) {
+    const NearBlocks near =
+        select_near_blocks(view, T_odom_cam, band,
+                           std::max(static_cast<std::size_t>(config.max_blocks), others) - others,
+                           frame, keyframe, map);
+    report.blocks_refused += near.refused;
+    for (VoxelBlock* block : near.blocks) {
+      if (view.labelled && block->labels == nullptr)
+        block->labels = std::make_unique<std::array<VoxelLabels, kBlockVoxels>>();
+      if (!view.colors.empty() && block->colors == nullptr)
+        block->colors = std::make_unique<std::array<VoxelColor, kBlockVoxels>>();
+      block->last_seen_m = way_m;
+      block->has_mesh |= is_meshed;
+      updates.push_back({block, true, false});
+    }
+  };
+  add_near(bands[level], true);
+  if (level == space_level()) add_near({0.0, bands[level].above_m}, false);
   for (const auto& block : map.blocks()) {
     if (block->selected_in == frame) continue;
     const BlockFusion::Relation relation = fusion.relation_to(*block);
