@@ -11,7 +11,7 @@ option(KM_UNITY "Compile the sources of a library or program in groups" ON)
 
 find_package(kimera_multi REQUIRED
   COMPONENTS charts core evaluation heap images loop_closure opencv outlier_rejection place_recognition
-             pose_graph program rbcd recorded_graph runtime sensors_node)
+             program rbcd recorded_graph robust runtime sensors_node session tree_newton)
 
 # Include paths are those of the tree ("apps/lab/pgo/solvers.hpp"). Its root is no include folder,
 # because the headers of modules must be the installed ones.
