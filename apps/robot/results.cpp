@@ -1,6 +1,8 @@
 #include "apps/robot/results.hpp"
 
+#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <array>
 #include <cinttypes>
 #include <cmath>
@@ -202,6 +204,25 @@ void write_results(const fs::path& folder, const RunRecord& record, ResultWriter
   write("loop_closures.csv", write_closures, record);
 }
 
+std::optional<CorrectionSummary> correction_of(const RunRecord& record) {
+  const std::vector<StampedPose> optimized = record.optimized_keyframes();
+  if (optimized.size() < 2) return std::nullopt;
+  CorrectionSummary summary;
+  std::vector<double> squares;
+  UncertainPose odometry;
+  for (std::size_t i = 1; i < optimized.size(); ++i) {
+    const RunRecord::RecordedKeyframe& keyframe = record.keyframes()[i];
+    odometry = compose(odometry, {keyframe.T_previous_kf, keyframe.covariance});
+    const Vector6 e = local_coordinates(odometry.T, optimized[0].T.inverse() * optimized[i].T);
+    squares.push_back(e.dot(odometry.Sigma.ldlt().solve(e)) / 6.0);
+    summary.largest_m = std::max(summary.largest_m, e.tail<3>().norm());
+  }
+  const auto middle = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2);
+  std::ranges::nth_element(squares, middle);
+  summary.normalised_square = *middle;
+  return summary;
+}
+
 std::vector<PublishedClosure> published_closures(const RunRecord& record) {
   std::vector<PublishedClosure> published;
   for (const ClosureOutcome& outcome : record.outcomes())
@@ -225,6 +246,7 @@ RunSummary summary_of(const RunRecord& record) {
   summary.pgo = record.progress();
   summary.odometry = record.odometry_statistics();
   summary.holes = holes_of(record.odometry());
+  summary.correction = correction_of(record);
   if (record.calibration()) summary.cameras = cameras_of(*record.calibration());
   if (record.dense_sensing()) summary.mapping = map_counts(record);
   return summary;

@@ -293,6 +293,15 @@ class FindingsOfRun {
           "loop closures of this robot agree on a jump there, as after lost tracking; the "
           "optimised trajectory is corrected, odometry.tum is not",
           "see the log for the keyframes, and odometry in summary.json");
+    // The 99.9999 % quantile of chi-squared with 6 degrees of freedom, as for closures.
+    constexpr double kContradicting = 38.3 / 6.0;
+    if (run_.correction && run_.correction->normalised_square > kContradicting)
+      add(kWarning, "odometry.contradicted",
+          "the optimised trajectory is up to " + fixed(run_.correction->largest_m, 2) +
+              " m from odometry, " + fixed(std::sqrt(run_.correction->normalised_square), 1) +
+              " times the stated standard deviation of odometry",
+          "either odometry is worse than it states, or false closures bend the trajectory",
+          "compare odometry.tum and optimized.tum, and see loop_closures.csv for the closures");
     if (run_.odometry && !run_.odometry->has_imu)
       add(kNote, "odometry.images_alone", "odometry by images alone, without an inertial sensor",
           "z of poses and maps is the upward direction of the camera at the first image, not the "

@@ -199,6 +199,18 @@ struct HolesSummary {
   }
 };
 
+/// Difference of the optimised keyframes to odometry, both in the frame of the first keyframe.
+struct CorrectionSummary {
+  double largest_m = 0.0;
+  /// Median over the keyframes of the squared difference, normalised by the covariance of odometry:
+  /// less than about 1 if odometry and the optimised keyframes are right.
+  double normalised_square = 0.0;
+
+  void visit_fields(auto& visitor) {
+    visit_each(visitor, "largest_m", largest_m, "normalised_square", normalised_square);
+  }
+};
+
 /// A time without a pose between two poses of a trajectory.
 struct PoseHole {
   Stamp from = 0, to = 0;
@@ -236,9 +248,10 @@ struct RunSummary {
   std::optional<VioStatistics> odometry;            ///< Absent with an external odometry.
   std::optional<LocalizationSummary> localization;  ///< Absent without --localize.
   std::optional<FixesSummary> fixes;                ///< Absent without absolute fixes.
-  std::optional<HolesSummary> holes;      ///< Holes of the live trajectory; absent without any.
-  std::optional<CamerasSummary> cameras;  ///< Absent without vio.calibrate.
-  std::optional<MappingSummary> mapping;  ///< Absent if mapping is off.
+  std::optional<HolesSummary> holes;  ///< Holes of the live trajectory; absent without any.
+  std::optional<CorrectionSummary> correction;   ///< Absent before the first solution.
+  std::optional<CamerasSummary> cameras;         ///< Absent without vio.calibrate.
+  std::optional<MappingSummary> mapping;         ///< Absent if mapping is off.
   std::map<std::string, std::uint64_t> traffic;  ///< Bytes sent, by category.
   std::optional<HeldBackSums> held_back;         ///< Absent without a budget.
   ProcessSummary process;
@@ -267,11 +280,12 @@ struct RunSummary {
                frames_skipped, "paused_s", paused_s, "sensor_faults", sensor_faults,
                "peer_keyframes", peer_keyframes, "closures", closures, "pgo", pgo, "odometry",
                odometry, "localization", localization, "absolute_fixes", fixes, "holes", holes,
-               "cameras", cameras, "mapping", mapping, "traffic", traffic, "held_back", held_back,
-               "process", process, "seconds", seconds, "lost_peers", lost_peers, "apart_peers",
-               apart_peers, "unmet_peers", unmet_peers, "forged_announcements",
-               forged_announcements, "other_vocabulary", other_vocabulary, "other_network",
-               other_network, "noticed", noticed, "exit_reason", exit_reason, "findings", findings);
+               "correction", correction, "cameras", cameras, "mapping", mapping, "traffic", traffic,
+               "held_back", held_back, "process", process, "seconds", seconds, "lost_peers",
+               lost_peers, "apart_peers", apart_peers, "unmet_peers", unmet_peers,
+               "forged_announcements", forged_announcements, "other_vocabulary", other_vocabulary,
+               "other_network", other_network, "noticed", noticed, "exit_reason", exit_reason,
+               "findings", findings);
   }
 };
 

@@ -87,6 +87,7 @@ TEST_CASE("summary.json has the keys that others read", "[robot][summary]") {
         "/absolute_fixes/not_used/x /absolute_fixes/datum/0 /absolute_fixes/datum/1 "
         "/absolute_fixes/odometry_frame/0 /absolute_fixes/odometry_frame/1 "
         "/holes/count /holes/seconds /holes/longest_s /holes/longest_from_s "
+        "/correction/largest_m /correction/normalised_square "
         "/cameras/offset_s /cameras/offset_sigma_s /cameras/rotation_x_rad /cameras/rotation_y_rad "
         "/cameras/rotation_z_rad /cameras/rotation_sigma_rad /cameras/translation_x_m "
         "/cameras/translation_y_m /cameras/translation_z_m /cameras/translation_sigma_m "
@@ -185,6 +186,29 @@ TEST_CASE("The summary has the holes of the live trajectory", "[robot][findings]
   CHECK(holes->seconds == Approx(8.0));
   CHECK(holes->longest_s == Approx(6.0));
   CHECK(holes->longest_from_s == Approx(1.0));
+}
+
+TEST_CASE("The summary compares the optimised keyframes with the uncertainty of odometry",
+          "[robot][findings]") {
+  constexpr double kSigma_m = 0.1, kOff_m = 0.4;
+  RunRecord record(1);
+  Trajectory trajectory;
+  trajectory.robot = trajectory.anchor = 1;
+  for (KeyframeIndex k = 0; k < 3; ++k) {
+    KeyframeOdometry keyframe;
+    keyframe.id = {1, k};
+    keyframe.stamp = nanoseconds(0.5 * k);
+    keyframe.covariance = kSigma_m * kSigma_m * Matrix6::Identity();
+    record.add(keyframe);
+    trajectory.T_world_kf.push_back(SE3(Eigen::Translation3d(5.0, k == 2 ? kOff_m : 0.0, 0.0)));
+  }
+  CHECK_FALSE(summary_of(record).correction.has_value());
+  record.add(trajectory);
+  const auto correction = summary_of(record).correction;
+  REQUIRE(correction.has_value());
+  CHECK(correction->largest_m == Approx(kOff_m));
+  CHECK(correction->normalised_square ==
+        Approx(kOff_m * kOff_m / (2.0 * kSigma_m * kSigma_m * 6.0)));
 }
 
 namespace {
