@@ -110,7 +110,10 @@ class Watch {
         process_file_(options.output / "process.csv", results),
         process_csv_(process_file_.rows(), continues ? process_file_.go_on() : std::string()),
         rounds_file_(options.output / "optimizer.csv", results),
-        rounds_csv_(rounds_file_.rows(), continues ? rounds_file_.go_on() : std::string()) {}
+        rounds_csv_(rounds_file_.rows(), continues ? rounds_file_.go_on() : std::string()) {
+    for (const std::string& host : config.dds.peers)
+      if (!host.starts_with("127.") && host != robot.interface().address) hosts_.push_back(host);
+  }
 
   /// True when the robot may leave, or must leave because another robot has its id. Called ten
   /// times a second.
@@ -218,7 +221,13 @@ class Watch {
   // while a new participant discovers it again.
   void note_unmet(double now_s) {
     constexpr double kUnmet_s = 5.0, kKept_s = 10.0;
-    for (const auto& [name, why] : robot_.bridge().peers().ask(&PeerTable::unmet)) {
+    const std::vector<Peer> met = robot_.bridge().peers().list();
+    auto unmet_now = robot_.bridge().peers().ask(&PeerTable::unmet);
+    if (met.empty() && unmet_now.empty())
+      for (const std::string& host : hosts_)
+        unmet_now["dds.peers " + host] =
+            "no robot there is received: none runs, or a firewall or NAT is between";
+    for (const auto& [name, why] : unmet_now) {
       Unmet& unmet = unmet_.try_emplace(name, Unmet{.since_s = now_s}).first->second;
       unmet.why = why;
       unmet.last_s = now_s;
@@ -229,7 +238,7 @@ class Watch {
       const double gone_s = now_s - entry.second.last_s;
       return gone_s > (entry.first.ends_with(')') ? kKept_s : 0.0);
     });
-    for (const Peer& peer : robot_.bridge().peers().list()) unmet_.erase(to_string(peer.identity));
+    for (const Peer& peer : met) unmet_.erase(to_string(peer.identity));
   }
 
   // Less often than poll(), because the time to count closures grows with their number.
@@ -303,6 +312,7 @@ class Watch {
   const double serve_limit_s_;
   Departure departure_;
   Absentees absentees_;
+  std::vector<std::string> hosts_;      // other hosts in dds.peers
   std::map<std::string, Unmet> unmet_;  // by name
   double start_s_;
   GrowingFile traffic_file_;
