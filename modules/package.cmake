@@ -13,6 +13,9 @@ set(placed COMPONENT package EXCLUDE_FROM_ALL)
 install(FILES "${package_dir}/kimera_multi_robot@.service" DESTINATION lib/systemd/system ${placed})
 install(FILES ${package_dir}/alice.env DESTINATION share/doc/kimera-multi/examples ${placed})
 install(FILES LICENSE DESTINATION share/doc/kimera-multi RENAME copyright ${placed})
+install(FILES README.md CITATION.cff .github/CHANGELOG.md DESTINATION share/doc/kimera-multi ${placed})
+install(CODE "set(programs ${programs})\nset(bin \"${CMAKE_RUNTIME_OUTPUT_DIRECTORY}\")" ${placed})
+install(SCRIPT modules/man_pages.cmake ${placed})
 foreach(program ${programs})  # bash-completion loads the file that is named like the command
   install(FILES config/completion/kimera_multi.bash RENAME ${program}
           DESTINATION share/bash-completion/completions ${placed})

@@ -19,6 +19,8 @@ file(READ "${root}/lib/systemd/system/kimera_multi_robot@.service" unit)
 check("${unit}" "ExecStart=/usr/bin/kimera_multi_robot ")
 file(READ ${root}/share/doc/kimera-multi/examples/alice.env environment)
 check("${environment}" "KM_RIG=/usr/share/kimera_multi/rigs/")
-foreach(file share/bash-completion/completions/kimera_multi_team share/doc/kimera-multi/copyright)
+foreach(file share/bash-completion/completions/kimera_multi_team share/doc/kimera-multi/copyright
+        share/doc/kimera-multi/README.md share/doc/kimera-multi/CHANGELOG.md
+        share/man/man1/kimera_multi_robot.1)
   file(SIZE ${root}/${file} bytes)
 endforeach()
