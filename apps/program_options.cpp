@@ -8,7 +8,7 @@
 namespace km {
 
 std::optional<int> parse_options(CLI::App& app, int argc, const char* const* argv,
-                                 int exit_code_if_wrong, const std::string& hint_for_unknown) {
+                                 const std::string& hint_for_unknown) {
   app.set_version_flag("--version", version_text(app.get_name()))->group("Options");
   try {
     app.parse(argc, argv);
@@ -26,7 +26,7 @@ std::optional<int> parse_options(CLI::App& app, int argc, const char* const* arg
   } catch (const CLI::ParseError& error) {
     if (app.exit(error) == 0) return 0;  // --help, --version or CLI::Success
   }
-  return exit_code_if_wrong;
+  return kBadCommandLine;
 }
 
 int run_subcommands(const std::string& program, const std::string& about,
@@ -34,7 +34,7 @@ int run_subcommands(const std::string& program, const std::string& about,
   CLI::App app(about, program);
   app.require_subcommand(1);
   for (const auto add : adders) add(app);
-  const std::optional<int> exit_code = parse_options(app, argc, argv, 1);
+  const std::optional<int> exit_code = parse_options(app, argc, argv);
   if (exit_code.value_or(0) == 0) return 0;
   if (!app.get_subcommands().empty()) return *exit_code;
   std::cerr << program << ": the first word must be a subcommand:\n";
@@ -45,7 +45,7 @@ int run_subcommands(const std::string& program, const std::string& about,
   return *exit_code;
 } catch (const std::exception& error) {
   std::cerr << program << ": " << error.what() << '\n';
-  return 1;
+  return kBadInput;
 }
 
 }  // namespace km

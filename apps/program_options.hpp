@@ -1,6 +1,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>  // takes seconds to compile: only for sources that define options
+#include <exception>
 #include <initializer_list>
 #include <memory>
 #include <optional>
@@ -8,18 +9,36 @@
 
 namespace km {
 
+/// Exit codes of all programs, for input or a disk that cannot be used, and for an invalid command
+/// line. Other codes are those of a program.
+inline constexpr int kBadInput = 1, kBadCommandLine = 2;
+
 /// Adds --version, parses the words and calls the callbacks. Empty if the program continues.
 /// Otherwise the exit code: 0 after --help, --version and a callback that throws CLI::Success. It
-/// is `exit_code_if_wrong` for an invalid command line, whose error is printed to stderr. An
-/// unknown word is often the reason why another one is missing, and is named instead, followed by
+/// is kBadCommandLine for an invalid command line, whose error is printed to stderr. An unknown
+/// word is often the reason why another one is missing, and is named instead, followed by
 /// `hint_for_unknown`. Other exceptions of callbacks are passed on.
 [[nodiscard]] std::optional<int> parse_options(CLI::App& app, int argc, const char* const* argv,
-                                               int exit_code_if_wrong,
                                                const std::string& hint_for_unknown = {});
+
+/// Replaces the text of an option by the path that `find(folder, text)` returns. The text of an
+/// exception is the error.
+template <typename Find>
+[[nodiscard]] CLI::Validator named_file(Find find, const char* folder) {
+  return {[find, folder](std::string& text) {
+            try {
+              text = find(folder, text).string();
+              return std::string();
+            } catch (const std::exception& error) {
+              return std::string(error.what());
+            }
+          },
+          "FILE|NAME"};
+}
 
 /// The main() of a program whose first word is a subcommand. Each of `adders` adds one, which runs
 /// as soon as the command line names it. The exit code is 0 if the subcommand succeeded or help was
-/// requested. It is 1 for an exception, with a message on stderr, and for an invalid command line.
+/// requested. It is kBadInput for an exception, with a message on stderr.
 int run_subcommands(const std::string& program, const std::string& about,
                     std::initializer_list<void (*)(CLI::App&)> adders, int argc, char** argv);
 

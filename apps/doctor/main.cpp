@@ -10,6 +10,7 @@
 #include "apps/doctor/network_facts.hpp"
 #include "apps/output_file.hpp"
 #include "apps/program_options.hpp"
+#include "apps/robot/robot_config.hpp"
 #include "apps/stage_progress.hpp"
 #include "modules/sensors/node/rig_file.hpp"
 #include "runtime/log.hpp"
@@ -83,10 +84,10 @@ Options options_of(int argc, char** argv) {
   app.footer(kFooter);
   app.add_option("PATH", options.path, "Recording, or results")->check(CLI::ExistingPath);
   app.add_option("--live", options.live, "Rig file: look at the live topics that it names (ROS 2)")
-      ->check(CLI::ExistingFile);
+      ->transform(named_file(find_named_file, "rigs"));
   add_network(app, options);
   app.add_option("--rig", robot.rig, "For a bag: which topics are the sensors, and calibration")
-      ->check(CLI::ExistingFile);
+      ->transform(named_file(find_named_file, "rigs"));
   app.add_option("--from", robot.from_s, "Look from here on [s since the first image]");
   app.add_option("--to", robot.to_s, "Look up to here [s]; by default 120 s are looked at");
   app.add_option("--seconds", options.seconds,
@@ -94,11 +95,11 @@ Options options_of(int argc, char** argv) {
                  "10; how long to listen to the network, by default 5")
       ->check(CLI::Range(0.5, 3600.0));
   app.add_option("--config", robot.configs, "Configuration files of the robots")
-      ->check(CLI::ExistingFile);
+      ->transform(named_file(find_named_file, "datasets"));
   app.add_option("--set", robot.settings, "One setting over all files: section.key=value");
   app.add_option("--json", options.json, "Also write figures and findings to this file");
   app.callback([&options, &app] { check(options, app); });
-  if (const auto exit_code = parse_options(app, argc, argv, kUnusable)) std::exit(*exit_code);
+  if (const auto exit_code = parse_options(app, argc, argv)) std::exit(*exit_code);
   return options;
 }
 

@@ -5,7 +5,7 @@ namespace {
 
 constexpr const char* kAbout =
     R"(Compares what robots estimated with what is true.
-Exit code: 0 if the comparison was made, 1 for input that cannot be used.)";
+Exit code: 0 if the comparison was made, 1 for input that cannot be used, 2 for a bad command line.)";
 
 }  // namespace
 

@@ -31,7 +31,7 @@ these messages. Examples:
   kimera_multi_keys show survey
 Keep survey/authority off the robots, and a copy of it in a safe place: its owner can admit
 any robot to the team, and without it no robot can be added or revoked.
-Every subcommand has a --help. Exit code: 0 for success, 1 otherwise.)";
+Every subcommand has a --help. Exit code: 0 for success, 2 for a bad command line, 1 otherwise.)";
 
 namespace fs = std::filesystem;
 

@@ -18,8 +18,6 @@
 namespace km {
 namespace {
 
-constexpr int kBadInput = 1, kBadCommandLine = 2;
-
 constexpr const char* kAbout =
     "Plays a recording as live topics of ROS 2, without ROS, in place of the drivers of a "
     "robot.";
@@ -107,7 +105,7 @@ Options options_of(int argc, char** argv) {
     if (!(options.play.from_s < options.play.to_s))
       throw CLI::ValidationError("--from is not before --to");
   });
-  if (const auto exit_code = parse_options(app, argc, argv, kBadCommandLine)) std::exit(*exit_code);
+  if (const auto exit_code = parse_options(app, argc, argv)) std::exit(*exit_code);
   return options;
 }
 

@@ -14,8 +14,6 @@
 namespace km {
 namespace {
 
-constexpr int kBadInput = 1, kBadCommandLine = 2;
-
 constexpr const char* kFooter = R"(
 Examples
   One robot on a whole recording, in real time:
@@ -117,7 +115,7 @@ void add_input(CLI::App& app, RobotOptions& options) {
           "config/robot.yaml); runs until Ctrl-C")
       ->expected(0, 1)  // --inspect --live needs none
       ->type_name("RIG")
-      ->check(CLI::ExistingFile);
+      ->transform(named_file(find_named_file, "rigs"));
   group
       .add_option("--graph", options.graph,
                   "Recorded pose graph of one robot (.g2o or .csv), or of a team (.jrl)")
@@ -140,8 +138,8 @@ void add_input(CLI::App& app, RobotOptions& options) {
          "--rig", options.rig,
          "For a bag: file with the topics and the calibration of the sensors; for a EuRoC folder: "
          "corrections of its calibration (rig_estimated.yaml of a run); for a TUM RGB-D folder: "
-         "calibration of its camera")
-      ->check(CLI::ExistingFile);
+         "calibration of its camera; or the name of a shipped one, such as d455")
+      ->transform(named_file(find_named_file, "rigs"));
   app.add_option("--odometry", options.odometry,
                  "Poses of the body (TUM: t[s] x y z qx qy qz qw) that replace the robot's visual-"
                  "inertial odometry; images still give features and depth")
@@ -230,8 +228,9 @@ RobotOptions options_of(int argc, char** argv) {
                "kimera_multi_robot");
   app.footer(kFooter);
   app.add_option("--config", options.configs,
-                 "Configuration files; a later file overrides earlier ones")
-      ->check(CLI::ExistingFile);
+                 "Configuration files, or names of shipped ones, such as euroc; a later file "
+                 "overrides earlier ones")
+      ->transform(named_file(find_named_file, "datasets"));
   app.add_option("--set", options.settings, "One setting over all files: section.key=value");
   app.add_option("--robot", options.robot, "Id of this robot, any number, unique in the team")
       ->check(CLI::Range(0, 65535))
@@ -262,7 +261,7 @@ RobotOptions options_of(int argc, char** argv) {
     check_window(options);
     check_localize(options);
   });
-  if (const auto exit_code = parse_options(app, argc, argv, kBadCommandLine)) std::exit(*exit_code);
+  if (const auto exit_code = parse_options(app, argc, argv)) std::exit(*exit_code);
   if (options.name.empty()) options.name = "robot" + std::to_string(options.robot);
   return options;
 }

@@ -194,4 +194,10 @@ struct RobotConfig {
 /// `name` is, and all places that were tried.
 [[nodiscard]] std::filesystem::path find_shipped_file(const std::string& name, const char* key);
 
+/// `name` if it is a file. Otherwise the file of this folder of config/ with this name, or the only
+/// one whose name ends with it: "euroc" for datasets/euroc.yaml, "d455" for
+/// rigs/realsense_d455.yaml. Throws ConfigError that lists the names.
+[[nodiscard]] std::filesystem::path find_named_file(const std::string& folder,
+                                                    const std::string& name);
+
 }  // namespace km

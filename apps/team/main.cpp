@@ -44,7 +44,7 @@ with charts over time, every closure, and the findings.
 Ctrl-C asks the robots to end in order and prints the results; a second one ends them at once. If this
 program is killed, the robots end in order and write their results.
 Exit codes: 0 if every robot ended without a failure; 1 for unusable input and results that cannot be
-written; 3 if a robot failed.
+written; 2 for a bad command line; 3 if a robot failed.
 
 Examples:
   kimera_multi_team --config config/teams/euroc_two_robots.yaml --dataset MH_01_easy
@@ -312,7 +312,7 @@ int main(int argc, char** argv) try {
   // The parser takes "--" after --record only as the end of its values.
   char** const robots = std::find(argv, argv + argc, std::string_view("--"));
   if (const auto exit_code =
-          km::parse_options(app, static_cast<int>(robots - argv), argv, 1, kHintForUnknown))
+          km::parse_options(app, static_cast<int>(robots - argv), argv, kHintForUnknown))
     return *exit_code;
   if (robots != argv + argc)
     options.arguments.insert(options.arguments.end(), robots + 1, argv + argc);

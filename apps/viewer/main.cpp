@@ -20,8 +20,6 @@
 namespace km {
 namespace {
 
-constexpr int kBadInput = 1, kBadCommandLine = 2;
-
 constexpr const char* kAbout =
     R"(Shows a team in a browser, during a run or afterwards. Prints the address to open.
 
@@ -172,8 +170,7 @@ int main(int argc, char** argv) try {
   CLI::App app(km::kAbout, "kimera_multi_viewer");
   km::ViewerOptions options;
   km::define(app, options);
-  if (const auto exit_code = km::parse_options(app, argc, argv, km::kBadCommandLine))
-    return *exit_code;
+  if (const auto exit_code = km::parse_options(app, argc, argv)) return *exit_code;
   km::SignalWatch signals;  // before any thread: threads inherit the blocked signals
   km::ViewStore store(static_cast<std::size_t>(options.memory_MB * 1e6));
   (options.results.empty() ? km::show_team : km::show_run)(options, store, signals);

@@ -32,13 +32,10 @@ struct Parsed {
   std::string errors;
 };
 
-constexpr int kWrong = 7;
-
 Parsed parse(CLI::App& app, std::vector<const char*> words, const std::string& hint = {}) {
   words.insert(words.begin(), "program");
   const CapturedErrors errors;
-  const auto exit_code =
-      parse_options(app, static_cast<int>(words.size()), words.data(), kWrong, hint);
+  const auto exit_code = parse_options(app, static_cast<int>(words.size()), words.data(), hint);
   return {exit_code, errors.text()};
 }
 
@@ -89,7 +86,7 @@ TEST_CASE("An invalid command line gives the exit code and a message with the op
   Program program;
   const Parsed parsed = parse(program.app, words, hint);
   CAPTURE(parsed.errors);
-  CHECK(parsed.exit_code == kWrong);
+  CHECK(parsed.exit_code == kBadCommandLine);
   CHECK_THAT(parsed.errors, Catch::Contains(named));
   CHECK_THAT(parsed.errors, Catch::Contains("NAME") || !Catch::Contains("is required"));
 }
@@ -103,7 +100,7 @@ TEST_CASE("A callback can refuse its option, or end the program", "[program]") {
   CHECK_FALSE(parse(program.app, {"a", "--number", "2"}).exit_code);
   CHECK(program.number == 2);
   const Parsed refused = parse(program.app, {"a", "--refused"});
-  CHECK(refused.exit_code == kWrong);
+  CHECK(refused.exit_code == kBadCommandLine);
   CHECK_THAT(refused.errors, Catch::StartsWith("--refused: why\n"));
   const Parsed done = parse(program.app, {"a", "--done"});
   CHECK(done.exit_code == 0);
@@ -123,7 +120,7 @@ TEST_CASE("Without a subcommand the program lists them", "[program]") {
   const std::vector<std::string> words =
       GENERATE(std::vector<std::string>{}, std::vector<std::string>{"cont"});
   const Parsed parsed = run_program(words);
-  CHECK(parsed.exit_code == 1);
+  CHECK(parsed.exit_code == kBadCommandLine);
   CHECK_THAT(parsed.errors, Catch::EndsWith("program: the first word must be a subcommand:\n"
                                             "  count  Counts\n  fail  Fails\n"));
 }

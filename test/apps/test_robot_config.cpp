@@ -136,6 +136,15 @@ struct Recording {
   }
 };
 
+TEST_CASE("A shipped file is found by its name", "[robot]") {
+  CHECK(find_named_file("datasets", "euroc") == "config/datasets/euroc.yaml");
+  CHECK(find_named_file("rigs", "d455") == "config/rigs/realsense_d455.yaml");
+  CHECK(find_named_file("rigs", "config/datasets/euroc.yaml") == "config/datasets/euroc.yaml");
+  CHECK_THROWS_WITH(find_named_file("rigs", "d500"),
+                    "no file d500, and none of this name in rigs: oak_d, realsense_d435i, "
+                    "realsense_d455, zed2");
+}
+
 TEST_CASE("Off is no plan, metric takes depth alone", "[robot][mapping]") {
   const Recording recording({"cam0", "cam1", "depth0", "label0"});
   CHECK_FALSE(recording.plan({}).has_value());

@@ -25,6 +25,14 @@ struct CommandResult {
   std::string output;  ///< Standard output and error together.
 };
 
+/// True for the exit code of all programs: 2 for an invalid command line, whose message refers to
+/// --help, and 1 for input that cannot be used.
+inline bool is_refused(const CommandResult& result) {
+  const bool is_command_line = result.output.find("Run with --help") != std::string::npos ||
+                               result.output.find("must be a subcommand") != std::string::npos;
+  return result.exit_code == (is_command_line ? 2 : 1);
+}
+
 /// Runs a shell command to its end.
 inline CommandResult run_command(const std::string& command) {
   CommandResult result;

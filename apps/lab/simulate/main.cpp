@@ -26,7 +26,7 @@ data; only the images are rendered:
       --imu V1_02.imu.csv V1_03.imu.csv --names a b --end 60 --output vicon1
 
 Exit code: 0 if the recordings are complete, 1 for input that cannot be used or a disk that cannot be
-written.)";
+written, 2 for a bad command line.)";
 
 }  // namespace
 
@@ -34,7 +34,7 @@ int main(int argc, char** argv) try {
   CLI::App app(kAbout, "kimera_multi_simulate");
   km::SimulationOptions options;
   km::define(app, options);
-  if (const auto exit_code = km::parse_options(app, argc, argv, 1)) return *exit_code;
+  if (const auto exit_code = km::parse_options(app, argc, argv)) return *exit_code;
   options = km::completed(options);
   km::simulate(options);
   std::cout << "Complete: " << options.output.string() << "\nRun a team on it:\n  "

@@ -160,7 +160,7 @@ TEST_CASE("mesh and render refuse input by name", "[evaluate]") {
   for (const auto& [arguments, message] : refused) {
     const auto result = run(arguments);
     CAPTURE(arguments);
-    CHECK(result.exit_code == 1);
+    CHECK(is_refused(result));
     CHECK_THAT(result.output, Contains(message));
   }
 }

@@ -89,7 +89,7 @@ TEST_CASE("kimera_multi_keys ends with 1 and the reason if it fails", "[keys]") 
   }));
   CAPTURE(arguments);
   const CommandResult result = keys(arguments);
-  CHECK(result.exit_code == 1);
+  CHECK(is_refused(result));
   CHECK_THAT(result.output, Catch::Contains(reason, Catch::CaseSensitive::No));
   CHECK_FALSE(fs::exists(keys.folder.path() / "other"));
 }
