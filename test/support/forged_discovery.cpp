@@ -84,16 +84,25 @@ void ForgedDiscovery::dispose(int robot) {
   send(packet);
 }
 
-void ForgedDiscovery::contradict(int robot) {
+void ForgedDiscovery::contradict(int robot, Change change) {
   Packet packet = recorded_.at(robot);
   // Sequence number of the DATA of the writer of participants: 32 high bits, 32 low bits.
   constexpr std::array<std::uint8_t, 4> kWriter{0, 1, 0, 0xc2};
   const auto number = std::ranges::search(packet, kWriter).end();
   constexpr std::array<std::uint8_t, 8> kHigh{0, 0, 0, 0, 0, 0, 1, 0};
   std::ranges::copy(kHigh, number);
-  constexpr std::array<std::uint8_t, 6> kRobot{'r', 'o', 'b', 'o', 't', '='};
-  constexpr std::array<std::uint8_t, 6> kLiar{'l', 'i', 'a', 'r', '!', '='};
-  std::ranges::copy(kLiar, std::ranges::search(packet, kRobot).begin());
+  if (change == Change::kUserData) {
+    constexpr std::array<std::uint8_t, 6> kRobot{'r', 'o', 'b', 'o', 't', '='};
+    constexpr std::array<std::uint8_t, 6> kLiar{'l', 'i', 'a', 'r', '!', '='};
+    std::ranges::copy(kLiar, std::ranges::search(packet, kRobot).begin());
+    return send(packet);
+  }
+  // PID_METATRAFFIC_UNICAST_LOCATOR and PID_DEFAULT_UNICAST_LOCATOR: kind and port, 4 bytes each.
+  for (const std::uint8_t id : std::array<std::uint8_t, 2>{0x31, 0x32}) {
+    const std::array<std::uint8_t, 8> locator{id, 0, 24, 0, 1, 0, 0, 0};
+    std::ranges::copy(std::array<std::uint8_t, 2>{9, 0},
+                      std::ranges::search(packet, locator).end());
+  }
   send(packet);
 }
 

@@ -23,9 +23,10 @@ class ForgedDiscovery {
   /// Declares in the name of a recorded robot that its participant has gone.
   void dispose(int robot);
 
-  /// Announces the participant of a recorded robot as that of no robot, by a packet that DDS takes
-  /// for newer than all true ones.
-  void contradict(int robot);
+  /// Announces the participant of a recorded robot as that of no robot, or at useless addresses, by
+  /// a packet that DDS takes for newer than all true ones.
+  enum class Change { kUserData, kAddresses };
+  void contradict(int robot, Change change);
 
   /// Announces `count` participants without an end that copy the announcement of a recorded robot.
   void invent(int robot, std::size_t count);
