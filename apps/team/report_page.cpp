@@ -13,12 +13,14 @@
 #include <string_view>
 #include <utility>
 
+#include "apps/evaluate/mesh_picture.hpp"
 #include "apps/output_file.hpp"
 #include "apps/team/closure_images.hpp"
 #include "apps/team/team_report.hpp"
 #include "modules/charts/html_page.hpp"
 #include "modules/core/input_file.hpp"
 #include "modules/core/text_rows.hpp"
+#include "modules/images/image_codec.hpp"
 
 namespace km {
 
@@ -213,6 +215,18 @@ Json table(const fs::path& file, Json (*read)(const fs::path&), Json& notes) try
 
 }  // namespace
 
+// The map of the team as JPEG, seen from above at an angle; empty without a map.
+std::string map_picture(const LabelledMesh& map) {
+  if (map.faces.empty()) return {};
+  const PictureView view = parse_view("oblique", extent_of(map), 1000, 560);
+  const cv::Mat3b picture =
+      draw_meshes({.meshes = {&map, 1}, .names = {""}, .lines = {}, .palette = {}}, view,
+                  map.colors.empty() ? PictureColor::kShade : PictureColor::kOwn);
+  constexpr int kQuality = 85;
+  const std::vector<std::uint8_t> bytes = encode_jpeg(picture, kQuality);
+  return data_uri("image/jpeg", {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+}
+
 Json report_data(const TeamPlan& plan, const TeamResult& team) {
   Reasons reasons;
   Json notes = Json::array(), robots = Json::array();
@@ -241,9 +255,13 @@ Json report_data(const TeamPlan& plan, const TeamResult& team) {
   for (const auto& [keyframe, jpeg] : seen.jpegs)
     images[to_string(keyframe)] = data_uri("image/jpeg", jpeg);
   for (std::string& note : seen.notes) notes.push_back(std::move(note));
-  return {{"folder", plan.output.string()}, {"team", team},
-          {"reasons", reasons.texts()},     {"notes", std::move(notes)},
-          {"images", std::move(images)},    {"robots", std::move(robots)}};
+  return {{"folder", plan.output.string()},
+          {"team", team},
+          {"reasons", reasons.texts()},
+          {"notes", std::move(notes)},
+          {"images", std::move(images)},
+          {"robots", std::move(robots)},
+          {"map", map_picture(team.meshes.merged)}};
 }
 
 std::string report_page(const Json& data) {

@@ -14,6 +14,7 @@ namespace km {
 ///   {folder, team: as to_json(TeamResult), reasons: [text...], notes: [text...],
 ///    images: {"robot:keyframe": address with a small JPEG in it}, of closures, as closure_images()
 ///    has them,
+///    map: address with a picture of the map in it, empty without a map,
 ///    robots: [{id, name, truth, odometry, optimized: [[x, y, t]...],
 ///              odometry_error, optimized_error: [[t, m]...], with a point of nulls in each of
 ///              pose_holes(): of the truth, else of the odometry,

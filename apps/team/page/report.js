@@ -67,6 +67,7 @@ function showHead() {
   if (run.team.optimized)
     fact('Error of the team, rmse', quantity(run.team.optimized.joint.position_m.rmse, 'm'));
   fact('Wall time', duration(Math.max(0, ...robots.map((r) => r.seconds ?? 0))));
+  if (run.map) element('img', 'map', main).src = run.map;
 }
 
 function showFindings() {

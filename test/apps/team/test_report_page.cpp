@@ -75,6 +75,7 @@ TEST_CASE("The report has the numbers that the robots left", "[report_page]") {
   CHECK(robot["closures"][1] == Json::parse("[0, 1, 1, 2, 2, 9, 0, 1]"));
   CHECK(data["reasons"] == Json::parse(R"(["", "no pose"])"));
   CHECK(data["team"]["robots"][0]["findings"][0]["id"] == "closures.few");
+  CHECK_THAT(data["map"].get<std::string>(), Catch::StartsWith("data:image/jpeg;base64,"));
 }
 
 TEST_CASE("If there is a truth, the report has it and the error over time", "[report_page]") {
