@@ -28,10 +28,11 @@ std::vector<Finding> causes_of_failed_odometry(const RobotOptions& options,
   while (const auto packet = reader.next()) sampler.add(*packet);
   const SensorSample& sample = sampler.sample();
   const StereoRig& rig = reader.rig().stereo;
-  Examination result = examine_stereo(sample, rig);
+  Examination result = examine_images(sample);
+  result.add(examine_stereo(sample, rig));
   result.add(examine_depth(sample, rig));
   result.add(examine_inertial(sample, rig));
-  std::erase_if(result.findings, [](const Finding& f) { return f.severity != Severity::kError; });
+  std::erase_if(result.findings, [](const Finding& f) { return f.severity == Severity::kNote; });
   return result.findings;
 } catch (const std::runtime_error&) {  // a fault of the recording, which the run has reported
   return {};

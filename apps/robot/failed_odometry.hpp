@@ -8,10 +8,10 @@
 
 namespace km {
 
-/// Errors of calibration, units and signs that the first 30 s of the recording of `options` show:
-/// the causes for which odometry fails. kimera_multi_doctor states them in the same way. Reads
-/// these images again, which takes some seconds. Empty without a recording, or if it cannot be
-/// read.
+/// Faults of images, calibration, units and signs that the first 30 s of the recording of `options`
+/// show: possible causes for which odometry fails. kimera_multi_doctor states them in the same way.
+/// Reads these images again, which takes some seconds. Empty without a recording, or if it cannot
+/// be read.
 [[nodiscard]] std::vector<Finding> causes_of_failed_odometry(const RobotOptions& options,
                                                              const RobotConfig& config,
                                                              SignalWatch& signals);
