@@ -21,7 +21,13 @@ constexpr double kLengthen = 4.0;
 // root therefore accepts kMaxRises increases in a row, each by a factor of up to kMaxRise.
 constexpr int kMaxRises = 2;
 constexpr double kMaxRise = 1.5;
-constexpr double kCostRounding = 1e-13;  // relative to the cost: smaller increases are rounding
+// Smaller increases of the cost are rounding: relative to the cost, and if it is near 0.
+constexpr double kCostRounding = 1e-13;
+constexpr double kLeastRise = 1e-9;
+// Rounding may keep steps from being shorter: each round below this predicted decrease relaxes the
+// tolerances.
+constexpr double kNearRounding = 1e-13;
+constexpr double kRelax = 2.0;
 constexpr int kMaxBacktracks = 12;
 constexpr int kMaxBacktracksUndecided = 8;
 // Margin on barc if noise is smaller than stated, because its tails are then longer: the largest
@@ -196,8 +202,7 @@ DownMessage TreeRoot::decide(const TreeSums& sums, std::uint32_t round, const Tr
                              std::span<const SE3> poses, bool factorised) {
   round_ = round;
   const bool may_rise = weighing_ != Weighing::kDecided && rises_ < kMaxRises;
-  const double limit =
-      sums.base_cost * (may_rise ? kMaxRise : 1.0 + kCostRounding) + options_.absolute_tolerance;
+  const double limit = sums.base_cost * (may_rise ? kMaxRise : 1.0 + kCostRounding) + kLeastRise;
   if (!at_base_ && !(sums.cost <= limit)) return go_back();
   if (!at_base_) {
     retried_ = false;
@@ -227,6 +232,8 @@ DownMessage TreeRoot::step(const TreeSums& sums, const TreeFront& front,
   const bool far =
       odometry_is_noisy_ && !at_base_ && schedule_.is_nearly_convex() && 0.5 * decrement_ > cost_;
   if (!far && weighing_ != Weighing::kHold) schedule_.next({sums.changed, sums.fractional});
+  if (decrement_ <= kNearRounding * (1.0 + cost_))
+    for (double* limit : {&options_.tolerance, &options_.absolute_tolerance}) *limit *= kRelax;
   const bool small = 0.5 * decrement_ <= options_.tolerance * cost_ + options_.absolute_tolerance;
   // Weights are decided before the poses have converged. If the converged poses contradict them,
   // closures are weighed again. A second look mostly rejects closures that it has reopened.

@@ -167,8 +167,8 @@ TEST_CASE("a graph that cannot be solved ends the session for all, with a notice
           "[pose_graph][agent]") {
   const bool throws = GENERATE(true, false);
   CAPTURE(throws);
-  const ScriptedSolver::Options options = throws ? ScriptedSolver::Options{.fails_in_round = 2}
-                                                 : ScriptedSolver::Options{.gives_up_in_round = 2};
+  const ScriptedSolver::Options options = throws ? ScriptedSolver::Options{.fails_in_round = 4}
+                                                 : ScriptedSolver::Options{.gives_up_in_round = 4};
   const TeamProblem problem = ring(5);
   TeamNetwork network;
   for (const RobotId id : kIds)
