@@ -1,10 +1,12 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <vector>
 
+#include "modules/core/color_image.hpp"
 #include "modules/core/geometry.hpp"
 #include "modules/core/stamp.hpp"
 
@@ -41,6 +43,8 @@ struct StereoFrame {
   GrayImage right;                                     ///< 0 x 0 with an RGB-D rig.
   std::shared_ptr<const DepthImage> depth = nullptr;   ///< Null if there is none.
   std::shared_ptr<const LabelImage> labels = nullptr;  ///< Null if there are none.
+  /// Decodes the colours of the left image; 0 x 0 for a grey image. Empty: grey.
+  std::function<ColorImage()> decode_color = nullptr;
 };
 
 /// One inertial sample in the body frame.

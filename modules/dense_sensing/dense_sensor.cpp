@@ -47,11 +47,18 @@ void DenseSensor::add_depth(const StereoFrame& frame, DenseImages& images) {
 
 void DenseSensor::add_color(const StereoFrame& frame, DenseImages& images) const {
   if (!fits(frame.left, left_)) return;
-  ColorImage gray{frame.left.width, frame.left.height, {}};
-  gray.pixels.reserve(frame.left.pixels.size());
-  for (const std::uint8_t value : frame.left.pixels) gray.pixels.push_back({value, value, value});
-  images.color = std::make_shared<const ColorImage>(
-      stereo_ ? stereo_->rectification().rectified(gray) : std::move(gray));
+  const ColorImage color = frame.decode_color ? frame.decode_color() : ColorImage{};
+  const bool is_gray = color.width != left_.width || color.height != left_.height;
+  const auto color_at = [&](std::size_t i) {
+    const std::uint8_t gray = frame.left.pixels[i];
+    return is_gray ? ColorImage::Pixel{gray, gray, gray} : color.pixels[i];
+  };
+  ColorImage result{camera().width, camera().height, {}};
+  if (stereo_)
+    result.pixels = stereo_->rectification().rectified(color_at);
+  else
+    for (std::size_t i = 0; i < frame.left.pixels.size(); ++i) result.pixels.push_back(color_at(i));
+  images.color = std::make_shared<const ColorImage>(std::move(result));
 }
 
 void DenseSensor::add_labels(const StereoFrame& frame, DenseImages& images) {
@@ -65,9 +72,11 @@ void DenseSensor::add_labels(const StereoFrame& frame, DenseImages& images) {
   if (labels == nullptr) return;
   images.wrong_label_size = !fits(*labels, left_);
   if (images.wrong_label_size) return;
-  images.labels =
-      stereo_ ? std::make_shared<const LabelImage>(stereo_->rectification().rectified(*labels))
-              : labels;
+  images.labels = labels;
+  if (!stereo_) return;
+  auto ids = stereo_->rectification().rectified([&](std::size_t i) { return labels->ids[i]; });
+  images.labels = std::make_shared<const LabelImage>(
+      LabelImage{camera().width, camera().height, std::move(ids)});
 }
 
 }  // namespace km

@@ -192,7 +192,6 @@ StereoRectification::StereoRectification(const StereoRig& rig, int downscale)
     : full_(rig, Rectification::Centre::kImage),
       camera_(shrunk(full_.camera(), downscale)),
       baseline_m_(rig.baseline_m()),
-      label_size_(rig.cameras[0].width, rig.cameras[0].height),
       seen_(cv::Mat::zeros(camera_.height, camera_.width, CV_8UC1)) {
   for (int y = 0; y < camera_.height; ++y)
     for (int x = 0; x < camera_.width; ++x) {
@@ -200,7 +199,7 @@ StereoRectification::StereoRectification(const StereoRig& rig, int downscale)
       const auto pixel = seen_pixel(rig.cameras[0], full_.R_left_rect() * ray);
       seen_.at<std::uint8_t>(y, x) = pixel ? 255 : 0;
       left_pixel_.push_back(pixel ? static_cast<std::int32_t>(std::lround(pixel->y())) *
-                                            label_size_.width +
+                                            rig.cameras[0].width +
                                         static_cast<std::int32_t>(std::lround(pixel->x()))
                                   : kOutside);
     }
@@ -214,25 +213,6 @@ cv::Mat StereoRectification::rectified(const GrayImage& image, std::size_t side)
   cv::resize(full(cv::Rect(0, 0, camera_.width * factor, camera_.height * factor)), small,
              seen_.size(), 0.0, 0.0, cv::INTER_AREA);
   return small;
-}
-
-LabelImage StereoRectification::rectified(const LabelImage& labels) const {
-  CV_Assert(cv::Size(labels.width, labels.height) == label_size_);
-  LabelImage result{camera_.width, camera_.height, {}};
-  result.ids.reserve(left_pixel_.size());
-  for (const std::int32_t index : left_pixel_)
-    result.ids.push_back(index == kOutside ? LabelId{0}
-                                           : labels.ids[static_cast<std::size_t>(index)]);
-  return result;
-}
-
-ColorImage StereoRectification::rectified(const ColorImage& color) const {
-  ColorImage result{camera_.width, camera_.height, {}};
-  result.pixels.reserve(left_pixel_.size());
-  for (const std::int32_t index : left_pixel_)
-    result.pixels.push_back(index == kOutside ? ColorImage::Pixel()
-                                              : color.pixels[static_cast<std::size_t>(index)]);
-  return result;
 }
 
 StereoDepth::StereoDepth(const StereoRig& rig, const StereoDepthConfig& config)

@@ -6,9 +6,7 @@
 #include <vector>
 
 #include "modules/core/camera.hpp"
-#include "modules/core/color_image.hpp"
 #include "modules/core/frame.hpp"
-#include "modules/core/label_palette.hpp"
 #include "modules/dense_sensing/stereo_depth_config.hpp"
 #include "modules/images/rectification.hpp"
 
@@ -32,12 +30,17 @@ class StereoRectification {
   /// 255 for pixels in the real left camera's view, else 0.
   [[nodiscard]] const cv::Mat& seen() const { return seen_; }
 
-  /// The labels of the nearest pixels; 0 outside the real camera's view. Precondition: `labels` has
-  /// the left camera's size.
-  [[nodiscard]] LabelImage rectified(const LabelImage& labels) const;
-
-  /// The colours of the nearest pixels; black outside. Precondition: `color` has that size too.
-  [[nodiscard]] ColorImage rectified(const ColorImage& color) const;
+  /// The values of the nearest pixels of the real left camera; zero outside its view. `value_at`
+  /// returns that of an index into an image of the camera's size.
+  template <typename ValueAt>
+  [[nodiscard]] auto rectified(const ValueAt& value_at) const {
+    std::vector<decltype(value_at(std::size_t{0}))> values;
+    values.reserve(left_pixel_.size());
+    for (const std::int32_t index : left_pixel_)
+      values.push_back(index == kOutside ? typename decltype(values)::value_type{}
+                                         : value_at(static_cast<std::size_t>(index)));
+    return values;
+  }
 
  private:
   static constexpr std::int32_t kOutside = -1;
@@ -45,7 +48,6 @@ class StereoRectification {
   Rectification full_;
   Camera camera_;
   double baseline_m_;
-  cv::Size label_size_;
   cv::Mat seen_;
   std::vector<std::int32_t> left_pixel_;  // for each virtual pixel, index of the nearest real one
 };

@@ -323,6 +323,10 @@ LoadedImage<StereoFrame> load_stereo_pair(const StereoPairFile& files, const Ste
     if (loaded.status != ImageStatus::kOk) return {loaded.status, std::move(loaded.problem), {}};
     images[i].second = std::move(loaded.image);
   }
+  result.image.decode_color = [file = files.left,
+                               size = cv::Size(rig.cameras[0].width, rig.cameras[0].height)] {
+    return color_image_of(decode_image(file, DecodedPixels::kEightBits, size));
+  };
   return result;
 }
 

@@ -80,6 +80,19 @@ ImageResult load_gray_image(const std::filesystem::path& file, int width, int he
   return {ImageStatus::kOk, {}, {width, height, {decoded.datastart, decoded.dataend}}};
 }
 
+ColorImage color_image_of(const LoadedImage<cv::Mat>& decoded) {
+  const cv::Mat& bgr = decoded.image;
+  if (bgr.type() != CV_8UC3) return {};
+  ColorImage color{bgr.cols, bgr.rows, {}};
+  color.pixels.reserve(bgr.total());
+  for (int y = 0; y < bgr.rows; ++y)
+    for (int x = 0; x < bgr.cols; ++x) {
+      const std::uint8_t* const pixel = bgr.ptr(y, x);
+      color.pixels.push_back({pixel[2], pixel[1], pixel[0]});
+    }
+  return color;
+}
+
 LoadedImage<cv::Mat> image_failure(ImageStatus status, const std::string& place,
                                    const std::string& why) {
   return {status, place + ": " + why, {}};

@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "modules/core/camera.hpp"
+#include "modules/core/color_image.hpp"
 #include "modules/core/frame.hpp"
 #include "modules/core/label_palette.hpp"
 #include "modules/images/image_codec.hpp"
@@ -32,6 +33,9 @@ using ImageResult = LoadedImage<GrayImage>;
 /// unreadable, because decoders fill the missing part of a truncated JPEG with grey and report
 /// success.
 [[nodiscard]] ImageResult load_gray_image(const std::filesystem::path& file, int width, int height);
+
+/// The colours of a BGR image; 0 x 0 for an image that failed or has no colours.
+[[nodiscard]] ColorImage color_image_of(const LoadedImage<cv::Mat>& decoded);
 
 /// A PNG or JPEG file. Never kWrongFormat.
 [[nodiscard]] LoadedImage<cv::Mat> decode_image(const std::filesystem::path& file,

@@ -20,32 +20,33 @@ namespace {
 
 constexpr int kAsItIs = -1;
 
-// Storage of pixels, and the conversion to grey.
+// Storage of pixels, and the conversions to grey and to colours.
 struct Encoding {
   std::string_view name;
   int type;
-  int to_gray;  // code of cv::cvtColor
+  int to_gray = kAsItIs;  // code of cv::cvtColor
+  int to_bgr = kAsItIs;   // code of cv::cvtColor
 };
 
 // sensor_msgs/image_encodings.hpp. OpenCV names a Bayer pattern by its second row and column.
 constexpr Encoding kEncodings[] = {
-    {"mono8", CV_8UC1, kAsItIs},
-    {"8UC1", CV_8UC1, kAsItIs},
-    {"mono16", CV_16UC1, kAsItIs},
-    {"16UC1", CV_16UC1, kAsItIs},
+    {"mono8", CV_8UC1},
+    {"8UC1", CV_8UC1},
+    {"mono16", CV_16UC1},
+    {"16UC1", CV_16UC1},
     {"bgr8", CV_8UC3, cv::COLOR_BGR2GRAY},
     {"8UC3", CV_8UC3, cv::COLOR_BGR2GRAY},
-    {"rgb8", CV_8UC3, cv::COLOR_RGB2GRAY},
-    {"bgra8", CV_8UC4, cv::COLOR_BGRA2GRAY},
-    {"8UC4", CV_8UC4, cv::COLOR_BGRA2GRAY},
-    {"rgba8", CV_8UC4, cv::COLOR_RGBA2GRAY},
-    {"bayer_rggb8", CV_8UC1, cv::COLOR_BayerBG2GRAY},
-    {"bayer_bggr8", CV_8UC1, cv::COLOR_BayerRG2GRAY},
-    {"bayer_gbrg8", CV_8UC1, cv::COLOR_BayerGR2GRAY},
-    {"bayer_grbg8", CV_8UC1, cv::COLOR_BayerGB2GRAY},
-    {"yuv422", CV_8UC2, cv::COLOR_YUV2GRAY_UYVY},
-    {"yuv422_yuy2", CV_8UC2, cv::COLOR_YUV2GRAY_YUY2},
-    {"32FC1", CV_32FC1, kAsItIs},
+    {"rgb8", CV_8UC3, cv::COLOR_RGB2GRAY, cv::COLOR_RGB2BGR},
+    {"bgra8", CV_8UC4, cv::COLOR_BGRA2GRAY, cv::COLOR_BGRA2BGR},
+    {"8UC4", CV_8UC4, cv::COLOR_BGRA2GRAY, cv::COLOR_BGRA2BGR},
+    {"rgba8", CV_8UC4, cv::COLOR_RGBA2GRAY, cv::COLOR_RGBA2BGR},
+    {"bayer_rggb8", CV_8UC1, cv::COLOR_BayerBG2GRAY, cv::COLOR_BayerBG2BGR},
+    {"bayer_bggr8", CV_8UC1, cv::COLOR_BayerRG2GRAY, cv::COLOR_BayerRG2BGR},
+    {"bayer_gbrg8", CV_8UC1, cv::COLOR_BayerGR2GRAY, cv::COLOR_BayerGR2BGR},
+    {"bayer_grbg8", CV_8UC1, cv::COLOR_BayerGB2GRAY, cv::COLOR_BayerGB2BGR},
+    {"yuv422", CV_8UC2, cv::COLOR_YUV2GRAY_UYVY, cv::COLOR_YUV2BGR_UYVY},
+    {"yuv422_yuy2", CV_8UC2, cv::COLOR_YUV2GRAY_YUY2, cv::COLOR_YUV2BGR_YUY2},
+    {"32FC1", CV_32FC1},
 };
 
 const Encoding* find_encoding(std::string_view name) {
@@ -87,6 +88,7 @@ LoadedImage<cv::Mat> pixels_of(const RosImage& image, const Encoding& encoding,
 struct RawImage {
   LoadedImage<cv::Mat> loaded;
   int to_gray = kAsItIs;
+  int to_bgr = kAsItIs;
 };
 
 RawImage raw_image(const BagChannel& channel, const BagMessage& message, const std::string& place,
@@ -98,7 +100,7 @@ RawImage raw_image(const BagChannel& channel, const BagMessage& message, const s
     return {image_failure(ImageStatus::kWrongFormat, place,
                           "the encoding " + readable(image.value->encoding, 40) +
                               " is none of mono, rgb, bgr, bayer of 8 bits, yuv422, 16UC1, 32FC1")};
-  return {pixels_of(*image.value, *encoding, place, size), encoding->to_gray};
+  return {pixels_of(*image.value, *encoding, place, size), encoding->to_gray, encoding->to_bgr};
 }
 
 // Header of image_transport's compressedDepth before the compressed image: a number of the format,
@@ -231,6 +233,20 @@ ImageResult gray_of_message(const BagChannel& channel, const BagMessage& message
   if (gray.type() != CV_8UC1)
     return {ImageStatus::kWrongFormat, place + ": metres are no grey values", {}};
   return {ImageStatus::kOk, {}, {gray.cols, gray.rows, {gray.datastart, gray.dataend}}};
+}
+
+ColorImage color_of_message(const BagChannel& channel, const BagMessage& message,
+                            const cv::Size& size) {
+  RawImage raw =
+      is_raw(channel)
+          ? raw_image(channel, message, {}, size)
+          : RawImage{compressed_image(channel, message, {}, DecodedPixels::kEightBits, size)};
+  if (raw.loaded.status == ImageStatus::kOk && raw.to_bgr != kAsItIs) {
+    cv::Mat bgr;
+    cv::cvtColor(raw.loaded.image, bgr, raw.to_bgr);
+    raw.loaded.image = bgr;
+  }
+  return color_image_of(raw.loaded);
 }
 
 DepthResult depth_of_message(const BagChannel& channel, const BagMessage& message,

@@ -25,6 +25,10 @@ namespace km {
 [[nodiscard]] ImageResult gray_of_message(const BagChannel& channel, const BagMessage& message,
                                           const std::string& place, const cv::Size& size);
 
+/// The colours of an image; 0 x 0 for a message without colours or that cannot be decoded.
+[[nodiscard]] ColorImage color_of_message(const BagChannel& channel, const BagMessage& message,
+                                          const cv::Size& size);
+
 /// Depth from a message: 16UC1, mono16 or a PNG image of 16 bits in units of `scale_m` [m], or
 /// 32FC1 in metres. image_transport's compressedDepth of 16UC1 or 32FC1 is read as PNG or RVL.
 [[nodiscard]] DepthResult depth_of_message(const BagChannel& channel, const BagMessage& message,
