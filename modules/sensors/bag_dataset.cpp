@@ -341,10 +341,11 @@ std::optional<StereoFrame> BagDataset::decode(const JoinedFrame& joined, FrameUs
     return result.status == ImageStatus::kOk;
   };
   if (!gray(joined.left, 0, frame.left)) return std::nullopt;
-  frame.decode_color = [channel = bag_->channels()[joined.left.channel], message = joined.left,
-                        size = size_of(rig_.sensors.stereo, 0)] {
-    return color_of_message(channel, message, size);
-  };
+  if (use == FrameUse::kAll)
+    frame.decode_color = [channel = bag_->channels()[joined.left.channel], message = joined.left,
+                          size = size_of(rig_.sensors.stereo, 0)] {
+      return color_of_message(channel, message, size);
+    };
   if (joined.right && !gray(*joined.right, 1, frame.right)) return std::nullopt;
   const bool is_rgbd = rig_.topics.right.empty();
   if (!joined.depth || !rig_.sensors.depth || (use != FrameUse::kAll && !is_rgbd)) return frame;

@@ -1,5 +1,6 @@
 #include <catch2/catch.hpp>
 
+#include <algorithm>
 #include <memory>
 
 #include "modules/dense_sensing/dense_sensor.hpp"
@@ -33,20 +34,34 @@ TEST_CASE("Recorded depth and labels are not changed", "[dense_sensor]") {
   CHECK(images.labels == frame.labels);
   REQUIRE(images.color != nullptr);
   CHECK(images.color->pixels.at(5)[1] == frame.left.pixels.at(5));
+  frame.decode_color = [&] {
+    const std::size_t pixels = frame.left.pixels.size();
+    return ColorImage{frame.left.width, frame.left.height,
+                      std::vector<ColorImage::Pixel>(pixels, {200, 100, 20})};
+  };
+  CHECK(sensor.sense(frame).color->pixels.at(5) == ColorImage::Pixel{200, 100, 20});
   DenseSensor metric(rig, {});
   CHECK(metric.sense(frame).labels == nullptr);
 }
 
-TEST_CASE("Labels follow the pixels of rectified depth", "[dense_sensor]") {
+TEST_CASE("Labels and colours follow the pixels of rectified depth", "[dense_sensor]") {
   const StereoRig rig = test_rig();
   DenseSensorConfig config{.depth = DepthFrom::kStereo, .labels = LabelsFrom::kImages};
   config.stereo.downscale = GENERATE(1, 2);
   DenseSensor sensor(rig, config);
   StereoFrame frame = TexturedPlane{}.render(rig, SE3::Identity(), 5);
   frame.labels = halves(rig.cameras[0]);
+  frame.decode_color = [&] {  // the labels as colours
+    ColorImage color{frame.left.width, frame.left.height, {}};
+    for (const LabelId label : frame.labels->ids) color.pixels.push_back({label, 0, 0});
+    return color;
+  };
   const DenseImages images = sensor.sense(frame);
   REQUIRE(images.problem == DenseProblem::kNone);
   REQUIRE(images.labels != nullptr);
+  REQUIRE(images.color->pixels.size() == images.labels->ids.size());
+  CHECK(std::ranges::equal(images.color->pixels, images.labels->ids, {},
+                           [](const ColorImage::Pixel& pixel) { return LabelId{pixel[0]}; }));
   const Camera& camera = sensor.camera();
   REQUIRE(images.labels->width == camera.width);
   CHECK(images.depth->width == camera.width);

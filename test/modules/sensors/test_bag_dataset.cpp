@@ -364,6 +364,48 @@ TEST_CASE("Images of every common encoding become the same grey", "[sensors][bag
   }
 }
 
+TEST_CASE("Colours of every common encoding are those of the scene", "[sensors][bag]") {
+  const auto color_of = [](const char* encoding, const std::vector<std::uint8_t>& pixels) {
+    RosImage message = image(kFirst, 0);
+    message.encoding = encoding;
+    message.step = static_cast<std::uint32_t>(kWidth * pixels.size() / 4);
+    message.data.clear();
+    for (int y = 0; y < kHeight; y += 2)  // `pixels`: two by two of them
+      for (const std::size_t row : {std::size_t{0}, pixels.size() / 2})
+        for (int x = 0; x < kWidth; x += 2)
+          message.data.insert(message.data.end(), pixels.begin() + static_cast<long>(row),
+                              pixels.begin() + static_cast<long>(row + pixels.size() / 2));
+    return color_of_message({"/left", "sensor_msgs/msg/Image", "cdr", 1},
+                            {0, kFirst, encode_ros(message)}, {kWidth, kHeight});
+  };
+  const auto repeated = [](std::vector<std::uint8_t> pixel) {
+    std::vector<std::uint8_t> four;
+    for (int k = 0; k < 4; ++k) four.insert(four.end(), pixel.begin(), pixel.end());
+    return four;
+  };
+  const ColorImage::Pixel orange{200, 100, 20};
+  const auto is_orange = [&](const ColorImage& color) {
+    return color.width == kWidth && color.height == kHeight &&
+           color.pixels.at(2 * kWidth + 2) == orange && color.pixels.at(3 * kWidth + 3) == orange;
+  };
+  CHECK(is_orange(color_of("rgb8", repeated({200, 100, 20}))));
+  CHECK(is_orange(color_of("bgr8", repeated({20, 100, 200}))));
+  CHECK(is_orange(color_of("rgba8", repeated({200, 100, 20, 7}))));
+  CHECK(is_orange(color_of("bgra8", repeated({20, 100, 200, 7}))));
+  CHECK(is_orange(color_of("bayer_rggb8", {200, 100, 100, 20})));
+  CHECK(is_orange(color_of("bayer_bggr8", {20, 100, 100, 200})));
+  CHECK(is_orange(color_of("bayer_grbg8", {100, 200, 20, 100})));
+  CHECK(is_orange(color_of("bayer_gbrg8", {100, 20, 200, 100})));
+  CHECK(color_of("mono8", repeated({90})).pixels.empty());
+
+  const RosCompressedImage compressed{
+      {kFirst, "camera"},
+      "",
+      encode_png(cv::Mat(kHeight, kWidth, CV_8UC3, cv::Scalar(20, 100, 200)))};
+  CHECK(is_orange(color_of_message({"/left", "sensor_msgs/CompressedImage", "cdr", 1},
+                                   {0, kFirst, encode_ros(compressed)}, {kWidth, kHeight})));
+}
+
 TEST_CASE("The name of a Bayer pattern determines the place of its colours", "[sensors][bag]") {
   // A red scene: only red pixels are bright.
   RosImage message = image(kFirst, 0);

@@ -66,6 +66,7 @@ TEST_CASE("A folder in KITTI's layout is read with its calibration", "[sensors][
   CHECK(packets[3].frame->stamp == 300'000'000);
   CHECK(packets[3].frame->left.pixels[0] == 30);
   CHECK(packets[3].frame->right.pixels[0] == 30);
+  CHECK(packets[3].frame->decode_color().pixels.empty());  // grey images
   CHECK(packets[3].imu.empty());
   CHECK(reader.report().empty());
   CHECK(open_folder(folder.path(), {.part = {.from_s = 0.05, .to_s = 0.25}}).pair_count() == 2);
@@ -199,6 +200,7 @@ TEST_CASE("A folder in the layout of 7-Scenes is read at 30 Hz", "[sensors][fold
   REQUIRE(packets.size() == 3);
   CHECK(packets[2].frame->stamp == 400'000'000);
   CHECK(packets[2].frame->left.pixels[0] == 12);
+  CHECK(packets[2].frame->decode_color().pixels.at(31) == ColorImage::Pixel{12, 12, 12});
   CHECK(packets[2].frame->depth->millimetres[0] == 1500);
   for (const char* frame : {"0000", "0004", "0012"})
     fs::remove(folder.path() / ("frame-00" + std::string(frame) + ".depth.png"));
