@@ -22,7 +22,10 @@ enum class LensModel {
   /// xi, k1, k2, p1, p2: Mei and Rives, "Single view point omnidirectional camera calibration from
   /// planar grids", 2007, as cv::omnidir.
   kOmnidirectional,
-  /// xi, alpha: Usenko, Demmel and Cremers, "The double sphere camera model", 2018; ds of Basalt.
+  /// xi, alpha[, beta]: Usenko, Demmel and Cremers, "The double sphere camera model", 2018; ds of
+  /// Basalt. With a xi of 0 and with beta: Khomutenko, Garcia and Martinet, "An enhanced unified
+  /// camera model", 2016; eucm of Basalt and Kalibr. That model is the one without beta for
+  /// bearings and points times the root of beta.
   kDoubleSphere,
 };
 
@@ -49,7 +52,7 @@ class Lens {
 
   /// Throws std::invalid_argument for a wrong number of coefficients and for one that is not
   /// finite. Throws it also for a xi below 0 (omnidirectional) or not within (-1, 1] (double
-  /// sphere), and for an alpha outside [0, 1].
+  /// sphere), for an alpha outside [0, 1] and for a beta that is not positive.
   Lens(LensModel model, const std::vector<double>& coefficients);
 
   [[nodiscard]] LensModel model() const { return model_; }
