@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "modules/core/input_file.hpp"
+#include "modules/evaluation/mesh/sampled_surface.hpp"
 #include "modules/mesh/mesh_file.hpp"
 #include "test/support/process.hpp"
 #include "test/support/shared_data.hpp"
@@ -35,19 +36,20 @@ TEST_CASE("Two robots end with the same map of their team", "[system]") {
   const auto a = start(0, "--from 0 --to 6"), b = start(1, "--from 2 --to 8");
   CHECK(a->wait() == 0);
   CHECK(b->wait() == 0);
-  std::array<std::size_t, 2> faces{};
+  std::array<double, 2> areas_m2{};
   for (const int robot : {0, 1}) {
     const fs::path results = folder.path() / std::to_string(robot);
     REQUIRE(read_summary(results / "summary.json").pgo.members.size() == 2);
-    faces[static_cast<std::size_t>(robot)] = read_mesh(results / "mesh_optimized.ply").faces.size();
+    areas_m2[static_cast<std::size_t>(robot)] =
+        surface_area(read_mesh(results / "mesh_optimized.ply"));
   }
   for (const char* file : {"team_mesh.ply", "team_map.pgm"})
     CHECK(read_input_file(folder.path() / "0" / file) ==
           read_input_file(folder.path() / "1" / file));
-  // Each place is there once: fewer faces than both have, and more than one has.
-  const std::size_t fused = read_mesh(folder.path() / "0/team_mesh.ply").faces.size();
-  CHECK(5 * fused < 4 * (faces[0] + faces[1]));
-  CHECK(fused > std::max(faces[0], faces[1]));
+  // Each near place is there once. Far surface has voxels above the reach of the fusion.
+  const double fused_m2 = surface_area(read_mesh(folder.path() / "0/team_mesh.ply"));
+  CHECK(fused_m2 < 0.9 * (areas_m2[0] + areas_m2[1]));
+  CHECK(fused_m2 > std::ranges::max(areas_m2));
 }
 
 TEST_CASE("A robot whose id is taken reports it and ends, and the first owner of the id continues",
