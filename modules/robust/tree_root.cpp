@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <utility>
 
@@ -25,9 +24,9 @@ constexpr double kMaxRise = 1.5;
 // Smaller increases of the cost are rounding: relative to the cost, and if it is near 0.
 constexpr double kCostRounding = 1e-13;
 constexpr double kLeastRise = 1e-9;
-// Rounding may keep steps from being shorter. After so many rounds without a new smallest predicted
-// decrease, each further one relaxes the tolerances.
-constexpr int kRoundsAtRounding = 4;
+// Rounding may keep steps from being shorter: each round below this predicted decrease relaxes the
+// tolerances.
+constexpr double kNearRounding = 1e-13;
 constexpr double kRelax = 2.0;
 constexpr int kMaxBacktracks = 12;
 constexpr int kMaxBacktracksUndecided = 8;
@@ -233,7 +232,8 @@ DownMessage TreeRoot::step(const TreeSums& sums, const TreeFront& front,
   const bool far =
       odometry_is_noisy_ && !at_base_ && schedule_.is_nearly_convex() && 0.5 * decrement_ > cost_;
   if (!far && weighing_ != Weighing::kHold) schedule_.next({sums.changed, sums.fractional});
-  relax_at_rounding();
+  if (decrement_ <= kNearRounding * (1.0 + cost_))
+    for (double* limit : {&options_.tolerance, &options_.absolute_tolerance}) *limit *= kRelax;
   const bool small = 0.5 * decrement_ <= options_.tolerance * cost_ + options_.absolute_tolerance;
   // Weights are decided before the poses have converged. If the converged poses contradict them,
   // closures are weighed again. A second look mostly rejects closures that it has reopened.
@@ -267,16 +267,6 @@ DownMessage TreeRoot::step(const TreeSums& sums, const TreeFront& front,
         poses, front.substitute_back(root.kept).leftCols(static_cast<Index>(poses.size())),
         upright_);
   return message;
-}
-
-void TreeRoot::relax_at_rounding() {
-  if (!schedule_.decided() || decrement_ < least_decrement_) {
-    least_decrement_ = schedule_.decided() ? decrement_ : std::numeric_limits<double>::infinity();
-    rounds_since_least_ = 0;
-  } else if (++rounds_since_least_ > kRoundsAtRounding) {
-    options_.tolerance *= kRelax;
-    options_.absolute_tolerance *= kRelax;
-  }
 }
 
 // Closures between robots cannot bend a robot as far if those inside it have their full weight from

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <limits>
 #include <optional>
 #include <span>
 #include <vector>
@@ -56,7 +55,6 @@ class TreeRoot {
   [[nodiscard]] DownMessage go_back();
   [[nodiscard]] DownMessage refresh(bool accept, TreeVerdict::Weighing weighing);
   [[nodiscard]] bool worth_refreshing(double decrement);
-  void relax_at_rounding();
   [[nodiscard]] DownMessage weigh_all();
 
   std::vector<RobotId> members_;
@@ -86,8 +84,6 @@ class TreeRoot {
   int rises_ = 0;         // accepted increases of the cost, in a row
   double length_ = 1.0;   // scale of the next Newton step; 1 once all is decided
   std::optional<double> last_decrement_;  // with the present second derivatives
-  double least_decrement_ = std::numeric_limits<double>::infinity();  // with decided weights
-  int rounds_since_least_ = 0;
 };
 
 }  // namespace km

@@ -109,6 +109,8 @@ std::vector<bool> pairwise_consistent(const TeamGraph& graph, const PcmConfig& c
 
 PlacedTeam solve_centrally(const TeamGraph& graph, std::vector<bool> kept, std::vector<SE3> start,
                            std::uint32_t most_steps) {
+  // Exact measurements have huge weights, with which rounding predicts decreases of 1e-10.
+  constexpr double kEnd = 1e-9;
   PlacedTeam placed{.T_frame_kf = std::move(start), .frame_of = {}, .kept = std::move(kept)};
   placed.frame_of = part_of_poses(with_edges(graph, placed.kept));
   for (const ConnectedPart& part : connected_parts(graph, placed.kept)) {
@@ -116,7 +118,7 @@ PlacedTeam solve_centrally(const TeamGraph& graph, std::vector<bool> kept, std::
     for (const std::size_t i : part.poses) alone.start.push_back(placed.T_frame_kf[i]);
     for (const BlockEdge& e : part.graph.edges) alone.own.push_back(edge_of_one_robot(e));
     const LoneSolution solved = solve_alone(std::move(alone), {.dimension = graph.dimension,
-                                                               .absolute_tolerance = 1e-12,
+                                                               .absolute_tolerance = kEnd,
                                                                .max_rounds = most_steps,
                                                                .robust = false});
     placed.decided = placed.decided && solved.converged;
