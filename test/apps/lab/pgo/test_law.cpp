@@ -123,7 +123,7 @@ TEST_CASE("A team ends equally, in whatever order and at whatever rate its robot
                LawCase{"pose_graphs/3d/sphere2500.g2o", 5, "noisy-odometry", kInRooms_m}));
 }
 
-TEST_CASE("All recorded graphs and scenarios end equally in any order", "[pgo][.][law_long]") {
+TEST_CASE("All recorded graphs and scenarios end equally in any order", "[.][law_long]") {
   check_orders(
       GENERATE(LawCase{"cosmo_bench/kth_r3_00_d06_d09_d10_proradio.jrl", 0, "", kOverKilometres_m},
                LawCase{"cosmo_bench/ntu_r3_02_d02_n04_n13_proradio.jrl", 0, "", kOverKilometres_m},
