@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "apps/robot/run_end.hpp"
+#include "apps/robot/unmet_peers.hpp"
 
 namespace km {
 namespace {
@@ -235,6 +236,31 @@ TEST_CASE("A member that only others received is missed once it cannot have left
                    std::vector<RobotId>{1, 2});
   CHECK(text_of(absentees, 3.0) == "carol silent 4 ");
   CHECK(text_of(absentees, 5.0).empty());
+}
+
+TEST_CASE("A robot that is noticed is unmet until it is met", "[run_end]") {
+  UnmetPeers unmet({"10.0.0.7"});
+  Peer bob;
+  bob.identity.name = "bob";
+  const std::map<std::string, std::string> noticed = {{to_string(bob.identity), "no keys"}};
+  unmet.update(0.0, {}, noticed);
+  CHECK(unmet.reasons() == noticed);
+  unmet.update(1.0, {{bob}}, {});
+  CHECK(unmet.reasons().empty());
+
+  SECTION("a named host counts only while no robot is noticed") {
+    unmet.update(2.0, {}, {});
+    CHECK(unmet.reasons().begin()->first == "dds.peers 10.0.0.7");
+    unmet.update(3.0, {{bob}}, {});
+    CHECK(unmet.reasons().empty());
+  }
+  SECTION("a participant whose name is in parentheses stays for ten seconds") {
+    unmet.update(2.0, {{bob}}, {{"a participant (10.0.0.9)", "hears nothing"}});
+    unmet.update(11.0, {{bob}}, {});
+    CHECK(unmet.reasons().size() == 1);
+    unmet.update(13.0, {{bob}}, {});
+    CHECK(unmet.reasons().empty());
+  }
 }
 
 }  // namespace

@@ -1,0 +1,37 @@
+#include "apps/robot/unmet_peers.hpp"
+
+#include <utility>
+
+#include "runtime/log.hpp"
+
+namespace km {
+
+void UnmetPeers::update(double now_s, std::span<const Peer> met,
+                        std::map<std::string, std::string> unmet) {
+  // A participant that was named stays while a new one of its program is discovered.
+  constexpr double kUnmet_s = 5.0, kKept_s = 10.0;
+  if (met.empty() && unmet.empty())
+    for (const std::string& host : hosts_)
+      unmet["dds.peers " + host] =
+          "no robot there is received: none runs, or a firewall or NAT is between";
+  for (const auto& [name, why] : unmet) {
+    Unmet& known = unmet_.try_emplace(name, Unmet{.since_s = now_s}).first->second;
+    known.why = why;
+    known.last_s = now_s;
+    if (now_s - known.since_s >= kUnmet_s && !std::exchange(known.is_logged, true))
+      log::warn("peers") << name << " is not met: " << why;
+  }
+  std::erase_if(unmet_, [now_s](const auto& entry) {
+    const double gone_s = now_s - entry.second.last_s;
+    return gone_s > (entry.first.ends_with(')') ? kKept_s : 0.0);
+  });
+  for (const Peer& peer : met) unmet_.erase(to_string(peer.identity));
+}
+
+std::map<std::string, std::string> UnmetPeers::reasons() const {
+  std::map<std::string, std::string> reasons;
+  for (const auto& [name, unmet] : unmet_) reasons[name] = unmet.why;
+  return reasons;
+}
+
+}  // namespace km
