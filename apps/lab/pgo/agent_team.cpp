@@ -22,7 +22,8 @@
 namespace km {
 namespace {
 
-constexpr double kTick_s = 0.05;  // period of TeamNode
+constexpr double kLongest_s = 3600.0;  // virtual time of a run
+constexpr double kTick_s = 0.05;       // period of TeamNode
 constexpr double kDelay_s = 1e-3;
 constexpr double kLatestMeeting_s = 20.0;  // with random times
 constexpr double kMeanDelay_s = 0.03;      // with random times
@@ -115,8 +116,7 @@ class AgentTeam {
     for (std::size_t k = 0; k < members_.size(); ++k) {
       std::set<RobotId> others;
       for (std::size_t other = 0; other < members_.size(); ++other)
-        if (other != k && (options.shape == TeamShape::kAll || other + 1 == k || k + 1 == other))
-          others.insert(static_cast<RobotId>(other));
+        if (other != k) others.insert(static_cast<RobotId>(other));
       links.links.report(static_cast<RobotId>(k), std::move(others));
     }
     for (const Member& member : members_) member.agent->update_links(links);
@@ -125,7 +125,7 @@ class AgentTeam {
   AgentTeamRun run() {
     const double quiet_s = options_.pose_graph.session_wait_s + kMargin_s;
     double last_change_s = 0.0;
-    while (now_s_ - last_change_s < quiet_s && now_s_ < options_.longest_s) {
+    while (now_s_ - last_change_s < quiet_s && now_s_ < kLongest_s) {
       const bool played = play();
       const bool idle = exchange();
       if (played || pending() || !settled()) last_change_s = now_s_;
@@ -260,8 +260,6 @@ class AgentTeam {
     changed_ |= output.trajectory.has_value();
     if (output.trajectory) member.trajectory = std::move(output.trajectory);
     if (output.progress) member.progress = std::move(*output.progress);
-    for (std::string& notice : output.notices)
-      notices_.push_back("robot " + std::to_string(robot) + ": " + std::move(notice));
     for (const TeamMessage& message : output.messages) send(robot, message);
   }
 
@@ -283,7 +281,6 @@ class AgentTeam {
       members_[to].cost.received[message.index()] += sent;
       bytes_ += sent;
     }
-    if (const auto* session = std::get_if<Session>(&message)) sessions_.insert(session->id);
   }
 
   [[nodiscard]] bool settled() const {
@@ -294,16 +291,13 @@ class AgentTeam {
   [[nodiscard]] AgentTeamRun result(bool settled, double seconds) const {
     AgentTeamRun run{.T_world_kf = {},
                      .world_of = {},
-                     .tentative = {},
                      .kept = odometry_edges(graph_),
                      .settled = settled,
                      .seconds = seconds,
                      .last = members_.front().agent->part()->progress(),
                      .critical_path_s = critical_path_s_,
                      .bytes = bytes_,
-                     .costs = {},
-                     .sessions = sessions_.size(),
-                     .notices = notices_};
+                     .costs = {}};
     for (const Member& member : members_) run.costs.push_back(member.cost);
     for (std::size_t k = 0; k < members_.size(); ++k) {
       const Member& member = members_[k];
@@ -316,8 +310,6 @@ class AgentTeam {
                           run.T_world_kf.end() - static_cast<std::ptrdiff_t>(graph_.poses_of(k)));
       run.world_of.push_back(publishes(named_by) ? members_[named_by].trajectory->anchor
                                                  : static_cast<RobotId>(named_by));
-      const std::vector<RobotId>& uncertain = members_[run.world_of.back()].progress.tentative;
-      run.tentative.push_back(std::ranges::binary_search(uncertain, static_cast<RobotId>(k)));
       run.rounds = std::max(run.rounds, static_cast<std::size_t>(member.progress.round));
     }
     for (const TeamClosure& measured : team_closures(graph_)) {
@@ -373,8 +365,6 @@ class AgentTeam {
   std::map<std::tuple<std::size_t, std::size_t, std::size_t>, double> last_arrival_s_;
   double critical_path_s_ = 0.0;
   std::size_t bytes_ = 0;
-  std::set<SessionId> sessions_;
-  std::vector<std::string> notices_;
   double now_s_ = 0.0;
   double next_tick_s_ = 0.0;
   bool changed_ = false;

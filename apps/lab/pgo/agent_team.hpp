@@ -30,8 +30,6 @@ struct AgentTeamOptions {
   PcmConfig pcm = {};            ///< Decides when the closures of a pair count; `selection` is
                                  ///< witness.
   double keyframes_per_s = 0.0;  ///< Rate at which robots play their graphs [1/s]; 0: all at once.
-  double longest_s = 3600.0;     ///< Limit of the virtual time of the run [s].
-  TeamShape shape = TeamShape::kAll;
   /// Seed of random times: robots start and meet within the first 20 s, and messages take 30 ms on
   /// average. 0: robots meet at once, and each message takes 1 ms.
   unsigned seed = 0;
@@ -51,17 +49,14 @@ struct AgentTeamRun {
   std::vector<SE3> T_world_kf;    ///< Published poses, in the numbering of the graph.
   std::vector<RobotId> world_of;  ///< By robot: id of the robot whose odometry frame is its
                                   ///< `world`.
-  std::vector<bool> tentative;    ///< By robot: closures at a single place tie it to `world`.
   std::vector<bool> kept;         ///< By edge of the graph: used in the published solution.
-  bool settled = false;           ///< False: the run ended at longest_s.
+  bool settled = false;           ///< False: the run ended after an hour of virtual time.
   double seconds = 0.0;           ///< Virtual time of the last change [s].
   std::size_t rounds = 0;         ///< In all sessions, maximum over the robots.
   SolverState last = {};          ///< State of robot 0 at the end of its last session.
   double critical_path_s = 0.0;   ///< CPU time of the slowest robot, summed over all steps.
   std::size_t bytes = 0;          ///< Sent by all robots; a message counts once per receiver.
   std::vector<AgentCost> costs;   ///< By robot.
-  std::size_t sessions = 0;       ///< Number of sessions of the team.
-  std::vector<std::string> notices;
 };
 
 /// Runs the robots' own code on a recorded graph, from measurements to published poses. Each robot

@@ -5,8 +5,8 @@
 #include <string>
 
 #include "apps/lab/pgo/team_graph_file.hpp"
+#include "apps/output_file.hpp"
 #include "apps/program_options.hpp"
-#include "apps/report_files.hpp"
 
 namespace km {
 

@@ -13,7 +13,7 @@ namespace km {
 using Eigen::Index;
 
 MemberTeam::MemberTeam(const TeamGraph& graph, Index rank, std::vector<SE3> start,
-                       const Factory& make, TeamShape shape)
+                       const Factory& make)
     : graph_(graph),
       rank_(rank),
       parts_(graph.robots()),
@@ -23,7 +23,7 @@ MemberTeam::MemberTeam(const TeamGraph& graph, Index rank, std::vector<SE3> star
     throw std::invalid_argument("MemberTeam: " + std::to_string(start.size()) +
                                 " start poses for " + std::to_string(graph.poses()));
   for (std::size_t k = 0; k < parts_.size(); ++k) parts_[k] = part_of(graph, k);
-  places_ = places(shape);
+  places_ = places();
   announce_starts(std::move(start));
   for (std::size_t k = 0; k < parts_.size(); ++k)
     members_.push_back(make(parts_[k], places_.at(k)));
@@ -31,7 +31,7 @@ MemberTeam::MemberTeam(const TeamGraph& graph, Index rank, std::vector<SE3> star
 }
 
 // Places in the tree that the robots' own plan_tree() computes.
-std::map<std::size_t, TreePlace> MemberTeam::places(TeamShape shape) const {
+std::map<std::size_t, TreePlace> MemberTeam::places() const {
   std::map<RobotId, TeamStatus> statuses;
   TeamLinks links;
   for (const SessionGraph& part : parts_) {
@@ -41,11 +41,8 @@ std::map<std::size_t, TreePlace> MemberTeam::places(TeamShape shape) const {
     for (const PoseEdge& e : part.between) ++edges[e.other(part.self).robot];
     for (const auto& [peer, count] : edges) status.offers.push_back({peer, count, {1, count}});
     std::set<RobotId> received;
-    for (const SessionGraph& other : parts_) {
-      const bool beside = other.self + 1 == part.self || part.self + 1 == other.self;
-      if (other.self != part.self && (shape == TeamShape::kAll || beside))
-        received.insert(other.self);
-    }
+    for (const SessionGraph& other : parts_)
+      if (other.self != part.self) received.insert(other.self);
     links.report(part.self, received);
   }
   SessionPlan plan = plan_session(statuses, 0);
@@ -139,20 +136,6 @@ bool MemberTeam::pass_on(std::uint32_t round, RoundMeter& meter) {
   }
   meter.finish_exchange();
   return worked;
-}
-
-std::vector<bool> MemberTeam::kept() const {
-  std::map<ClosureId, bool> verdict;
-  for (const auto& member : members_)
-    for (const WeighedClosure& closure : member->verdicts().closures)
-      verdict[closure.id] = closure.kept;
-  std::vector<bool> kept = odometry_edges(graph_);
-  for (std::size_t k = 0; k < kept.size(); ++k) {
-    const BlockEdge& e = graph_.edges[k];
-    const auto found = verdict.find(closure_id(graph_.keyframe_of(e.i), graph_.keyframe_of(e.j)));
-    kept[k] = kept[k] || found == verdict.end() || found->second;
-  }
-  return kept;
 }
 
 }  // namespace km

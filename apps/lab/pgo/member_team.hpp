@@ -22,16 +22,14 @@ class MemberTeam final : public TeamSolver {
 
   /// `start`: one pose for each pose of the graph. Throws std::invalid_argument if the number of
   /// poses differs, and what `make` throws.
-  MemberTeam(const TeamGraph& graph, Eigen::Index rank, std::vector<SE3> start, const Factory& make,
-             TeamShape shape = TeamShape::kAll);
+  MemberTeam(const TeamGraph& graph, Eigen::Index rank, std::vector<SE3> start,
+             const Factory& make);
 
   int step(RoundMeter& meter) override;
   [[nodiscard]] const LiftedPoses& block(std::size_t robot) const override {
     return blocks_[robot];
   }
 
-  /// By edge of the graph: whether the solution uses it. Odometry is always used.
-  [[nodiscard]] std::vector<bool> kept() const;
   /// True if all members are done.
   [[nodiscard]] bool done() const;
   [[nodiscard]] const SolverState& state() const { return state_; }
@@ -46,7 +44,7 @@ class MemberTeam final : public TeamSolver {
     SolverMessage message;
   };
 
-  [[nodiscard]] std::map<std::size_t, TreePlace> places(TeamShape shape) const;
+  [[nodiscard]] std::map<std::size_t, TreePlace> places() const;
   void announce_starts(std::vector<SE3> start);
   void take_poses();
   bool pass_on(std::uint32_t round, RoundMeter& meter);

@@ -124,30 +124,4 @@ void write_outlier_json(std::ostream& out, const OutlierStudy& study) {
                     {"results", std::move(results)}});
 }
 
-std::vector<Plot> outlier_plots(const OutlierStudy& study) {
-  const auto panel = [&](const char* title, const char* unit, bool log, const auto& ordinate) {
-    Plot plot{.title = title,
-              .x_label = "false closures per 100 true ones",
-              .y_label = unit,
-              .log_y = log};
-    for (const Cell& cell : cells_of(study)) {
-      const std::string& method = cell.front().method;
-      auto curve = std::ranges::find(plot.series, method, &PlotSeries::name);
-      if (curve == plot.series.end())
-        curve = plot.series.insert(
-            curve, {method, {}, plot.series.size(), PlotSeries::Style::kMarkedLine});
-      curve->points.push_back({cell.front().share_percent, ordinate(cell)});
-    }
-    return plot;
-  };
-  const auto worst = [](auto OutlierResult::*member) {
-    return [member](Cell cell) { return statistics(cell, member).max; };
-  };
-  return {panel("RMSE of positions to the truth", "m", true, worst(&OutlierResult::rms_m)),
-          panel("True closures lost", "closures", false, worst(&OutlierResult::true_lost)),
-          panel("False closures kept", "closures", false, worst(&OutlierResult::false_kept)),
-          panel("CPU time of all robots", "s", false,
-                [](Cell cell) { return statistics(cell, &OutlierResult::cpu_s).median; })};
-}
-
 }  // namespace km

@@ -10,11 +10,9 @@
 #include "apps/lab/pgo/solvers.hpp"
 #include "apps/lab/pgo/team_graph.hpp"
 #include "modules/evaluation/trajectory_error.hpp"
-#include "modules/outlier_rejection/chi_squared.hpp"
 #include "modules/outlier_rejection/pcm.hpp"
 #include "modules/rbcd/stiefel.hpp"
 #include "modules/robust/lone_solution.hpp"
-#include "modules/robust/robust_schedule.hpp"
 #include "modules/tree_newton/chordal.hpp"
 #include "modules/tree_newton/tree_front.hpp"
 
@@ -33,20 +31,6 @@ std::vector<SE3> chordal_start(const TeamGraph& graph, const std::vector<bool>& 
   return start;
 }
 
-double residual(const BlockEdge& e, const std::vector<SE3>& poses) {
-  return residual_of(edge_of_one_robot(e), poses[static_cast<std::size_t>(e.i)],
-                     poses[static_cast<std::size_t>(e.j)]);
-}
-
-TeamGraph with_weights(const TeamGraph& graph, const std::vector<double>& weights) {
-  TeamGraph weighed = graph;
-  for (std::size_t k = 0; k < weights.size(); ++k) {
-    weighed.edges[k].kappa *= weights[k];
-    weighed.edges[k].tau *= weights[k];
-  }
-  return weighed;
-}
-
 PlacedTeam solve_reference(const ScenarioGraph& drawn) {
   TeamGraph honest = drawn.graph;
   std::vector<bool> kept;
@@ -58,15 +42,11 @@ PlacedTeam solve_reference(const ScenarioGraph& drawn) {
   return solve_centrally(honest, std::move(kept), drawn.truth);
 }
 
-// The robots receive only the `known` edges.
-PlacedTeam solve_by_robots(const TeamGraph& graph, std::vector<bool> known) {
-  AgentTeamRun run = run_agent_team(with_edges(graph, known), {});
-  std::size_t in_part = 0;
-  for (std::size_t k = 0; k < known.size(); ++k)
-    if (known[k]) known[k] = run.kept[in_part++];
+PlacedTeam solve_by_robots(const TeamGraph& graph) {
+  AgentTeamRun run = run_agent_team(graph, {});
   PlacedTeam placed{.T_frame_kf = std::move(run.T_world_kf),
                     .frame_of = {},
-                    .kept = std::move(known),
+                    .kept = std::move(run.kept),
                     .decided = run.settled,
                     .rounds = run.rounds,
                     .bytes = run.bytes};
@@ -80,11 +60,11 @@ PlacedTeam solve_by(const std::string& method, const ScenarioGraph& drawn,
                     const OutlierStudyOptions& options) {
   const TeamGraph& graph = drawn.graph;
   if (method == "reference") return solve_reference(drawn);
-  if (method == "gnc") return solve_by_gnc(graph);
+  if (method == "robots") return solve_by_robots(graph);
   std::vector<bool> kept(graph.edges.size(), true);
-  if (method.starts_with("pcm")) kept = pairwise_consistent(graph, options.pcm);
-  if (method.ends_with("robots")) return solve_by_robots(graph, std::move(kept));
-  if (method != "pcm" && method != "trust-all")
+  if (method == "pcm")
+    kept = pairwise_consistent(graph, options.pcm);
+  else if (method != "trust-all")
     throw std::invalid_argument("outlier study: unknown method " + method);
   std::vector<SE3> start = chordal_start(graph, kept);
   return solve_centrally(graph, std::move(kept), std::move(start));
@@ -107,8 +87,7 @@ std::vector<bool> pairwise_consistent(const TeamGraph& graph, const PcmConfig& c
   return kept;
 }
 
-PlacedTeam solve_centrally(const TeamGraph& graph, std::vector<bool> kept, std::vector<SE3> start,
-                           std::uint32_t most_steps) {
+PlacedTeam solve_centrally(const TeamGraph& graph, std::vector<bool> kept, std::vector<SE3> start) {
   // Exact measurements have huge weights, with which rounding predicts decreases of 1e-10.
   constexpr double kEnd = 1e-9;
   PlacedTeam placed{.T_frame_kf = std::move(start), .frame_of = {}, .kept = std::move(kept)};
@@ -119,48 +98,13 @@ PlacedTeam solve_centrally(const TeamGraph& graph, std::vector<bool> kept, std::
     for (const BlockEdge& e : part.graph.edges) alone.own.push_back(edge_of_one_robot(e));
     const LoneSolution solved = solve_alone(std::move(alone), {.dimension = graph.dimension,
                                                                .absolute_tolerance = kEnd,
-                                                               .max_rounds = most_steps,
+                                                               .max_rounds = 300,
                                                                .robust = false});
     placed.decided = placed.decided && solved.converged;
     for (std::size_t k = 0; k < part.poses.size(); ++k)
       placed.T_frame_kf[part.poses[k]] = solved.poses[k];
   }
   return placed;
-}
-
-PlacedTeam solve_by_gnc(const TeamGraph& graph) {
-  constexpr double kConfidence = 0.99;
-  constexpr double kSteeper = 1.4;   // as the paper recommends
-  constexpr double kFloor = 1e-10;   // keeps the equations regular
-  constexpr int kMostUpdates = 100;  // as in the paper
-  constexpr std::uint32_t kStepsOfUpdate = 20;
-  const double c2 = chi_squared_6_quantile(kConfidence);
-  const std::vector<bool> odometry = odometry_edges(graph);
-  const std::vector<bool> all(graph.edges.size(), true);
-  PlacedTeam placed = solve_centrally(graph, all, chordal_start(graph, all));
-  double largest = 0.0;
-  for (std::size_t k = 0; k < odometry.size(); ++k)
-    if (!odometry[k]) largest = std::max(largest, residual(graph.edges[k], placed.T_frame_kf));
-  double mu = first_mu(largest * largest, c2);
-  std::vector<double> weights(graph.edges.size(), 1.0);
-  bool decided = false;
-  for (int update = 0; update < kMostUpdates && !decided; ++update, mu *= kSteeper) {
-    decided = true;
-    for (std::size_t k = 0; k < odometry.size(); ++k) {
-      if (odometry[k]) continue;
-      const double r = residual(graph.edges[k], placed.T_frame_kf);
-      const double weight = std::max(kFloor, robust_weight(r * r, c2, mu));
-      decided = decided && (weight == 1.0 || weight == kFloor);
-      weights[k] = weight;
-    }
-    PlacedTeam next =
-        solve_centrally(with_weights(graph, weights), all, placed.T_frame_kf, kStepsOfUpdate);
-    placed.T_frame_kf = std::move(next.T_frame_kf);
-  }
-  for (std::size_t k = 0; k < odometry.size(); ++k) placed.kept[k] = weights[k] > 0.5;
-  PlacedTeam end = solve_centrally(graph, placed.kept, placed.T_frame_kf);
-  end.decided = end.decided && decided;
-  return end;
 }
 
 OutlierResult judge(const ScenarioGraph& drawn, const PlacedTeam& placed) {

@@ -15,14 +15,11 @@ namespace km {
 
 /// Methods against false closures:
 /// - robots: the robots' own code at its defaults, see run_agent_team();
-/// - pcm+robots: robots that receive the closures that pairwise consistency keeps;
 /// - pcm: the closures that pairwise consistency keeps, by Newton's method on one computer;
-/// - gnc: graduated non-convexity on one computer, see solve_by_gnc();
 /// - trust-all: all closures, on one computer;
 /// - reference: only the true closures, all edges weighed by the noise that was drawn, on one
 ///   computer, started at the truth: the best achievable result.
-inline const std::vector<std::string> kRejections = {"robots", "pcm+robots", "pcm",
-                                                     "gnc",    "trust-all",  "reference"};
+inline const std::vector<std::string> kRejections = {"robots", "pcm", "trust-all", "reference"};
 
 struct OutlierStudyOptions {
   std::optional<Scenario> scenario = {};  ///< nullopt: the measurements of the graph.
@@ -89,18 +86,11 @@ struct PlacedTeam {
   std::size_t bytes = 0;
 };
 
-/// Returns the minimum of the `kept` edges near `start`, after at most `most_steps` Newton steps on
-/// one computer. Parts that these edges leave unconnected are solved separately, each in a frame of
+/// Returns the minimum of the `kept` edges near `start`, after at most 300 Newton steps on one
+/// computer. Parts that these edges leave unconnected are solved separately, each in a frame of
 /// its own.
 [[nodiscard]] PlacedTeam solve_centrally(const TeamGraph& graph, std::vector<bool> kept,
-                                         std::vector<SE3> start, std::uint32_t most_steps = 300);
-
-/// Graduated non-convexity with truncated least squares at a fixed scale (Yang et al., "Graduated
-/// Non-Convexity for Robust Spatial Perception", RA-L 2020, Algorithm 1). Closures are rejected if
-/// their squared residual exceeds the 99 % quantile of chi-squared with 6 degrees of freedom.
-/// Odometry is trusted. The start is chordal. Each change of the weights is followed by at most 20
-/// Newton steps.
-[[nodiscard]] PlacedTeam solve_by_gnc(const TeamGraph& graph);
+                                         std::vector<SE3> start);
 
 /// Counts closures lost and kept, and computes the errors of `placed`. Method, share, seed and time
 /// are not set.

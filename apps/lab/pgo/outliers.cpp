@@ -24,8 +24,6 @@ Methods:
   pcm        pairwise consistency: between two robots, and inside one, the largest set of
              closures that agree pairwise along the odometry, by exact clique search;
              then the optimum of odometry and these closures, on one computer
-  pcm+robots robots that receive the closures that pcm keeps
-  gnc        graduated non-convexity at the claimed noise, on one computer
   trust-all  all closures, on one computer
   reference  only the true closures, weighed by the noise that was drawn
 
@@ -40,7 +38,7 @@ around it. Scenarios, and the graph each is meant for:
 )" + scenario_list() +
          R"(
 Examples:
-  kimera_multi_pgo outliers sphere2500.g2o --json out.json --plot out.html
+  kimera_multi_pgo outliers sphere2500.g2o --json out.json
   kimera_multi_pgo outliers parking-garage.g2o --shares 30,100,400 --methods robots \
       --seeds 1,2,3
   kimera_multi_pgo outliers sphere2500.g2o --scenario noisy-odometry --seeds 1,2,3)";
@@ -48,9 +46,9 @@ Examples:
 
 struct OutliersCommand {
   GraphInput input{.robots = 5};
-  OutlierStudyOptions study{.methods = {"pcm", "robots", "pcm+robots"}};
+  OutlierStudyOptions study{.methods = {"pcm", "robots"}};
   std::string scenario = {};
-  ReportFiles files = {};
+  std::filesystem::path json = {};
 };
 
 void define(CLI::App& app, OutliersCommand& command) {
@@ -65,7 +63,7 @@ void define(CLI::App& app, OutliersCommand& command) {
       ->check(CLI::Range(0.0, 10000.0))
       ->delimiter(',');
   app.add_option("--methods", study.methods,
-                 "See below. In a scenario the default is robots,trust-all,pcm,gnc,reference")
+                 "See below. In a scenario the default is robots,trust-all,pcm,reference")
       ->check(CLI::IsMember(kRejections).description(""))
       ->delimiter(',');
   app.add_option("--seeds", study.seeds,
@@ -90,13 +88,12 @@ void set_scenario(CLI::App& app, const OutliersCommand& command, OutlierStudyOpt
   else if (app.count("--robots") > 0)
     scenario.robots = command.input.robots;
   scenario.keep_steps = command.input.keep_steps;
-  if (app.count("--methods") == 0)
-    study.methods = {"robots", "trust-all", "pcm", "gnc", "reference"};
+  if (app.count("--methods") == 0) study.methods = {"robots", "trust-all", "pcm", "reference"};
   if (app.count("--seeds") == 0) study.seeds = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10};
 }
 
 void run(CLI::App& app, const OutliersCommand& command) {
-  command.files.check();
+  check_output_folder(command.json);
   OutlierStudyOptions study = command.study;
   GraphInput input = command.input;
   if (!command.scenario.empty()) {
@@ -116,9 +113,7 @@ void run(CLI::App& app, const OutliersCommand& command) {
                  static_cast<double>(ended) / static_cast<double>(all));
       });
   std::cout << outlier_text(done);
-  command.files.write([&](std::ostream& out) { write_outlier_json(out, done); },
-                      "Rejecting false closures: " + input.file.string(),
-                      [&] { return outlier_plots(done); });
+  write_output(command.json, [&](std::ostream& out) { write_outlier_json(out, done); });
 }
 
 }  // namespace
@@ -132,7 +127,7 @@ void add_outliers(CLI::App& parent) {
   const auto command = std::make_shared<OutliersCommand>();
   command->input.define(app);
   define(app, *command);
-  command->files.define(app, "every run", "error, closures and time");
+  app.add_option("--json", command->json, "Also write every run to this file, as JSON");
   app.callback([&app, command] { run(app, *command); });
 }
 

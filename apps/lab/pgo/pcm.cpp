@@ -42,12 +42,12 @@ of the last 50 searches, the worst search and their sum, the median time of the 
 rounds of checks and their sum. Times are CPU times of one thread.
 
 Examples:
-  kimera_multi_pgo pcm manhattan.g2o --outliers 1000 --seed 1 --json pcm.json --plot pcm.html
+  kimera_multi_pgo pcm manhattan.g2o --outliers 1000 --seed 1 --json pcm.json
   kimera_multi_pgo pcm manhattan.g2o --outliers 1000 --search exact incremental batch)";
 
 struct PcmCommand {
   fs::path file;
-  ReportFiles files;
+  fs::path json;
   std::vector<std::string> searches{"exact"};
   ClosureChoice selection;
 };
@@ -58,9 +58,6 @@ void define_closures(CLI::App& app, ClosureChoice& selection) {
   app.add_option("--closures", selection.keep,
                  "Number of the file's closures to use, drawn at random; 0: all")
       ->check(CLI::Range(0, kMostClosures));
-  app.add_option("--outlier-range", selection.outlier_half_side_m,
-                 "Translations of the random closures are at most this along every axis [m]")
-      ->check(CLI::PositiveNumber);
   app.add_option("--seed", selection.seed, "Seed of all random draws")->capture_default_str();
 }
 
@@ -102,14 +99,12 @@ void add_pcm(CLI::App& parent) {
       ->check(CLI::ExistingFile);
   define_search(app, *command);
   define_closures(app, command->selection);
-  command->files.define(app, "every addition (an array for several searches)",
-                        "time and size of the clique against vertices");
+  app.add_option("--json", command->json,
+                 "Also write every addition to this file, as JSON (an array for several searches)");
   app.callback([command] {
-    command->files.check();
+    check_output_folder(command->json);
     const std::vector<PcmRun> runs = run_file(*command);
-    command->files.write([&](std::ostream& out) { write_pcm_json(out, runs); },
-                         "Consistent closures: " + command->file.string(),
-                         [&] { return pcm_plots(runs); });
+    write_output(command->json, [&](std::ostream& out) { write_pcm_json(out, runs); });
   });
 }
 

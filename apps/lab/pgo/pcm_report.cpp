@@ -79,24 +79,6 @@ std::string totals_text(const PcmRun& run) {
                      : "no proof of a maximum after " + std::to_string(unproven) + " additions\n");
 }
 
-std::vector<PlotPoint> points(Additions additions, const auto& ordinate) {
-  std::vector<PlotPoint> result;
-  for (const PcmAddition& a : additions)
-    result.push_back({static_cast<double>(a.vertices), static_cast<double>(ordinate(a))});
-  return result;
-}
-
-// Medians over the additions around every point, because single times are noisy.
-std::vector<PlotPoint> running_median_ms(Additions additions, double PcmAddition::*member) {
-  std::vector<PlotPoint> result;
-  for (std::size_t n = 0; n < additions.size(); n += kWindow / 5) {
-    const std::size_t first = n - std::min(n, kWindow / 2);
-    const Additions around = additions.subspan(first, std::min(kWindow, additions.size() - first));
-    result.push_back({static_cast<double>(additions[n].vertices), median_ms(around, member)});
-  }
-  return result;
-}
-
 }  // namespace
 
 std::string pcm_text(const PcmRun& run) {
@@ -122,31 +104,6 @@ void write_pcm_json(std::ostream& out, std::span<const PcmRun> runs) {
     all.push_back({{"search", run.search}, {"additions", std::move(additions)}});
   }
   out << json_text(runs.size() == 1 ? all.front() : all);
-}
-
-std::vector<Plot> pcm_plots(std::span<const PcmRun> runs) {
-  Plot time{.title = "CPU time of one addition: each, and the median of 50",
-            .x_label = "vertices",
-            .y_label = "ms",
-            .log_y = true};
-  Plot size{.title = "Size of the clique", .x_label = "vertices", .y_label = "closures"};
-  for (std::size_t colour = 0; colour < runs.size(); ++colour) {
-    const std::string& search = runs[colour].search;
-    const Additions additions(runs[colour].additions);
-    time.series.push_back({search,
-                           points(additions, [](const auto& a) { return 1e3 * a.search_s; }),
-                           colour, PlotSeries::Style::kDots});
-    time.series.push_back({search, running_median_ms(additions, &PcmAddition::search_s), colour});
-    size.series.push_back(
-        {search, points(additions, [](const auto& a) { return a.clique; }), colour});
-  }
-  const Additions first = runs.empty() ? Additions() : Additions(runs.front().additions);
-  time.series.push_back(
-      {"consistency checks", running_median_ms(first, &PcmAddition::check_s), runs.size()});
-  size.series.push_back({"true closures added",
-                         points(first, [](const auto& a) { return a.true_vertices; }),
-                         runs.size()});
-  return {time, size};
 }
 
 }  // namespace km

@@ -3,10 +3,8 @@
 #include <iosfwd>
 #include <span>
 #include <string>
-#include <vector>
 
 #include "apps/lab/pgo/pcm_run.hpp"
-#include "modules/charts/chart_page.hpp"
 
 namespace km {
 
@@ -17,8 +15,5 @@ namespace km {
 /// "true_members", "false_members"}]}. "true_members" and "false_members" count the closures of the
 /// clique by label. Several runs are an array of such objects.
 void write_pcm_json(std::ostream& out, std::span<const PcmRun> runs);
-
-/// Time of search and checks, and size of the clique, against vertices.
-[[nodiscard]] std::vector<Plot> pcm_plots(std::span<const PcmRun> runs);
 
 }  // namespace km

@@ -146,7 +146,6 @@ ClosureInput read_closures(const std::filesystem::path& file, const ClosureChoic
                                                     {.robot = graph.robot,
                                                     .keyframes = graph.poses(),
                                                     .planar = g2o.dimension == 2,
-                                                    .half_side_m = selection.outlier_half_side_m,
                                                     .covariance = closures.front().covariance},
                                                     rng))
       add(edge, true);

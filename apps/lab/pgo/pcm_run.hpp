@@ -59,10 +59,8 @@ using PcmProgress = std::function<void(std::size_t)>;
 
 /// Selection of the closures of a pose graph, and additional random ones.
 struct ClosureChoice {
-  std::size_t outliers = 0;         ///< Number of random closures to add.
-  double outlier_half_side_m = 20;  ///< Range of their translations, see RandomOutlierModel.
-  std::size_t keep = 0;             ///< Number of the file's closures to use, drawn at random; 0:
-                                    ///< all.
+  std::size_t outliers = 0;  ///< Number of random closures to add.
+  std::size_t keep = 0;      ///< Number of the file's closures to use, drawn at random; 0: all.
   unsigned seed = 1;
 };
 

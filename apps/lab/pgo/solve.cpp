@@ -63,7 +63,7 @@ Examples:
   kimera_multi_pgo solve sphere2500.g2o --robots 5 --method newton --trust-all --json out.json
   kimera_multi_pgo solve tunnels_8robots --method rbcd --rounds 300
   kimera_multi_pgo solve tunnels_8robots
-  kimera_multi_pgo solve tunnels_8robots --barc 20 --links chain
+  kimera_multi_pgo solve tunnels_8robots --barc 20
   kimera_multi_pgo solve ntu_r3_02_d02_n04_n13_wifi.jrl
   kimera_multi_pgo solve manhattan.g2o --method centralized --output manhattan.tum)";
 
@@ -82,10 +82,7 @@ struct Takers {
 };
 
 std::vector<Takers> takers() {
-  return {{"--rank", {"rbcd"}},
-          {"--over-relaxation", {"rbcd"}},
-          {"--barc", {"newton"}},
-          {"--links", {"newton", "newton --trust-all", "rbcd"}}};
+  return {{"--rank", {"rbcd"}}, {"--over-relaxation", {"rbcd"}}, {"--barc", {"newton"}}};
 }
 
 void define_method(CLI::App& app, SolveCommand& command) {
@@ -99,14 +96,6 @@ void define_method(CLI::App& app, SolveCommand& command) {
   app.add_option("--over-relaxation", solver.over_relaxation,
                  "rbcd: largest step of a robot, relative to that to the minimum of its block")
       ->check(CLI::Range(1.0, 1.99));
-  app.add_option_function<std::string>(
-         "--links",
-         [&solver](const std::string& shape) {
-           solver.shape = shape == "chain" ? TeamShape::kChain : TeamShape::kAll;
-         },
-         "newton, rbcd: links of the robots: all, or chain (robot k to k - 1 and k + 1)")
-      ->check(CLI::IsMember(std::vector<std::string>{"all", "chain"}))
-      ->default_str("all");
 }
 
 void define_newton(CLI::App& app, SolveCommand& command) {

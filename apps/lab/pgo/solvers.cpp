@@ -59,11 +59,9 @@ std::unique_ptr<TeamSolver> rbcd_team(const TeamGraph& graph, const std::vector<
                          .max_rounds = static_cast<std::uint32_t>(options.run.max_rounds),
                          .max_over_relaxation = options.over_relaxation};
   return std::make_unique<MemberTeam>(
-      graph, kRigidRank, start,
-      [rbcd](SessionGraph part, const TreePlace& place) {
+      graph, kRigidRank, start, [rbcd](SessionGraph part, const TreePlace& place) {
         return std::make_unique<MemberRbcd>(std::move(part), place, rbcd);
-      },
-      options.shape);
+      });
 }
 
 std::unique_ptr<TeamSolver> make_team(const TeamGraph& graph, const std::vector<SE3>& start,
@@ -82,12 +80,9 @@ SolverRun run_trusting(const TeamGraph& graph, const std::vector<SE3>& start,
   TreeNewtonOptions newton = newton_options({.robust = false});
   newton.dimension = graph.dimension;
   newton.absolute_tolerance = 1e-12;
-  MemberTeam team(
-      graph, kRigidRank, start,
-      [&](SessionGraph part, TreePlace place) {
-        return std::make_unique<TreeNewton>(std::move(part), std::move(place), newton);
-      },
-      options.shape);
+  MemberTeam team(graph, kRigidRank, start, [&](SessionGraph part, TreePlace place) {
+    return std::make_unique<TreeNewton>(std::move(part), std::move(place), newton);
+  });
   SolverRun run;
   run.rounds = run_team(graph, team,
                         {.max_rounds = options.run.max_rounds, .gradient_tolerance = -1.0}, meter);
@@ -97,7 +92,7 @@ SolverRun run_trusting(const TeamGraph& graph, const std::vector<SE3>& start,
 
 // The robots' own code from measurements to published poses, over an ideal network.
 SolverRun run_agents(const TeamGraph& graph, const SolverOptions& options, const TeamMeter& meter) {
-  AgentTeamOptions team{.shape = options.shape, .meter = meter};
+  AgentTeamOptions team{.meter = meter};
   team.pose_graph.barc = options.barc;
   team.pose_graph.max_rounds = options.run.max_rounds;
   team.pcm.witness_wait_s = 0.0;

@@ -26,7 +26,6 @@ struct SolverOptions {
   double over_relaxation = 1.95;  ///< rbcd: largest value; 1: as published.
   bool trust_all = false;         ///< newton: all closures are treated as true.
   double barc = 0.0;              ///< newton: largest residual of an inlier [sigma]; 0: estimated.
-  TeamShape shape = TeamShape::kAll;  ///< newton, rbcd: links between the robots.
 
   [[nodiscard]] bool rejects() const { return method == "newton" && !trust_all; }
   /// The method as given on the command line.

@@ -65,12 +65,6 @@ struct TeamGraph {
 /// does.
 [[nodiscard]] QuadraticProblem problem_of(const TeamGraph& graph, Eigen::Index rank);
 
-/// Links between the robots of a team.
-enum class TeamShape {
-  kAll,    ///< Every robot receives all others.
-  kChain,  ///< Robot k receives only k - 1 and k + 1.
-};
-
 /// By robot: the robots with which it shares edges, ascending.
 using TeamNeighbours = std::vector<std::vector<std::size_t>>;
 

@@ -26,29 +26,25 @@ using Eigen::Index;
 // A team that gives access to each member.
 class AskedTeam {
  public:
-  AskedTeam(const TeamGraph& graph, std::vector<SE3> start, TreeNewtonOptions options,
-            TeamShape shape = TeamShape::kAll)
+  AskedTeam(const TeamGraph& graph, std::vector<SE3> start, TreeNewtonOptions options)
       : graph_(graph),
         members_(graph.robots()),
         neighbours_(graph.robots()),
         meter_(graph.robots(), {}) {
     options.dimension = graph.dimension;
-    team_.emplace(
-        graph_, 3, std::move(start),
-        [this, options](SessionGraph part, TreePlace place) {
-          const RobotId self = part.self;
-          neighbours_[self] = {place.children.begin(), place.children.end()};
-          if (place.parent) neighbours_[self].insert(*place.parent);
-          auto member = std::make_unique<TreeNewton>(std::move(part), std::move(place), options);
-          members_[self] = member.get();
-          return std::make_unique<ObservedMember>(std::move(member),
-                                                  [this, self](const SolverMessage& message) {
-                                                    message_bytes_ += message.bytes->size();
-                                                    if (!neighbours_[self].contains(message.to))
-                                                      ++misaddressed_;
-                                                  });
-        },
-        shape);
+    team_.emplace(graph_, 3, std::move(start), [this, options](SessionGraph part, TreePlace place) {
+      const RobotId self = part.self;
+      neighbours_[self] = {place.children.begin(), place.children.end()};
+      if (place.parent) neighbours_[self].insert(*place.parent);
+      auto member = std::make_unique<TreeNewton>(std::move(part), std::move(place), options);
+      members_[self] = member.get();
+      return std::make_unique<ObservedMember>(std::move(member),
+                                              [this, self](const SolverMessage& message) {
+                                                message_bytes_ += message.bytes->size();
+                                                if (!neighbours_[self].contains(message.to))
+                                                  ++misaddressed_;
+                                              });
+    });
   }
   AskedTeam(const AskedTeam&) = delete;
   AskedTeam& operator=(const AskedTeam&) = delete;
@@ -155,10 +151,9 @@ TEST_CASE("Robots that have drifted keep the few closures between them", "[pgo]"
 }
 
 TEST_CASE("A solver message goes to one neighbour in the tree", "[pgo]") {
-  const TeamShape shape = GENERATE(TeamShape::kAll, TeamShape::kChain);
   std::mt19937 rng(3);
   const TeamGraph graph = noisy_chain(60, 4, 0.01, rng);
-  AskedTeam asked(graph, chordal_initialisation(graph.poses(), graph.edges), {}, shape);
+  AskedTeam asked(graph, chordal_initialisation(graph.poses(), graph.edges), {});
   REQUIRE(asked.run(100));
   CHECK(asked.misaddressed() == 0);
   std::size_t sent = 0, received = 0;
@@ -228,11 +223,10 @@ std::size_t groups_of(const TeamGraph& graph, const std::vector<bool>& kept) {
 }
 
 TEST_CASE("The robots of the tunnels estimate their noise and reach one frame", "[pgo]") {
-  const TeamShape shape = GENERATE(TeamShape::kAll, TeamShape::kChain);
   const auto folder = shared_data("multi_robot/tunnels_8robots");
   if (!folder) return;
   const TeamGraph graph = read_team_folder(*folder);
-  const AgentTeamRun run = run_agent_team(graph, {.shape = shape});
+  const AgentTeamRun run = run_agent_team(graph, {});
   CHECK(run.settled);
   CHECK(run.last.round <= 100);
   const std::vector<bool> odometry = odometry_edges(graph);

@@ -10,7 +10,6 @@
 #include "test/modules/outlier_rejection/chain.hpp"
 #include "test/modules/outlier_rejection/random_graph.hpp"
 #include "test/support/command.hpp"
-#include "test/support/page_text.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/temporary_folder.hpp"
 
@@ -33,25 +32,18 @@ std::string chain_g2o(int keyframes, const std::vector<std::pair<int, int>>& clo
   return text;
 }
 
-TEST_CASE("pcm prints a table and writes JSON and a plot", "[pcm]") {
+TEST_CASE("pcm prints a table and writes JSON", "[pcm]") {
   const TemporaryFolder folder;
   const std::string graph =
       folder.write("chain.g2o", chain_g2o(20, {{0, 5}, {2, 9}, {3, 15}})).string();
   const auto result = run_command(kPcmTool + graph + " --search exact batch --json " +
-                                  (folder.path() / "out.json").string() + " --plot " +
-                                  (folder.path() / "out.html").string());
+                                  (folder.path() / "out.json").string());
   CAPTURE(result.output);
   REQUIRE(result.exit_code == 0);
   CHECK_THAT(result.output, Contains("vertices  clique") &&
                                 Contains("exact search: 3 consistent") &&
                                 Contains("batch search: 3 consistent"));
   CHECK_THAT(folder.read("out.json"), Contains("\"search\": \"batch\""));
-  const Json plots = data_of_page(folder.read("out.html"), "plots")["charts"];
-  REQUIRE(plots.size() == 2);
-  CHECK(plots[0]["log_y"] == true);
-  REQUIRE(plots[1]["series"].size() == 3);
-  CHECK(plots[1]["series"][0]["name"] == "exact");
-  CHECK(plots[1]["series"][1]["points"].back() == Json::parse("[3.0, 3.0]"));
 }
 
 TEST_CASE("pcm reports the fault of its input", "[pcm]") {

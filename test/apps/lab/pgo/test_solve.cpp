@@ -53,9 +53,8 @@ TEST_CASE("Every method runs from the command line and prints its result", "[pgo
   const TemporaryFolder folder;
   const auto graph = folder.write("square.g2o", square_g2o());
   const auto json = folder.path() / "out.json";
-  const std::string method =
-      GENERATE("local", "dgs", "rbcd", "rbcd --links chain", "newton --trust-all",
-               "newton --trust-all --links chain", "centralized", "rbcd --over-relaxation 1");
+  const std::string method = GENERATE("local", "dgs", "rbcd", "newton --trust-all", "centralized",
+                                      "rbcd --over-relaxation 1");
   CAPTURE(method);
   const CommandResult result = run_command(kSolveTool + graph.string() + " --robots 2 --method " +
                                            method + " --json " + json.string());
@@ -138,7 +137,6 @@ TEST_CASE("solve refuses unusable input and options with the reason", "[pgo]") {
   const auto [pattern, message] = GENERATE(table<std::string, std::string>(
       {{"FILE --robots 9", "8 poses, which cannot be divided among 9 robots"},
        {"FILE --method dgs --over-relaxation 1.5", "--over-relaxation is for"},
-       {"FILE --links ring", "ring not in {all,chain}"},
        {"FILE --method newton --trust-all --barc 5", "--barc is for --method newton only, not"},
        {"FILE --method rbcd --barc 5", "--barc is for --method newton only, not for rbcd"},
        {"FILE --method rbcd --trust-all", "--trust-all is for --method newton only"},
