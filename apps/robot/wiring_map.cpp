@@ -78,9 +78,7 @@ void Robot::add_mesh_files(const std::filesystem::path& folder, ResultWriter& re
 CrossingEnds Robot::share_meshes(const RobotConfig& robot, const LabelPalette& palette) {
   const MapSharingConfig& config = robot.map;
   if (config.team == TeamMapMode::kOff) return {.send = false, .receive = false};
-  const bool coarse = config.team == TeamMapMode::kCoarse;
-  const double voxel_m = config.coarse_voxel_m;
-  team_map_ = &add<TeamMapNode>(false, voxel_m, palette,
+  team_map_ = &add<TeamMapNode>(false, palette,
                                 TeamMapTopics{.own_chunks = topics_.sent_chunks,
                                               .received_chunks = topics_.chunks.from_peers(),
                                               .own_poses = topics_.sent_mesh_poses,
@@ -89,7 +87,10 @@ CrossingEnds Robot::share_meshes(const RobotConfig& robot, const LabelPalette& p
   forward<MeshChunk>(topics_.sent_chunks, topics_.chunks.to_peers());
   forward<MeshPoses>(topics_.sent_mesh_poses, topics_.mesh_poses.to_peers());
   MeshChunksNode::Reduction reduction;
-  if (coarse) reduction = [voxel_m](const LabelledMesh& mesh) { return resampled(mesh, voxel_m); };
+  if (config.team == TeamMapMode::kCoarse)
+    reduction = [voxel_m = config.coarse_voxel_m](const LabelledMesh& mesh) {
+      return resampled(mesh, voxel_m);
+    };
   chunks_ = &add<MeshChunksNode>(false, config, identity_.robot,
                                  MeshChunksTopics{topics_.sent_chunks, topics_.sent_mesh_poses},
                                  std::move(reduction));

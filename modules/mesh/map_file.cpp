@@ -13,7 +13,7 @@
 namespace km {
 namespace {
 
-constexpr std::string_view kMagic = "KMMAP2\n\n";
+constexpr std::string_view kMagic = "KMMAP3\n\n";
 constexpr std::size_t kMaxElements = std::size_t{1} << 28U;
 
 std::uint64_t check_sum_of(std::span<const std::uint8_t> bytes) {
@@ -40,6 +40,7 @@ void describe(auto& archive, As<MapMesh> auto& map) {
   tuples(map.seen_by);
   numbers(map.ids);
   numbers(map.certainty);
+  numbers(map.levels);
 }
 
 }  // namespace
@@ -50,7 +51,8 @@ const char* fault_of(const MapMesh& map) {
   const auto fits = [vertices](std::size_t size) { return size == 0 || size == vertices; };
   if (!std::isfinite(map.voxel_m) || map.voxel_m < 0.0) return "voxels have no size";
   if (map.seen_by.size() != vertices || !fits(map.mesh.labels.size()) ||
-      !fits(map.mesh.colors.size()) || !fits(map.ids.size()) || !fits(map.certainty.size()))
+      !fits(map.mesh.colors.size()) || !fits(map.ids.size()) || !fits(map.certainty.size()) ||
+      !fits(map.levels.size()))
     return "lists have other lengths than the vertices";
   for (const Eigen::Vector3f& v : map.mesh.vertices)
     if (!v.allFinite() || v.cwiseAbs().maxCoeff() >= kFarthest_m)

@@ -27,10 +27,14 @@ struct MapMesh {
   /// vertices, or empty if all are equal.
   std::vector<std::uint8_t> certainty = {};
 
+  /// Each vertex is from voxels of side 2^level * voxel_m. As long as the vertices, or empty if all
+  /// levels are 0.
+  std::vector<std::uint8_t> levels = {};
+
   /// How far the camera saw, in order of time; none: unknown.
   std::vector<std::shared_ptr<const CoarseView>> views = {};
 
-  /// Side of the voxels the mesh was made from [m]; 0: unknown.
+  /// Side of the smallest voxels the mesh was made from [m]; 0: unknown.
   double voxel_m = 0.0;
 };
 

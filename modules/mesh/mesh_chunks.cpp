@@ -19,6 +19,7 @@ using Face = LabelledMesh::Face;
 constexpr double kFarthest_steps = 1U << 30U;  // so that the sum of three fits into 64 bits
 constexpr std::int64_t kMaxOffset = std::numeric_limits<std::uint16_t>::max();
 constexpr std::int64_t kThirdOfMaxOffset = kMaxOffset / 3;
+constexpr float kMaxVoxel_m = 64.0F;
 constexpr double kFarthest_m = 1e7;  // bound on a robot's distance from the origin of a frame
 
 std::vector<GridPoint> quantise(const std::vector<Eigen::Vector3f>& vertices, double step_m) {
@@ -134,6 +135,7 @@ class Splitter {
            const MeshOrigin* origin)
       : mesh_(mesh),
         blank_(blank),
+        levels_(origin == nullptr ? std::span<const std::uint8_t>() : origin->levels),
         views_(origin),
         cell_steps_(static_cast<std::int64_t>(std::round(grid.cell_m / grid.step_m))),
         points_(quantise(mesh.vertices, static_cast<double>(blank.step_m))),
@@ -145,13 +147,16 @@ class Splitter {
   SplitMesh split() {
     sort_into_cells();
     for (auto& [cell, faces] : faces_of_cell_) {
-      std::ranges::sort(faces);
+      std::ranges::sort(faces, {},
+                        [this](const Face& face) { return std::pair(level(face), face); });
       add_cell(cell, faces);
     }
     return std::move(pieces_);
   }
 
  private:
+  [[nodiscard]] int level(const Face& face) const { return levels_.empty() ? 0 : levels_[face[0]]; }
+
   [[nodiscard]] bool fits_offsets(const Face& face) const {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const auto [low, high] =
@@ -217,6 +222,7 @@ class Splitter {
               views_.largest_bytes(vertices.size() + fresh) >
           kMaxChunkBytes)
         break;
+      if (level(faces[end]) != level(faces[begin])) break;
       // Surfaces of two visits may be in one cell before the deformation, and apart after it.
       for (const std::uint32_t v : faces[end]) range.extend(points_[v]);
       if (!range.fits()) break;
@@ -231,6 +237,7 @@ class Splitter {
     std::ranges::sort(vertices);
     MeshChunk chunk = blank_;
     chunk.key = key;
+    chunk.voxel_m = std::min(std::ldexp(chunk.voxel_m, level(faces.front())), kMaxVoxel_m);
     chunk.origin = points_[vertices.front()];
     for (const std::uint32_t v : vertices)
       for (std::size_t axis = 0; axis < 3; ++axis)
@@ -252,6 +259,7 @@ class Splitter {
 
   const LabelledMesh& mesh_;
   const MeshChunk& blank_;
+  std::span<const std::uint8_t> levels_;
   const ChunkViews views_;
   std::int64_t cell_steps_;
   std::vector<GridPoint> points_;
@@ -265,7 +273,8 @@ class Splitter {
 
 void check(const MeshOrigin& origin, const LabelledMesh& mesh) {
   const std::size_t vertices = mesh.vertices.size();
-  if (origin.seen_by.size() != vertices || origin.mapped.size() != vertices)
+  if (origin.seen_by.size() != vertices || origin.mapped.size() != vertices ||
+      !(origin.levels.empty() || origin.levels.size() == vertices))
     throw std::invalid_argument("mesh chunks: an origin of " +
                                 std::to_string(origin.seen_by.size()) + " vertices for " +
                                 std::to_string(vertices));
@@ -333,7 +342,7 @@ const char* fault_of(const MeshChunk& chunk) {
   if (chunk.faces.empty() != chunk.offsets.empty()) return "vertices without faces";
   if (const char* fault = fault_of(chunk.keyframes)) return fault;
   if (const char* fault = fault_of_views(chunk)) return fault;
-  if (!(chunk.voxel_m == 0.0F || (chunk.voxel_m >= 0.005F && chunk.voxel_m <= 1.0F)))
+  if (!(chunk.voxel_m == 0.0F || (chunk.voxel_m >= 0.005F && chunk.voxel_m <= kMaxVoxel_m)))
     return "voxels of an unusual size";
   if (!are_positions_usable(chunk)) return "positions are not finite or too far away";
   return nullptr;

@@ -43,7 +43,7 @@ struct MeshChunk {
   std::uint64_t boot = 0;  ///< Boot id of the sender; only set in received chunks.
   RobotId anchor = 0;      ///< Robot whose odometry frame is `world`.
   float step_m = 0.001F;
-  float voxel_m = 0.0F;  ///< Side of the voxels of the sender's map; 0: unknown.
+  float voxel_m = 0.0F;  ///< Side of the voxels the surface was made from; 0: unknown.
   std::array<std::int32_t, 3> origin = {0, 0, 0};  ///< [step_m] in `world`.
   std::vector<Triple> offsets = {};                ///< Offset of each vertex [step_m].
   std::vector<LabelId> labels = {};                ///< Label of each vertex, or empty.
@@ -111,7 +111,7 @@ struct SplitMesh {
 /// With an `origin`, chunks have the keyframes that move them: every mesh_keyframe_step()-th one of
 /// the trajectory, or less if a chunk had more than kMaxChunkKeyframes of them. Cells are then
 /// those of the positions before the deformation, so that a correction moves no face to another
-/// cell.
+/// cell. Surface from voxels of different sizes is in different chunks.
 ///
 /// Throws std::invalid_argument for a grid that is not positive and for cells that are no longer
 /// than a step. Also throws it for a vertex that is not finite or beyond 2^30 steps, and for a face

@@ -17,7 +17,8 @@ struct MeshOrigin {
   std::vector<SE3> T_world_kf;  ///< Poses with which the mesh was placed; all of these keyframes.
   /// Position of each vertex before the deformation, in the robot's odometry frame [m].
   std::vector<Eigen::Vector3f> mapped = {};
-  double voxel_m = 0.0;  ///< Side of the voxels of the map [m]; 0: unknown.
+  double voxel_m = 0.0;  ///< Side of the smallest voxels of the map [m]; 0: unknown.
+  std::vector<std::uint8_t> levels = {};  ///< MapMesh::levels of the vertices.
 };
 
 }  // namespace km

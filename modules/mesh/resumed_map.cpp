@@ -20,6 +20,7 @@ void drop_unused(MapMesh& map) {
   keep_elements(map.seen_by, kept);
   keep_elements(map.ids, kept);
   keep_elements(map.certainty, kept);
+  keep_elements(map.levels, kept);
 }
 
 }  // namespace
@@ -36,6 +37,7 @@ MapMesh ResumedMap::with(const MapMesh& now) const {
   both.mesh.append(now.mesh);
   append_elements(both.seen_by, first, now.seen_by, added);
   append_elements(both.certainty, first, now.certainty, added);
+  append_elements(both.levels, first, now.levels, added);
   for (const std::uint64_t id : now.ids) both.ids.push_back(next_id_ + id);
   if (now.voxel_m > 0.0) both.voxel_m = now.voxel_m;
   both.views = now.views;

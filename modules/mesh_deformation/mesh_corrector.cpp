@@ -151,6 +151,7 @@ MeshCorrection MeshCorrector::deform(const CorrectionInput& input, std::vector<S
   origin_.seen_by = elements_of(map.seen_by, kept);
   origin_.mapped = elements_of(map.mesh.vertices, kept);
   origin_.voxel_m = map.voxel_m;
+  origin_.levels = elements_of(map.levels, kept);
   const std::size_t superseded = present - optimized_.faces.size();
   return {optimized_, report_, true, std::move(dropped), superseded, all - present, origin_};
 }

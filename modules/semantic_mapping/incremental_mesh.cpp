@@ -162,6 +162,7 @@ void IncrementalMesh::mesh_block(VoxelBlock& block, BlockMap& map,
                             MarchingCubes::axis_of_edge(triangle[i]), block);
             face[i] = vertex;
             ++vertices_[vertex].uses;
+            vertices_[vertex].level = static_cast<std::uint8_t>(finer.size());
           }
           if (block.mesh == nullptr) block.mesh = std::make_unique<BlockMesh>();
           block.mesh->faces.push_back(face);
@@ -383,6 +384,7 @@ MapMesh IncrementalMesh::snapshot(std::span<const BlockMap> maps, bool labelled,
     map_mesh.seen_by.push_back({vertex.first, vertex.last});
     map_mesh.ids.push_back(vertex.id);
     map_mesh.certainty.push_back(vertex.certainty);
+    map_mesh.levels.push_back(vertex.level);
   }
   mesh.faces.reserve(faces_);
   const auto add = [&](const std::vector<Face>& faces) {

@@ -76,7 +76,7 @@ class IncrementalMesh {
     KeyframeIndex first = 0, last = 0;
     std::uint32_t computed = 0;  // number of the update in which position and labels were computed
     std::uint16_t edge = 0;      // index of the edge in the owner
-    std::uint8_t certainty = 0;  // see MapMesh
+    std::uint8_t certainty = 0, level = 0;  // see MapMesh
   };
 
   std::size_t mesh_blocks(const std::vector<VoxelBlock*>& blocks, BlockMap& map,

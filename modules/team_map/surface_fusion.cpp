@@ -48,6 +48,14 @@ std::pair<Eigen::Vector3f, float> bounding_sphere(const std::array<Eigen::Vector
   return {center, 1.001F * std::sqrt(radius2)};
 }
 
+// Colour of the corner nearest to a point.
+LabelledMesh::Color color_at(const RobotSurface::Triangle& triangle, const Eigen::Vector3f& p) {
+  std::array<float, 3> distances2 = {};
+  for (std::size_t c = 0; c < 3; ++c) distances2[c] = (triangle.corners[c] - p).squaredNorm();
+  return triangle
+      .colors[static_cast<std::size_t>(std::ranges::min_element(distances2) - distances2.begin())];
+}
+
 std::size_t index_of(int x, int y, int z, int side) {
   return static_cast<std::size_t>(x + side * (y + side * z));
 }
@@ -72,16 +80,21 @@ Eigen::Vector3f SurfaceFusion::position(int x, int y, int z) const {
 }
 
 FusedBox SurfaceFusion::fuse(const std::array<std::int32_t, 3>& box,
-                             std::span<const RobotSurface> surfaces) {
+                             std::span<const RobotSurface> surfaces,
+                             std::span<const RobotSurface::Triangle> finer) {
   for (std::size_t axis = 0; axis < 3; ++axis) first_[axis] = kSide * box[axis];
-  observations_.resize(std::max(observations_.size(), surfaces.size()));
-  for (std::size_t k = 0; k < surfaces.size(); ++k) {
-    observations_[k].assign(kCorners * kCorners * kCorners, {});
-    for (const RobotSurface::Triangle& triangle : surfaces[k].triangles)
-      observe(triangle, observations_[k]);
-  }
-  blend(std::span(observations_).first(surfaces.size()));
+  const std::size_t robots = surfaces.size();
+  observations_.resize(std::max(observations_.size(), robots + 1));
+  for (std::size_t k = 0; k < robots; ++k) observe(surfaces[k].triangles, observations_[k]);
+  observe(finer, observations_[robots]);
+  blend(std::span(observations_).first(robots), observations_[robots]);
   return extract();
+}
+
+void SurfaceFusion::observe(std::span<const RobotSurface::Triangle> triangles,
+                            std::vector<Observation>& observations) const {
+  observations.assign(kCorners * kCorners * kCorners, {});
+  for (const RobotSurface::Triangle& triangle : triangles) observe(triangle, observations);
 }
 
 // Enters the triangle into the voxels of the box to which it is nearest. Several triangles that
@@ -123,11 +136,13 @@ void SurfaceFusion::observe(const RobotSurface::Triangle& triangle,
         const float cosine = distance > same_m ? std::abs(height) / distance : 1.0F;
         const bool nearer = now.cosine < 0.0F || distance < before - same_m;
         if (!nearer && !(distance <= before + same_m && cosine > now.cosine)) continue;
-        now = {std::copysign(distance, height), cosine, normal, triangle.label, triangle.color};
+        now = {std::copysign(distance, height), cosine, normal, triangle.label,
+               color_at(triangle, voxel)};
       }
 }
 
-void SurfaceFusion::blend(std::span<const std::vector<Observation>> robots) {
+void SurfaceFusion::blend(std::span<const std::vector<Observation>> robots,
+                          std::span<const Observation> finer) {
   fused_.assign(kCorners * kCorners * kCorners, {});
   for (std::size_t v = 0; v < fused_.size(); ++v) {
     const Observation* nearest = nullptr;
@@ -160,7 +175,7 @@ void SurfaceFusion::blend(std::span<const std::vector<Observation>> robots) {
         label = seen.label;
       }
     }
-    fused_[v] = {sum / static_cast<float>(count), label, {}, true};
+    fused_[v] = {sum / static_cast<float>(count), label, {}, true, counts(finer[v])};
     for (std::size_t c = 0; c < 3; ++c)
       fused_[v].color[c] = static_cast<std::uint8_t>(color[c] / count);
   }
@@ -197,13 +212,14 @@ FusedBox SurfaceFusion::extract() const {
     for (int y = 0; y < kSide; ++y)
       for (int x = 0; x < kSide; ++x) {
         unsigned negative = 0;
-        bool known = true;
+        bool known = true, is_finer = true;
         for (int c = 0; c < 8 && known; ++c) {
           const Fused& corner = at(x + (c & 1), y + (c >> 1 & 1), z + (c >> 2 & 1));
           known = corner.known;
+          is_finer = is_finer && corner.is_finer;
           if (corner.distance_m < 0.0F) negative |= 1U << static_cast<unsigned>(c);
         }
-        if (!known) continue;
+        if (!known || is_finer) continue;
         for (const MarchingCubes::Triangle& triangle : cubes_.triangles(negative)) {
           LabelledMesh::Face face;
           for (std::size_t i = 0; i < 3; ++i) {

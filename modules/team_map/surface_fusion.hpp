@@ -18,7 +18,7 @@ struct RobotSurface {
   struct Triangle {
     std::array<Eigen::Vector3f, 3> corners;  ///< [m], counter-clockwise seen from free space.
     LabelId label = 0;
-    LabelledMesh::Color color = {0, 0, 0};
+    std::array<LabelledMesh::Color, 3> colors = {};  ///< Colours of the corners.
   };
   RobotId robot = 0;
   std::vector<Triangle> triangles;
@@ -54,6 +54,9 @@ struct FusedBox {
 /// border of a surface has no distance if its direction from the nearest point is more than 60
 /// degrees from the normal. A surface therefore grows by at most a voxel at its border.
 ///
+/// Surface is left out where a finer one, from smaller voxels, is in the band and has a similar
+/// normal.
+///
 /// The result depends on the triangles and their order alone, bit by bit.
 class SurfaceFusion {
  public:
@@ -73,8 +76,10 @@ class SurfaceFusion {
   [[nodiscard]] float reach_m() const { return (kBand_voxels + 1.0F) * voxel_m_; }
 
   /// `surfaces`: by ascending robot, all triangles within reach_m() of the box; others do no harm.
+  /// `finer`: those of smaller voxels.
   [[nodiscard]] FusedBox fuse(const std::array<std::int32_t, 3>& box,
-                              std::span<const RobotSurface> surfaces);
+                              std::span<const RobotSurface> surfaces,
+                              std::span<const RobotSurface::Triangle> finer = {});
 
  private:
   static constexpr int kCorners = kSide + 1;
@@ -92,11 +97,14 @@ class SurfaceFusion {
     LabelId label = 0;
     LabelledMesh::Color color = {0, 0, 0};
     bool known = false;
+    bool is_finer = false;  // a finer surface is here
   };
 
   void observe(const RobotSurface::Triangle& triangle,
                std::vector<Observation>& observations) const;
-  void blend(std::span<const std::vector<Observation>> robots);
+  void observe(std::span<const RobotSurface::Triangle> triangles,
+               std::vector<Observation>& observations) const;
+  void blend(std::span<const std::vector<Observation>> robots, std::span<const Observation> finer);
   [[nodiscard]] FusedBox extract() const;
   [[nodiscard]] Eigen::Vector3f position(int x, int y, int z) const;
 

@@ -29,17 +29,13 @@ LabelId label_of(const MeshChunk& chunk, const MeshChunk::Triple& face) {
   return b == c ? b : a;
 }
 
-// The mean of the corners; black without colours.
-LabelledMesh::Color color_of(const MeshChunk& chunk, const MeshChunk::Triple& face) {
-  LabelledMesh::Color mean = {0, 0, 0};
-  if (chunk.colors.empty()) return mean;
-  std::array<unsigned, 3> sum = {};
-  for (const std::uint16_t corner : face) {
-    const LabelledMesh::Color color = unpacked_color(chunk.colors[corner]);
-    for (std::size_t c = 0; c < 3; ++c) sum[c] += color[c];
-  }
-  for (std::size_t c = 0; c < 3; ++c) mean[c] = static_cast<std::uint8_t>(sum[c] / 3);
-  return mean;
+// Black without colours.
+std::array<LabelledMesh::Color, 3> colors_of(const MeshChunk& chunk,
+                                             const MeshChunk::Triple& face) {
+  std::array<LabelledMesh::Color, 3> colors = {};
+  if (!chunk.colors.empty())
+    for (std::size_t c = 0; c < 3; ++c) colors[c] = unpacked_color(chunk.colors[face[c]]);
+  return colors;
 }
 
 Eigen::AlignedBox3f bounds_of(const std::array<Eigen::Vector3f, 3>& corners, float margin_m) {
@@ -57,31 +53,43 @@ bool is_left_out(const Eigen::AlignedBox3f& bounds, const SurfaceFusion& fusion)
          !(bounds.min().minCoeff() > -kFarthest_m && bounds.max().maxCoeff() < kFarthest_m);
 }
 
-// Chunks by the boxes that their faces may change, in ascending order of their keys.
-using ChunksOfBoxes = std::map<Box, std::vector<const PlacedChunk*>>;
+// Chunks with faces near a box, in ascending order of their keys.
+struct NearChunks {
+  std::vector<const PlacedChunk*> own;    // chunks of the level of the box
+  std::vector<const PlacedChunk*> finer;  // chunks from smaller voxels
+};
 
-void enter(const PlacedChunk& chunk, const SurfaceFusion& fusion, ChunksOfBoxes& boxes,
-           Eigen::AlignedBox3f& extent) {
-  std::pair<Box, Box> last;
-  bool is_first = true;
+// By level and box: the voxels of level k are 2^k times as large as the smallest.
+using ChunksOfBoxes = std::map<std::pair<int, Box>, NearChunks>;
+
+// Calls visit(box) for the boxes that the faces of the chunk may change, some of them repeatedly.
+// Returns the extent of these faces.
+template <typename Visit>
+Eigen::AlignedBox3f visit_boxes(const PlacedChunk& chunk, const SurfaceFusion& fusion,
+                                const Visit& visit) {
+  Eigen::AlignedBox3f extent;
+  std::optional<std::pair<Box, Box>> last;
   for (const MeshChunk::Triple& face : chunk.chunk->faces) {
     const Eigen::AlignedBox3f bounds = bounds_of(corners_of(chunk, face), fusion.reach_m());
     if (is_left_out(bounds, fusion)) continue;
     extent.extend(bounds);
     const std::pair<Box, Box> range{fusion.box_of(bounds.min()), fusion.box_of(bounds.max())};
     // Neighbours in the list are usually neighbours in space.
-    if (!std::exchange(is_first, false) && range == last) continue;
+    if (last == range) continue;
     last = range;
     const auto& [low, high] = range;
     for (std::int32_t x = low[0]; x <= high[0]; ++x)
       for (std::int32_t y = low[1]; y <= high[1]; ++y)
-        for (std::int32_t z = low[2]; z <= high[2]; ++z) {
-          std::vector<const PlacedChunk*>& near = boxes[{x, y, z}];
-          if (near.empty() || near.back() != &chunk) near.push_back(&chunk);
-        }
+        for (std::int32_t z = low[2]; z <= high[2]; ++z) visit(Box{x, y, z});
   }
+  return extent;
 }
 
+void add_once(std::vector<const PlacedChunk*>& chunks, const PlacedChunk& chunk) {
+  if (chunks.empty() || chunks.back() != &chunk) chunks.push_back(&chunk);
+}
+
+// The surface of each robot near a box.
 std::vector<RobotSurface> surfaces_near(const Box& box,
                                         const std::vector<const PlacedChunk*>& chunks,
                                         const SurfaceFusion& fusion) {
@@ -98,7 +106,7 @@ std::vector<RobotSurface> surfaces_near(const Box& box,
       const Eigen::AlignedBox3f bounds = bounds_of(corners, fusion.reach_m());
       if (space.intersects(bounds) && !is_left_out(bounds, fusion))
         surfaces.back().triangles.push_back(
-            {corners, label_of(chunk, face), color_of(chunk, face)});
+            {corners, label_of(chunk, face), colors_of(chunk, face)});
     }
   }
   return surfaces;
@@ -131,19 +139,24 @@ class BoxJoiner {
   std::map<GridEdge, std::uint32_t> shared_;
 };
 
-// The voxels that the chunks state, see fuse_chunks().
-std::optional<double> stated_voxel_m(const std::vector<PlacedChunk>& chunks) {
+// The side of the smallest voxels, see fuse_chunks().
+double finest_voxel_m(const std::vector<PlacedChunk>& chunks) {
   std::map<RobotId, float> of_robot;
   for (const PlacedChunk& chunk : chunks)
-    if (chunk.chunk->voxel_m > 0.0F) {
-      float& largest = of_robot[chunk.chunk->key.robot];
-      largest = std::max(largest, chunk.chunk->voxel_m);
+    if (const float voxel_m = chunk.chunk->voxel_m; voxel_m > 0.0F) {
+      float& smallest = of_robot.try_emplace(chunk.chunk->key.robot, voxel_m).first->second;
+      smallest = std::min(smallest, voxel_m);
     }
-  if (of_robot.empty()) return std::nullopt;
-  std::vector<float> sizes;
+  std::vector<float> sizes = {};
   for (const auto& [robot, size] : of_robot) sizes.push_back(size);
   std::ranges::sort(sizes);
-  return static_cast<double>(sizes[sizes.size() / 2]);  // the coarser of two
+  return sizes.empty() ? 0.1 : static_cast<double>(sizes[sizes.size() / 2]);
+}
+
+int level_of(const MeshChunk& chunk, double finest_m) {
+  constexpr int kLevels = 8;
+  const double ratio = static_cast<double>(chunk.voxel_m) / finest_m;
+  return ratio > 1.0 ? std::min(static_cast<int>(std::lround(std::log2(ratio))), kLevels - 1) : 0;
 }
 
 // The key with the largest value, the lowest of several; 0 without any.
@@ -187,24 +200,26 @@ std::size_t limit(ChunksOfBoxes& boxes, std::size_t max_boxes) {
         action(near[k]->chunk->key.robot);
   };
   for (const auto& [box, near] : boxes)
-    for_each_robot(near, [&](RobotId robot) { ++counts[robot]; });
+    for_each_robot(near.own, [&](RobotId robot) { ++counts[robot]; });
   std::vector<std::size_t> sizes;
   for (const auto& [robot, count] : counts) sizes.push_back(count);
   const std::size_t share = share_of(sizes, max_boxes);
   std::size_t lost = 0;
   for (auto& [box, near] : boxes) {
-    for_each_robot(near, [&](RobotId robot) { lost += ++taken[robot] > share ? 1U : 0U; });
-    std::erase_if(
-        near, [&](const PlacedChunk* placed) { return taken[placed->chunk->key.robot] > share; });
+    for_each_robot(near.own, [&](RobotId robot) { lost += ++taken[robot] > share ? 1U : 0U; });
+    std::erase_if(near.own, [&](const PlacedChunk* placed) {
+      return taken[placed->chunk->key.robot] > share;
+    });
   }
-  std::erase_if(boxes, [](const auto& entry) { return entry.second.empty(); });
+  std::erase_if(boxes, [](const auto& entry) { return entry.second.own.empty(); });
   return lost;
 }
 
 }  // namespace
 
-TeamMap fuse_chunks(const std::vector<PlacedChunk>& chunks, double voxel_m, std::size_t max_boxes) {
-  SurfaceFusion fusion(stated_voxel_m(chunks).value_or(voxel_m));
+TeamMap fuse_chunks(const std::vector<PlacedChunk>& chunks, std::size_t max_boxes) {
+  const double finest_m = finest_voxel_m(chunks);
+  std::map<int, SurfaceFusion> fusions;  // by level
   TeamMap map{.anchor = anchor_of(chunks), .mesh = {}, .extents = {}};
   ChunksOfBoxes boxes;
   bool is_labelled = false, is_coloured = false;
@@ -213,15 +228,34 @@ TeamMap fuse_chunks(const std::vector<PlacedChunk>& chunks, double voxel_m, std:
       ++map.other_frames;
       continue;
     }
-    enter(chunk, fusion, boxes, map.extents[chunk.chunk->key.robot]);
+    const int level = level_of(*chunk.chunk, finest_m);
+    const SurfaceFusion& fusion =
+        fusions.try_emplace(level, std::ldexp(finest_m, level)).first->second;
+    map.extents[chunk.chunk->key.robot].extend(visit_boxes(chunk, fusion, [&](const Box& box) {
+      add_once(boxes[{level, box}].own, chunk);
+    }));
     is_labelled = is_labelled || !chunk.chunk->labels.empty();
     is_coloured = is_coloured || !chunk.chunk->colors.empty();
   }
   std::erase_if(map.extents, [](const auto& entry) { return entry.second.isEmpty(); });
   map.left_out = limit(boxes, max_boxes);
-  BoxJoiner joiner(map.mesh);
-  for (const auto& [box, near] : boxes)
-    joiner.append(fusion.fuse(box, surfaces_near(box, near, fusion)));
+  for (const PlacedChunk& chunk : chunks)
+    for (const auto& [level, fusion] : fusions)
+      if (chunk.anchor == map.anchor && level > level_of(*chunk.chunk, finest_m))
+        visit_boxes(chunk, fusion, [&](const Box& box) {
+          if (const auto found = boxes.find({level, box}); found != boxes.end())
+            add_once(found->second.finer, chunk);
+        });
+  std::map<int, BoxJoiner> joiners;
+  for (const auto& [place, near] : boxes) {
+    const auto& [level, box] = place;
+    SurfaceFusion& fusion = fusions.at(level);
+    std::vector<RobotSurface::Triangle> finer;
+    for (const RobotSurface& surface : surfaces_near(box, near.finer, fusion))
+      finer.insert(finer.end(), surface.triangles.begin(), surface.triangles.end());
+    joiners.try_emplace(level, map.mesh)
+        .first->second.append(fusion.fuse(box, surfaces_near(box, near.own, fusion), finer));
+  }
   if (!is_labelled) map.mesh.labels.clear();
   if (!is_coloured) map.mesh.colors.clear();
   return map;
@@ -261,10 +295,13 @@ Eigen::AlignedBox2f plan_of(const std::map<RobotId, Eigen::AlignedBox3f>& extent
 }
 
 LabelledMesh resampled(const LabelledMesh& mesh, double voxel_m) {
-  const SplitMesh pieces = split_mesh(mesh, 0, 0, {});
+  SplitMesh pieces = split_mesh(mesh, 0, 0, {});
   std::vector<PlacedChunk> chunks;
-  for (const MeshChunk& chunk : pieces.chunks) chunks.push_back(place(chunk, nullptr));
-  return fuse_chunks(chunks, voxel_m).mesh;
+  for (MeshChunk& chunk : pieces.chunks) {
+    chunk.voxel_m = static_cast<float>(voxel_m);
+    chunks.push_back(place(chunk, nullptr));
+  }
+  return fuse_chunks(chunks).mesh;
 }
 
 }  // namespace km

@@ -37,10 +37,11 @@ inline constexpr std::size_t kMaxMapBoxes = std::size_t{1} << 17U;
 /// The result depends on the placed chunks and the voxels alone, bit by bit (on processors with the
 /// same arithmetic). Two robots with the same chunks and poses therefore have the same map.
 ///
-/// The voxels are those of the robots' maps: for each robot the largest that its chunks state, and
-/// of these the median, the coarser one of two. Without statements they have `voxel_m`. Throws
-/// std::invalid_argument if this is not positive.
-[[nodiscard]] TeamMap fuse_chunks(const std::vector<PlacedChunk>& chunks, double voxel_m,
+/// Chunks are fused in voxels of the size that they state, rounded to the smallest one, twice, four
+/// times as large and so on. Surface is left out if there is surface from smaller voxels at its
+/// place. The smallest size is the median of the smallest sizes of the robots, the coarser one of
+/// two. Chunks that state none have this size. It is 0.1 m if no chunk states one.
+[[nodiscard]] TeamMap fuse_chunks(const std::vector<PlacedChunk>& chunks,
                                   std::size_t max_boxes = kMaxMapBoxes);
 
 /// The plan of the map with as many robots as have room together in `max_cells` squares of
@@ -49,8 +50,7 @@ inline constexpr std::size_t kMaxMapBoxes = std::size_t{1} << 17U;
 [[nodiscard]] Eigen::AlignedBox2f plan_of(const std::map<RobotId, Eigen::AlignedBox3f>& extents,
                                           double cell_m, double max_cells);
 
-/// A mesh on its own in voxels of another size. Throws under the conditions of split_mesh() and
-/// fuse_chunks().
+/// A mesh on its own in voxels of another size. Throws under the conditions of split_mesh().
 [[nodiscard]] LabelledMesh resampled(const LabelledMesh& mesh, double voxel_m);
 
 }  // namespace km

@@ -86,7 +86,12 @@ void MeshChunksNode::take(const MeshOffer& offer) {
 }
 
 SplitMesh MeshChunksNode::split(const MeshOffer& offer) const {
-  if (reduction_) return split_mesh(reduction_(*offer.mesh), self_, offer.anchor, {});
+  if (reduction_) {
+    SplitMesh pieces = split_mesh(reduction_(*offer.mesh), self_, offer.anchor, {});
+    for (MeshChunk& chunk : pieces.chunks)
+      chunk.voxel_m = static_cast<float>(config_.coarse_voxel_m);
+    return pieces;
+  }
   return split_mesh(*offer.mesh, self_, offer.anchor, {}, offer.origin.get());
 }
 

@@ -14,9 +14,8 @@ constexpr std::size_t kQueue = 4096;
 
 }  // namespace
 
-TeamMapNode::TeamMapNode(double voxel_m, LabelPalette palette, const TeamMapTopics& topics)
+TeamMapNode::TeamMapNode(LabelPalette palette, const TeamMapTopics& topics)
     : WorkerNode({.name = "team_map", .queue = kQueue, .in_background = true}),
-      voxel_m_(voxel_m),
       palette_(std::move(palette)) {
   follow(topics.own_chunks, topics.received_chunks, topics.own_poses, topics.received_poses);
 }
@@ -35,7 +34,7 @@ void TeamMapNode::handle(const Input& input) {
 
 TeamMap TeamMapNode::fuse() const {
   const std::lock_guard lock(mutex_);
-  TeamMap map = fuse_chunks(chunks_.placed(), voxel_m_);
+  TeamMap map = fuse_chunks(chunks_.placed());
   if (map.mesh.colors.empty() && !palette_.classes().empty() && !map.mesh.labels.empty())
     map.mesh.colour_by(palette_);
   return map;

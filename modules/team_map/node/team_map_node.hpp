@@ -24,7 +24,7 @@ class TeamMapNode final
     : public WorkerNode<std::variant<Topic<MeshChunk>::Message, Topic<MeshPoses>::Message>> {
  public:
   /// `palette` colours the mesh, if it has classes.
-  TeamMapNode(double voxel_m, LabelPalette palette, const TeamMapTopics& topics);
+  TeamMapNode(LabelPalette palette, const TeamMapTopics& topics);
   ~TeamMapNode() override { stop(); }
 
   [[nodiscard]] const LabelPalette& palette() const { return palette_; }
@@ -36,7 +36,6 @@ class TeamMapNode final
  private:
   void handle(const Input& input) override;
 
-  const double voxel_m_;
   const LabelPalette palette_;
   mutable std::mutex mutex_;  // guards chunks_
   TeamMesh chunks_;

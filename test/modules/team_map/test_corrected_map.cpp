@@ -20,7 +20,6 @@ namespace km {
 namespace {
 
 constexpr RobotId kMapper = 2;
-constexpr double kFusedVoxel_m = 0.1;
 
 // A floor of 20 m by 2 m, with vertices 10 cm and keyframes 20 cm apart.
 constexpr SheetSize kFloor{.columns = 200, .rows = 20, .step_m = 0.1, .keyframe_step_m = 0.2};

@@ -13,7 +13,7 @@
 namespace km {
 namespace {
 
-constexpr double kMapVoxel_m = 0.05;
+constexpr float kMapVoxel_m = 0.05F;
 
 // Waves over a floor of 4 m x 3 m, from x = `from_m` on, lifted by `lift_m`.
 LabelledMesh floor_from(float from_m, float lift_m, LabelId label = 1) {
@@ -37,16 +37,29 @@ LabelledMesh floor_from(float from_m, float lift_m, LabelId label = 1) {
 std::vector<MeshChunk> chunks_of(const LabelledMesh& mesh, RobotId robot, std::uint64_t boot = 1,
                                  RobotId anchor = 0) {
   std::vector<MeshChunk> chunks = split_mesh(mesh, robot, anchor, {}).chunks;
-  for (MeshChunk& chunk : chunks) chunk.boot = boot;
+  for (MeshChunk& chunk : chunks) {
+    chunk.boot = boot;
+    chunk.voxel_m = kMapVoxel_m;
+  }
   return chunks;
 }
 
 LabelledMesh fused(const TeamMesh& team) {
-  return fuse_chunks(team.placed(), kMapVoxel_m).mesh;
+  return fuse_chunks(team.placed()).mesh;
 }
 
 void add_all(TeamMesh& team, const std::vector<MeshChunk>& chunks) {
   for (const MeshChunk& chunk : chunks) CHECK(team.add(chunk) == ChunkVerdict::kTaken);
+}
+
+double area_of(const LabelledMesh& mesh) {
+  double area = 0.0;
+  for (const auto& [a, b, c] : mesh.faces)
+    area +=
+        0.5 *
+        std::abs(
+            (mesh.vertices[b] - mesh.vertices[a]).cross(mesh.vertices[c] - mesh.vertices[a]).z());
+  return area;
 }
 
 bool are_equal(const LabelledMesh& a, const LabelledMesh& b) {
@@ -60,13 +73,7 @@ TEST_CASE("Copies of a floor are fused between them, and every part is there onc
   add_all(team, chunks_of(floor_from(0.0F, 0.0F), 0));
   add_all(team, chunks_of(floor_from(2.0F, 0.04F), 1));
   const LabelledMesh mesh = fused(team);
-  double area = 0.0;
-  for (const auto& [a, b, c] : mesh.faces)
-    area +=
-        0.5 *
-        std::abs(
-            (mesh.vertices[b] - mesh.vertices[a]).cross(mesh.vertices[c] - mesh.vertices[a]).z());
-  CHECK(area == Approx(6.0 * 3.0).epsilon(0.03));
+  CHECK(area_of(mesh) == Approx(6.0 * 3.0).epsilon(0.03));
   for (const Eigen::Vector3f& p : mesh.vertices) {
     const float height = p.z() - 0.2F * std::sin(p.x()) * std::cos(p.y());
     const float expected = p.x() < 1.8F ? 0.0F : p.x() < 4.2F ? 0.02F : 0.04F;
@@ -83,12 +90,11 @@ TEST_CASE("The fused map has the colours of its chunks, and the median of their 
     LabelledMesh floor = floor_from(0.0F, 0.0F);
     floor.colors.assign(floor.vertices.size(), {static_cast<std::uint8_t>(80 * robot), 200, 40});
     for (MeshChunk chunk : chunks_of(floor, robot)) {
-      chunk.voxel_m = std::array{0.04F, 0.1F, 0.9F}[robot];
+      chunk.voxel_m = std::array{0.04F, 0.1F, 0.12F}[robot];
       CHECK(team.add(chunk) == ChunkVerdict::kTaken);
     }
   }
   const LabelledMesh mesh = fused(team);
-  CHECK(mesh.faces.size() == fuse_chunks(team.placed(), 1.0).mesh.faces.size());
   CHECK(mesh.faces.size() > 2000);  // 2400, two in each square of 0.1 m, and some more on slopes
   CHECK(mesh.faces.size() < 4800);
   REQUIRE(mesh.colors.size() == mesh.vertices.size());
@@ -99,12 +105,27 @@ TEST_CASE("The fused map has the colours of its chunks, and the median of their 
   }
 }
 
+TEST_CASE("Surface from larger voxels is there only where there is none from smaller ones",
+          "[team_map]") {
+  TeamMesh team;
+  add_all(team, chunks_of(floor_from(0.0F, 0.0F), 0));
+  LabelledMesh mesh = floor_from(4.0F, 0.0F);  // a map with both sizes
+  MeshOrigin origin{.seen_by = {}, .T_world_kf = {SE3::Identity()}, .voxel_m = kMapVoxel_m};
+  origin.levels.assign(mesh.vertices.size(), 0);
+  mesh.append(resampled(floor_from(2.0F, 0.1F, 2), 4.0 * kMapVoxel_m));
+  origin.levels.resize(mesh.vertices.size(), 2);
+  origin.seen_by.resize(mesh.vertices.size());
+  origin.mapped = mesh.vertices;
+  add_all(team, split_mesh(mesh, 1, 0, {}, &origin).chunks);
+  CHECK(area_of(fused(team)) == Approx(8.0 * 3.0).epsilon(0.03));
+}
+
 TEST_CASE("Chunks in another frame than most are left out and counted", "[team_map]") {
   TeamMesh alone, team;
   for (TeamMesh* both : {&alone, &team}) add_all(*both, chunks_of(floor_from(0.0F, 0.0F), 1, 1, 1));
   const std::vector<MeshChunk> apart = chunks_of(floor_from(0.0F, 1.0F), 2, 1, 0);
   CHECK(team.add(apart.front()) == ChunkVerdict::kTaken);
-  const TeamMap map = fuse_chunks(team.placed(), kMapVoxel_m);
+  const TeamMap map = fuse_chunks(team.placed());
   CHECK(map.anchor == 1);
   CHECK(map.other_frames == 1);
   CHECK(are_equal(map.mesh, fused(alone)));
@@ -118,8 +139,8 @@ TEST_CASE("A face of a size that no mapper makes is left out", "[team_map]") {
   chunk.step_m = 0.01F;
   chunk.offsets = {{0, 0, 0}, {65535, 0, 0}, {0, 65535, 65535}};
   chunk.faces = {{0, 1, 2}};
-  CHECK(fuse_chunks({place(chunk, nullptr)}, kMapVoxel_m).mesh.empty());
-  CHECK(fuse_chunks({}, kMapVoxel_m).mesh.empty());
+  CHECK(fuse_chunks({place(chunk, nullptr)}).mesh.empty());
+  CHECK(fuse_chunks({}).mesh.empty());
 }
 
 TEST_CASE("A robot with many chunks does not decide the frame of three", "[team_map]") {
@@ -127,7 +148,7 @@ TEST_CASE("A robot with many chunks does not decide the frame of three", "[team_
   add_all(team, {chunks_of(floor_from(0.0F, 0.0F), 1, 1, 1).front(),
                  chunks_of(floor_from(0.0F, 0.0F), 2, 1, 1).front()});
   add_all(team, chunks_of(floor_from(0.0F, 1.0F), 0, 1, 0));
-  const TeamMap map = fuse_chunks(team.placed(), kMapVoxel_m);
+  const TeamMap map = fuse_chunks(team.placed());
   CHECK(map.anchor == 1);
   CHECK(map.extents.size() == 2);
 }
@@ -138,9 +159,9 @@ TEST_CASE("A robot with too many boxes loses its own", "[team_map]") {
   const LabelledMesh whole = fused(alone);
   for (const float from_m : {-80.0F, -70.0F, 70.0F, 80.0F})
     add_all(team, chunks_of(floor_from(from_m, 0.0F), static_cast<RobotId>(from_m > 0.0F ? 9 : 1)));
-  const TeamMap all = fuse_chunks(team.placed(), kMapVoxel_m);
+  const TeamMap all = fuse_chunks(team.placed());
   CHECK(all.left_out == 0);
-  const TeamMap map = fuse_chunks(team.placed(), kMapVoxel_m, 80);
+  const TeamMap map = fuse_chunks(team.placed(), 80);
   CHECK(map.left_out > 0);
   CHECK(map.mesh.faces.size() < all.mesh.faces.size());
   const auto is_whole_part = [](const LabelledMesh& mesh, const LabelledMesh::Face& face) {

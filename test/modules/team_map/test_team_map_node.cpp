@@ -14,8 +14,6 @@
 namespace km {
 namespace {
 
-constexpr double kNodeVoxel_m = 0.1;
-
 MapSharingConfig fast() {
   MapSharingConfig config;
   config.max_bytes_per_s = 2e6;
@@ -27,11 +25,10 @@ struct Mapper {
   Mapper(const std::shared_ptr<const DdsDomain>& domain, RobotId robot)
       : basis(domain, robot),
         sender(fast(), robot, {sent, sent_poses}),
-        map(kNodeVoxel_m, {},
-            {.own_chunks = sent,
-             .received_chunks = chunks.from_peers(),
-             .own_poses = sent_poses,
-             .received_poses = poses.from_peers()}) {
+        map({}, {.own_chunks = sent,
+                 .received_chunks = chunks.from_peers(),
+                 .own_poses = sent_poses,
+                 .received_poses = poses.from_peers()}) {
     basis.bridge.exchange(chunks, TopicKind::kState, TrafficCategory::kMap);
     basis.bridge.exchange(poses, TopicKind::kState, TrafficCategory::kMap);
     sent.subscribe([this](const auto& chunk) { chunks.to_peers().publish(chunk); });
