@@ -224,7 +224,7 @@ DownMessage TreeRoot::decide(const TreeSums& sums, std::uint32_t round, const Tr
 
 DownMessage TreeRoot::step(const TreeSums& sums, const TreeFront& front,
                            std::span<const SE3> poses) {
-  const TreeFront::RootStep root = front.solve_root(upright_);
+  const TreeFront::Reduced root = front.solve_root(upright_);
   decrement_ = sums.decrement + root.decrement;
   // If odometry is noisy, the poses may be far from the minimum of the nearly convex cost at the
   // beginning. A predicted decrease of more than the whole cost shows that the quadratic model does

@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <queue>
+#include <set>
 #include <utility>
+
+#include "modules/tree_newton/block_matrix.hpp"
 
 namespace km {
 namespace {
@@ -22,8 +25,8 @@ std::pair<std::vector<KeyframeId>, Neighbours> public_graph(std::span<const Clos
   for (const ClosureId& closure : closures) {
     const int a = number(closure.from);
     const int b = number(closure.to);
-    neighbours[static_cast<std::size_t>(a)].push_back(b);
-    neighbours[static_cast<std::size_t>(b)].push_back(a);
+    neighbours[at(a)].push_back(b);
+    neighbours[at(b)].push_back(a);
   }
   for (auto& list : neighbours) {
     std::sort(list.begin(), list.end());
@@ -38,7 +41,7 @@ std::vector<KeyframeId> cover_closures(std::span<const ClosureId> closures) {
   const auto [poses, neighbours] = public_graph(closures);
   std::vector<int> left(poses.size());  // number of uncovered closures
   std::priority_queue<std::pair<int, int>> queue;
-  const auto offer = [&](int v) { queue.emplace(left[static_cast<std::size_t>(v)], -v); };
+  const auto offer = [&](int v) { queue.emplace(left[at(v)], -v); };
   for (std::size_t v = 0; v < poses.size(); ++v) {
     left[v] = static_cast<int>(neighbours[v].size());
     offer(static_cast<int>(v));
@@ -48,26 +51,46 @@ std::vector<KeyframeId> cover_closures(std::span<const ClosureId> closures) {
   while (!queue.empty()) {
     const auto [count, negative] = queue.top();
     queue.pop();
-    const auto v = static_cast<std::size_t>(-negative);
+    const auto v = at(-negative);
     if (chosen[v] || count != left[v] || count == 0) continue;  // an outdated entry
     chosen[v] = true;
     order.push_back(-negative);
     for (const int u : neighbours[v]) {
-      if (chosen[static_cast<std::size_t>(u)]) continue;
-      --left[static_cast<std::size_t>(u)];
+      if (chosen[at(u)]) continue;
+      --left[at(u)];
       offer(u);
     }
   }
   for (auto v = order.rbegin(); v != order.rend(); ++v) {
-    const auto& around = neighbours[static_cast<std::size_t>(*v)];
-    if (std::all_of(around.begin(), around.end(),
-                    [&](int u) { return chosen[static_cast<std::size_t>(u)]; }))
-      chosen[static_cast<std::size_t>(*v)] = false;
+    const auto& around = neighbours[at(*v)];
+    if (std::all_of(around.begin(), around.end(), [&](int u) { return chosen[at(u)]; }))
+      chosen[at(*v)] = false;
   }
   std::vector<KeyframeId> cover;
   for (std::size_t v = 0; v < poses.size(); ++v)
     if (chosen[v]) cover.push_back(poses[v]);
   return cover;
+}
+
+std::vector<bool> weighed_closures(std::span<const ClosureId> closures, RobotId self, RobotId peer,
+                                   std::optional<RobotId> child) {
+  constexpr double kWorthIt = 1.5;
+  const std::vector<KeyframeId> few = cover_closures(closures);
+  std::set<KeyframeId> cover(few.begin(), few.end());
+  if (child) {
+    std::set<KeyframeId> ends;
+    for (const ClosureId& closure : closures)
+      ends.insert(closure.from.robot == *child ? closure.from : closure.to);
+    if (static_cast<double>(ends.size()) <= kWorthIt * static_cast<double>(cover.size()))
+      cover = std::move(ends);
+  }
+  std::vector<bool> weighs;
+  for (const ClosureId& closure : closures) {
+    const bool from = cover.contains(closure.from), to = cover.contains(closure.to);
+    const bool here = closure.from.robot == self ? from : to;
+    weighs.push_back(from && to ? self < peer : !here);
+  }
+  return weighs;
 }
 
 }  // namespace km

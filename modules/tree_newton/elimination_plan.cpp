@@ -18,10 +18,10 @@ constexpr int kSmallFront = 4;
 using Neighbours = std::vector<std::vector<int>>;
 
 Neighbours neighbours_of(int nodes, const std::vector<NodePair>& pairs) {
-  Neighbours neighbours(static_cast<std::size_t>(nodes));
+  Neighbours neighbours(at(nodes));
   for (const auto& [i, j] : pairs) {
-    neighbours[static_cast<std::size_t>(i)].push_back(j);
-    neighbours[static_cast<std::size_t>(j)].push_back(i);
+    neighbours[at(i)].push_back(j);
+    neighbours[at(j)].push_back(i);
   }
   return neighbours;
 }
@@ -41,8 +41,8 @@ std::vector<int> fill_reducing_order(const std::vector<bool>& keep,
   entries.reserve(eliminated.size() + pairs.size());
   for (int i = 0; i < n; ++i) entries.emplace_back(i, i, 1.0);
   for (const auto& [a, b] : pairs) {
-    const int i = number[static_cast<std::size_t>(a)];
-    const int j = number[static_cast<std::size_t>(b)];
+    const int i = number[at(a)];
+    const int j = number[at(b)];
     if (i < 0 || j < 0) continue;
     entries.emplace_back(i, j, 1.0);
     entries.emplace_back(j, i, 1.0);
@@ -53,8 +53,7 @@ std::vector<int> fill_reducing_order(const std::vector<bool>& keep,
   if (n > 0) Eigen::AMDOrdering<int>()(pattern, order);
   std::vector<int> result;
   result.reserve(eliminated.size());
-  for (int k = 0; k < n; ++k)
-    result.push_back(eliminated[static_cast<std::size_t>(order.indices()(k))]);
+  for (int k = 0; k < n; ++k) result.push_back(eliminated[at(order.indices()(k))]);
   return result;
 }
 
@@ -74,18 +73,17 @@ Columns fill(const std::vector<int>& place, std::size_t eliminated, const Neighb
     const auto here = static_cast<int>(c);
     std::vector<int>& below = columns.below[c];
     const auto add = [&](int row) {
-      if (row <= here || mark[static_cast<std::size_t>(row)] == here) return;
-      mark[static_cast<std::size_t>(row)] = here;
+      if (row <= here || mark[at(row)] == here) return;
+      mark[at(row)] = here;
       below.push_back(row);
     };
-    for (const int v : neighbours[static_cast<std::size_t>(order[c])])
-      add(place[static_cast<std::size_t>(v)]);
+    for (const int v : neighbours[at(order[c])]) add(place[at(v)]);
     for (const int child : children[c])
-      for (const int row : columns.below[static_cast<std::size_t>(child)]) add(row);
+      for (const int row : columns.below[at(child)]) add(row);
     std::sort(below.begin(), below.end());
     if (below.empty() || below.front() >= static_cast<int>(eliminated)) continue;
     columns.parent[c] = below.front();
-    children[static_cast<std::size_t>(below.front())].push_back(here);
+    children[at(below.front())].push_back(here);
   }
   return columns;
 }
@@ -96,15 +94,14 @@ std::vector<int> postorder(const std::vector<int>& parent) {
   Neighbours children(parent.size());
   std::vector<int> roots;
   for (std::size_t c = 0; c < parent.size(); ++c)
-    (parent[c] < 0 ? roots : children[static_cast<std::size_t>(parent[c])])
-        .push_back(static_cast<int>(c));
+    (parent[c] < 0 ? roots : children[at(parent[c])]).push_back(static_cast<int>(c));
   std::vector<int> order;
   std::vector<std::pair<int, std::size_t>> path;
   for (const int root : roots) {
     path.emplace_back(root, 0);
     while (!path.empty()) {
       auto& [column, next] = path.back();
-      const auto& below = children[static_cast<std::size_t>(column)];
+      const auto& below = children[at(column)];
       if (next < below.size()) {
         path.emplace_back(below[next++], 0);
       } else {
@@ -142,8 +139,7 @@ std::vector<Run> merge_columns(const Columns& columns) {
       const Run& last = runs.back();
       const int last_column = last.first + last.columns - 1;
       double zeros = 0.0;
-      if (last_column + 1 != run.first ||
-          columns.parent[static_cast<std::size_t>(last_column)] != run.first ||
+      if (last_column + 1 != run.first || columns.parent[at(last_column)] != run.first ||
           !worth_merging(last, run, zeros))
         break;
       run.first = last.first;
@@ -165,8 +161,8 @@ EliminationPlan::EliminationPlan(std::vector<bool> keep, std::vector<NodePair> p
       throw std::invalid_argument("EliminationPlan: pair " + std::to_string(i) + ' ' +
                                   std::to_string(j) + " names no two nodes");
   for (int v = 0; v < nodes(); ++v) {
-    if (!keep_[static_cast<std::size_t>(v)]) continue;
-    place_of_kept_[static_cast<std::size_t>(v)] = static_cast<int>(kept_.size());
+    if (!keep_[at(v)]) continue;
+    place_of_kept_[at(v)] = static_cast<int>(kept_.size());
     kept_.push_back(v);
   }
   order_and_fill();
@@ -180,57 +176,51 @@ void EliminationPlan::order_and_fill() {
   order.insert(order.end(), kept_.begin(), kept_.end());
   std::vector<int> place(order.size());
   const auto number_places = [&] {
-    for (std::size_t k = 0; k < order.size(); ++k)
-      place[static_cast<std::size_t>(order[k])] = static_cast<int>(k);
+    for (std::size_t k = 0; k < order.size(); ++k) place[at(order[k])] = static_cast<int>(k);
   };
   number_places();
   const std::vector<int> column_order =
       postorder(fill(place, eliminated, neighbours, order).parent);
   const std::vector<int> before = order;
-  for (std::size_t k = 0; k < eliminated; ++k)
-    order[k] = before[static_cast<std::size_t>(column_order[k])];
+  for (std::size_t k = 0; k < eliminated; ++k) order[k] = before[at(column_order[k])];
   number_places();
   const std::vector<Run> runs = merge_columns(fill(place, eliminated, neighbours, order));
 
   std::vector<int> front_of(eliminated);
   for (const Run& run : runs) {
     for (int c = 0; c < run.columns; ++c)
-      front_of[static_cast<std::size_t>(run.first + c)] = static_cast<int>(fronts_.size());
+      front_of[at(run.first + c)] = static_cast<int>(fronts_.size());
     Front& front = fronts_.emplace_back();
     front.pivots = run.columns;
-    for (int c = 0; c < run.columns; ++c)
-      front.nodes.push_back(order[static_cast<std::size_t>(run.first + c)]);
-    for (const int row : run.below) front.nodes.push_back(order[static_cast<std::size_t>(row)]);
+    for (int c = 0; c < run.columns; ++c) front.nodes.push_back(order[at(run.first + c)]);
+    for (const int row : run.below) front.nodes.push_back(order[at(row)]);
   }
   for (std::size_t f = 0; f < runs.size(); ++f) {
     const auto& below = runs[f].below;
     if (below.empty() || below.front() >= static_cast<int>(eliminated)) continue;
-    fronts_[f].parent = front_of[static_cast<std::size_t>(below.front())];
-    fronts_[static_cast<std::size_t>(fronts_[f].parent)].children.push_back(static_cast<int>(f));
+    fronts_[f].parent = front_of[at(below.front())];
+    fronts_[at(fronts_[f].parent)].children.push_back(static_cast<int>(f));
   }
   for (std::size_t p = 0; p < pairs_.size(); ++p) {
-    const auto first =
-        static_cast<std::size_t>(std::min(place[static_cast<std::size_t>(pairs_[p][0])],
-                                          place[static_cast<std::size_t>(pairs_[p][1])]));
-    if (first < eliminated)
-      fronts_[static_cast<std::size_t>(front_of[first])].pairs.push_back(static_cast<int>(p));
+    const auto first = at(std::min(place[at(pairs_[p][0])], place[at(pairs_[p][1])]));
+    if (first < eliminated) fronts_[at(front_of[first])].pairs.push_back(static_cast<int>(p));
   }
 }
 
 void EliminationPlan::find_kept_pairs() {
   const auto add = [&](int i, int j) {
-    const int a = place_of_kept_[static_cast<std::size_t>(i)];
-    const int b = place_of_kept_[static_cast<std::size_t>(j)];
+    const int a = place_of_kept_[at(i)];
+    const int b = place_of_kept_[at(j)];
     kept_pairs_.push_back({std::min(a, b), std::max(a, b)});
   };
   for (const Front& front : fronts_) {
     if (front.parent >= 0) continue;
-    const auto first = static_cast<std::size_t>(front.pivots);
+    const auto first = at(front.pivots);
     for (std::size_t i = first; i < front.nodes.size(); ++i)
       for (std::size_t j = i + 1; j < front.nodes.size(); ++j) add(front.nodes[i], front.nodes[j]);
   }
   for (const auto& [i, j] : pairs_)
-    if (keep_[static_cast<std::size_t>(i)] && keep_[static_cast<std::size_t>(j)]) add(i, j);
+    if (keep_[at(i)] && keep_[at(j)]) add(i, j);
   std::sort(kept_pairs_.begin(), kept_pairs_.end());
   kept_pairs_.erase(std::unique(kept_pairs_.begin(), kept_pairs_.end()), kept_pairs_.end());
 }

@@ -41,7 +41,7 @@ bool FrontalCholesky::factorise(const BlockMatrix& A) {
   const std::size_t fronts = plan_->fronts().size();
   factors_.resize(fronts);
   rests_.assign(fronts, MatrixXd());
-  local_.assign(static_cast<std::size_t>(plan_->nodes()), -1);
+  local_.assign(at(plan_->nodes()), -1);
   schur_ = BlockMatrix::zero(block_, plan_->kept().size(), plan_->kept_pairs().size());
   for (std::size_t f = 0; f < fronts; ++f)
     if (!factorise_front(f, A)) return false;
@@ -54,21 +54,20 @@ bool FrontalCholesky::factorise_front(std::size_t f, const BlockMatrix& A) {
   const Index pivots = block_ * front.pivots;
   const Index size = block_ * static_cast<Index>(front.nodes.size());
   for (std::size_t k = 0; k < front.nodes.size(); ++k)
-    local_[static_cast<std::size_t>(front.nodes[k])] = static_cast<int>(k);
-  const auto local = [&](int node) { return local_[static_cast<std::size_t>(node)]; };
+    local_[at(front.nodes[k])] = static_cast<int>(k);
+  const auto local = [&](int node) { return local_[at(node)]; };
 
   MatrixXd F = MatrixXd::Zero(size, size);
   for (int k = 0; k < front.pivots; ++k)
-    F.block(block_ * k, block_ * k, block_, block_) =
-        A.at(front.nodes[static_cast<std::size_t>(k)]);
+    F.block(block_ * k, block_ * k, block_, block_) = A.at(front.nodes[at(k)]);
   for (const int pair : front.pairs) {
-    const auto& [i, j] = plan_->pairs()[static_cast<std::size_t>(pair)];
+    const auto& [i, j] = plan_->pairs()[at(pair)];
     add_block(F, block_, local(i), local(j), A.between(pair));
   }
   for (const int c : front.children) {
-    const EliminationPlan::Front& child = plan_->fronts()[static_cast<std::size_t>(c)];
-    MatrixXd& rest = rests_[static_cast<std::size_t>(c)];
-    const auto first = static_cast<std::size_t>(child.pivots);
+    const EliminationPlan::Front& child = plan_->fronts()[at(c)];
+    MatrixXd& rest = rests_[at(c)];
+    const auto first = at(child.pivots);
     for (std::size_t j = first; j < child.nodes.size(); ++j)
       for (std::size_t i = j; i < child.nodes.size(); ++i)
         add_block(F, block_, local(child.nodes[i]), local(child.nodes[j]),
@@ -86,28 +85,16 @@ bool FrontalCholesky::factorise_front(std::size_t f, const BlockMatrix& A) {
   return true;
 }
 
-int FrontalCholesky::kept_pair(int a, int b) const {
-  const auto& pairs = plan_->kept_pairs();
-  const NodePair pair{std::min(a, b), std::max(a, b)};
-  return static_cast<int>(std::lower_bound(pairs.begin(), pairs.end(), pair) - pairs.begin());
-}
-
 void FrontalCholesky::add_to_schur(const EliminationPlan::Front& front, const MatrixXd& rest) {
-  const auto first = static_cast<std::size_t>(front.pivots);
-  const auto kept = [&](std::size_t k) {
-    return plan_->place_of_kept()[static_cast<std::size_t>(front.nodes[k])];
-  };
+  const auto first = at(front.pivots);
+  const auto kept = [&](std::size_t k) { return plan_->place_of_kept()[at(front.nodes[k])]; };
   for (std::size_t j = first; j < front.nodes.size(); ++j) {
     const Index col = block_ * static_cast<Index>(j - first);
     const MatrixXd lower = rest.block(col, col, block_, block_);
     schur_.at(kept(j)) += lower.selfadjointView<Eigen::Lower>();
     for (std::size_t i = j + 1; i < front.nodes.size(); ++i) {
       const auto values = rest.block(block_ * static_cast<Index>(i - first), col, block_, block_);
-      auto sum = schur_.between(kept_pair(kept(i), kept(j)));
-      if (kept(i) < kept(j))
-        sum += values;
-      else
-        sum += values.transpose();
+      schur_.add(index_of(plan_->kept_pairs(), kept(i), kept(j)), kept(i) > kept(j), values);
     }
   }
 }
@@ -117,14 +104,10 @@ void FrontalCholesky::add_kept(const BlockMatrix& A) {
     schur_.at(static_cast<int>(k)) += A.at(plan_->kept()[k]);
   for (std::size_t p = 0; p < plan_->pairs().size(); ++p) {
     const auto& [i, j] = plan_->pairs()[p];
-    const int a = plan_->place_of_kept()[static_cast<std::size_t>(i)];
-    const int b = plan_->place_of_kept()[static_cast<std::size_t>(j)];
+    const int a = plan_->place_of_kept()[at(i)];
+    const int b = plan_->place_of_kept()[at(j)];
     if (a < 0 || b < 0) continue;
-    auto sum = schur_.between(kept_pair(a, b));
-    if (a < b)
-      sum += A.between(static_cast<int>(p));
-    else
-      sum += A.between(static_cast<int>(p)).transpose();
+    schur_.add(index_of(plan_->kept_pairs(), a, b), a > b, A.between(static_cast<int>(p)));
   }
 }
 
@@ -136,15 +119,13 @@ void FrontalCholesky::forward(MatrixXd& C) const {
     const Index rest = factors_[f].rows() - pivots;
     rows.resize(pivots, C.cols());
     for (int k = 0; k < front.pivots; ++k)
-      rows.middleRows(block_ * k, block_) =
-          C.middleRows(block_ * front.nodes[static_cast<std::size_t>(k)], block_);
+      rows.middleRows(block_ * k, block_) = C.middleRows(block_ * front.nodes[at(k)], block_);
     factors_[f].topRows(pivots).triangularView<Eigen::Lower>().solveInPlace(rows);
     for (int k = 0; k < front.pivots; ++k)
-      C.middleRows(block_ * front.nodes[static_cast<std::size_t>(k)], block_) =
-          rows.middleRows(block_ * k, block_);
+      C.middleRows(block_ * front.nodes[at(k)], block_) = rows.middleRows(block_ * k, block_);
     if (rest == 0) continue;
     const MatrixXd change = factors_[f].bottomRows(rest) * rows;
-    for (std::size_t k = static_cast<std::size_t>(front.pivots); k < front.nodes.size(); ++k)
+    for (std::size_t k = at(front.pivots); k < front.nodes.size(); ++k)
       C.middleRows(block_ * front.nodes[k], block_) -=
           change.middleRows(block_ * (static_cast<Index>(k) - front.pivots), block_);
   }
@@ -165,8 +146,7 @@ void FrontalCholesky::backward(MatrixXd& X) const {
       solved.noalias() -= factors_[f].bottomRows(rest).transpose() * rows.bottomRows(rest);
     factors_[f].topRows(pivots).triangularView<Eigen::Lower>().transpose().solveInPlace(solved);
     for (int k = 0; k < front.pivots; ++k)
-      X.middleRows(block_ * front.nodes[static_cast<std::size_t>(k)], block_) =
-          rows.middleRows(block_ * k, block_);
+      X.middleRows(block_ * front.nodes[at(k)], block_) = rows.middleRows(block_ * k, block_);
   }
 }
 
@@ -180,16 +160,16 @@ MatrixXf FrontalCholesky::inverse_of_rest(const std::vector<int>& place, const M
   MatrixXf Z(block_ * rest, block_ * rest);
   for (Index i = 0; i < rest; ++i)
     for (Index j = 0; j < rest; ++j) {
-      const int a = place[static_cast<std::size_t>(i)], b = place[static_cast<std::size_t>(j)];
+      const int a = place[at(i)], b = place[at(j)];
       auto block = Z.block(block_ * i, block_ * j, block_, block_);
       if (of_parent.size() > 0)
         block = of_parent.block(block_ * a, block_ * b, block_, block_);
       else if (a == b)
         block = kept.at(a).cast<float>();
       else if (a < b)
-        block = kept.between(kept_pair(a, b)).cast<float>();
+        block = kept.between(index_of(plan_->kept_pairs(), a, b)).cast<float>();
       else
-        block = kept.between(kept_pair(a, b)).transpose().cast<float>();
+        block = kept.between(index_of(plan_->kept_pairs(), a, b)).transpose().cast<float>();
     }
   return Z;
 }
@@ -219,32 +199,31 @@ void FrontalCholesky::invert_pivots(const MatrixXd& factor, MatrixXf& Z) const {
 }
 
 BlockMatrix FrontalCholesky::selected_inverse(const BlockMatrix& kept) const {
-  BlockMatrix inverse =
-      BlockMatrix::zero(block_, static_cast<std::size_t>(plan_->nodes()), plan_->pairs().size());
+  BlockMatrix inverse = BlockMatrix::zero(block_, at(plan_->nodes()), plan_->pairs().size());
   std::vector<MatrixXf> inverses(factors_.size());
   MatrixXf none;
-  std::vector<int> local(static_cast<std::size_t>(plan_->nodes()));  // place in a front
+  std::vector<int> local(at(plan_->nodes()));  // place in a front
   const auto number = [&](const EliminationPlan::Front& front) {
     for (std::size_t k = 0; k < front.nodes.size(); ++k)
-      local[static_cast<std::size_t>(front.nodes[k])] = static_cast<int>(k);
+      local[at(front.nodes[k])] = static_cast<int>(k);
   };
   const auto is_first_child = [&](std::size_t f) {
-    const auto parent = static_cast<std::size_t>(plan_->fronts()[f].parent);
+    const auto parent = at(plan_->fronts()[f].parent);
     return plan_->fronts()[parent].children.front() == static_cast<int>(f);
   };
   for (std::size_t f = factors_.size(); f-- > 0;) {
     const EliminationPlan::Front& front = plan_->fronts()[f];
     const bool has_parent = front.parent >= 0;
-    if (has_parent) number(plan_->fronts()[static_cast<std::size_t>(front.parent)]);
+    if (has_parent) number(plan_->fronts()[at(front.parent)]);
     std::vector<int> place;
-    for (std::size_t k = static_cast<std::size_t>(front.pivots); k < front.nodes.size(); ++k) {
-      const auto node = static_cast<std::size_t>(front.nodes[k]);
+    for (std::size_t k = at(front.pivots); k < front.nodes.size(); ++k) {
+      const auto node = at(front.nodes[k]);
       place.push_back(has_parent ? local[node] : plan_->place_of_kept()[node]);
     }
     MatrixXf& Z = inverses[f];
     Z.resize(factors_[f].rows(), factors_[f].rows());
     const Index rest = block_ * static_cast<Index>(place.size());
-    MatrixXf& of_parent = has_parent ? inverses[static_cast<std::size_t>(front.parent)] : none;
+    MatrixXf& of_parent = has_parent ? inverses[at(front.parent)] : none;
     Z.bottomRightCorner(rest, rest) = inverse_of_rest(place, of_parent, kept);
     invert_pivots(factors_[f], Z);
     number(front);
@@ -264,12 +243,10 @@ void FrontalCholesky::add_front(const EliminationPlan::Front& front, const Matri
   const auto block = [&](int i, int j) {
     return Z.block(block_ * i, block_ * j, block_, block_).cast<double>();
   };
-  for (int k = 0; k < front.pivots; ++k)
-    inverse.at(front.nodes[static_cast<std::size_t>(k)]) = block(k, k);
+  for (int k = 0; k < front.pivots; ++k) inverse.at(front.nodes[at(k)]) = block(k, k);
   for (const int pair : front.pairs) {
-    const auto& [i, j] = plan_->pairs()[static_cast<std::size_t>(pair)];
-    inverse.between(pair) =
-        block(local[static_cast<std::size_t>(i)], local[static_cast<std::size_t>(j)]);
+    const auto& [i, j] = plan_->pairs()[at(pair)];
+    inverse.between(pair) = block(local[at(i)], local[at(j)]);
   }
 }
 
@@ -278,14 +255,10 @@ void FrontalCholesky::place_kept(const BlockMatrix& kept, BlockMatrix& inverse) 
     inverse.at(plan_->kept()[k]) = kept.at(static_cast<int>(k));
   for (std::size_t p = 0; p < plan_->pairs().size(); ++p) {
     const auto& [i, j] = plan_->pairs()[p];
-    const int a = plan_->place_of_kept()[static_cast<std::size_t>(i)];
-    const int b = plan_->place_of_kept()[static_cast<std::size_t>(j)];
+    const int a = plan_->place_of_kept()[at(i)];
+    const int b = plan_->place_of_kept()[at(j)];
     if (a < 0 || b < 0) continue;
-    auto block = inverse.between(static_cast<int>(p));
-    if (a < b)
-      block = kept.between(kept_pair(a, b));
-    else
-      block = kept.between(kept_pair(a, b)).transpose();
+    inverse.add(static_cast<int>(p), a > b, kept.between(index_of(plan_->kept_pairs(), a, b)));
   }
 }
 

@@ -48,7 +48,6 @@ class FrontalCholesky {
   void add_front(const EliminationPlan::Front& front, const Eigen::MatrixXf& Z,
                  const std::vector<int>& local, BlockMatrix& inverse) const;
   void place_kept(const BlockMatrix& kept, BlockMatrix& inverse) const;
-  [[nodiscard]] int kept_pair(int a, int b) const;
 
   std::shared_ptr<const EliminationPlan> plan_;
   Eigen::Index block_ = 0;

@@ -26,6 +26,11 @@ struct PoseEdge {
   [[nodiscard]] const KeyframeId& other(RobotId robot) const {
     return from.robot == robot ? to : from;
   }
+  /// The robot at the other end; `robot` itself for an edge inside it. Precondition: one end is on
+  /// `robot`.
+  [[nodiscard]] RobotId peer_of(RobotId robot) const {
+    return from.robot == robot ? to.robot : from.robot;
+  }
   /// The end on `robot`. Precondition: one is.
   [[nodiscard]] const KeyframeId& end_on(RobotId robot) const {
     return from.robot == robot ? from : to;

@@ -11,8 +11,7 @@ namespace {
 class BitGraph {
  public:
   BitGraph(int nodes, const std::vector<NodePair>& pairs)
-      : words_((static_cast<std::size_t>(nodes) + 63) / 64),
-        bits_(words_ * static_cast<std::size_t>(nodes), 0) {
+      : words_((at(nodes) + 63) / 64), bits_(words_ * at(nodes), 0) {
     for (const auto& [i, j] : pairs) {
       set(i, j);
       set(j, i);
@@ -46,10 +45,8 @@ class BitGraph {
   }
 
  private:
-  std::uint64_t* row(int v) { return bits_.data() + words_ * static_cast<std::size_t>(v); }
-  [[nodiscard]] const std::uint64_t* row(int v) const {
-    return bits_.data() + words_ * static_cast<std::size_t>(v);
-  }
+  std::uint64_t* row(int v) { return bits_.data() + words_ * at(v); }
+  [[nodiscard]] const std::uint64_t* row(int v) const { return bits_.data() + words_ * at(v); }
   static std::uint64_t mask(int v) { return std::uint64_t{1} << (static_cast<unsigned>(v) % 64U); }
   void set(int i, int j) { row(i)[j / 64] |= mask(j); }
   void clear(int i, int j) { row(i)[j / 64] &= ~mask(j); }
@@ -92,17 +89,16 @@ std::vector<bool> keep_sparse(std::vector<bool> keep, const std::vector<NodePair
   for (std::size_t v = 0; v < keep.size(); ++v)
     if (!keep[v] && state[v] != State::kEliminated) offer(v);
   const auto eliminate = [&](int v) {
-    state[static_cast<std::size_t>(v)] = State::kEliminated;
+    state[at(v)] = State::kEliminated;
     for (const int u : graph.eliminate(v))
-      if (state[static_cast<std::size_t>(u)] == State::kOffered)
-        state[static_cast<std::size_t>(u)] = State::kOutdated;
+      if (state[at(u)] == State::kOffered) state[at(u)] = State::kOutdated;
   };
   bool progress = true;
   while (progress) {
     progress = false;
     while (!queue.empty()) {
       const auto [value, negative] = queue.top();
-      const auto v = static_cast<std::size_t>(-negative);
+      const auto v = at(-negative);
       if (state[v] == State::kOutdated) {
         queue.pop();
         offer(v);

@@ -14,7 +14,27 @@ using Eigen::Index;
 // converge. With 2^-20 all of them do, but not the equations of 100 robots on a ring, whose
 // weakest motions are softer than the rounding errors.
 constexpr double kCouplingUnit = 0x1p-26;
-constexpr double kMostUnits = 1e15;  // beyond it, a double is not a whole number of units
+constexpr double kMostUnits = 1e15;           // beyond it, a double is not a whole number of units
+constexpr double kMostCorrelation = 32767.0;  // units of a correlation of 1
+
+// Standard deviations of the variables whose covariances are `triangles`, one column each, times
+// the square root of the unit of a correlation.
+Eigen::MatrixXd units_of_correlations(std::span<const float> triangles, Index block) {
+  constexpr double kCorrelation = 1.0 / kMostCorrelation;
+  const Index size = block * (block + 1) / 2;
+  Eigen::MatrixXd units(block, static_cast<Index>(triangles.size()) / size);
+  for (Index k = 0; k < units.cols(); ++k)
+    for (Index row = 0, next = k * size; row < block; next += block - row, ++row)
+      units(row, k) =
+          std::sqrt(kCorrelation * std::max(0.0, static_cast<double>(triangles[at(next)])));
+  return units;
+}
+
+std::int16_t correlation_of(double covariance, double unit) {
+  constexpr double kMost = kMostCorrelation;
+  if (!(unit > 0.0)) return 0;
+  return static_cast<std::int16_t>(std::lround(std::clamp(covariance / unit, -kMost, kMost)));
+}
 
 }  // namespace
 
@@ -41,6 +61,54 @@ bool is_sent(const BlockMatrix& schur, const NodePair& ends, int pair) {
     for (Index row = 0; row < values.rows(); ++row)
       if (in_units(values(row, c), unit_of_coupling(schur, ends, row, c)) != 0) return true;
   return false;
+}
+
+TreeInverse TreeInverse::of(const BlockMatrix& inverse, std::span<const NodePair> pairs,
+                            const BlockMatrix& schur) {
+  const Index B = inverse.block(), variables = inverse.diagonal.cols() / B;
+  TreeInverse sent;
+  for (int k = 0; k < variables; ++k)
+    for (Index c = 0; c < B; ++c)
+      for (Index row = c; row < B; ++row)
+        sent.diagonal.push_back(static_cast<float>(inverse.at(k)(row, c)));
+  const Eigen::MatrixXd units = units_of_correlations(sent.diagonal, B);
+  for (int p = 0; p < std::ssize(pairs); ++p) {
+    const auto& [i, j] = pairs[at(p)];
+    if (!is_sent(schur, pairs[at(p)], p)) continue;
+    for (Index c = 0; c < B; ++c)
+      for (Index row = 0; row < B; ++row)
+        sent.correlations.push_back(
+            correlation_of(inverse.between(p)(row, c), units(row, i) * units(c, j)));
+  }
+  return sent;
+}
+
+std::optional<BlockMatrix> TreeInverse::decoded(std::span<const NodePair> pairs,
+                                                const BlockMatrix& schur) const {
+  const Index B = schur.block(), variables = schur.diagonal.cols() / B;
+  std::vector<int> coupled;
+  for (int p = 0; p < std::ssize(pairs); ++p)
+    if (is_sent(schur, pairs[at(p)], p)) coupled.push_back(p);
+  if (diagonal.size() != at(variables * B * (B + 1) / 2) ||
+      correlations.size() != coupled.size() * at(B * B))
+    return std::nullopt;
+  BlockMatrix inverse = BlockMatrix::zero(B, at(variables), pairs.size());
+  auto variance = diagonal.begin();
+  for (int k = 0; k < variables; ++k) {
+    auto values = inverse.at(k);
+    for (Index c = 0; c < B; ++c)
+      for (Index row = c; row < B; ++row) values(row, c) = values(c, row) = *variance++;
+  }
+  const Eigen::MatrixXd units = units_of_correlations(diagonal, B);
+  auto correlation = correlations.begin();
+  for (const int p : coupled) {
+    const auto& [i, j] = pairs[at(p)];
+    auto values = inverse.between(p);
+    for (Index c = 0; c < B; ++c)
+      for (Index row = 0; row < B; ++row)
+        values(row, c) = *correlation++ * units(row, i) * units(c, j);
+  }
+  return inverse;
 }
 
 }  // namespace km

@@ -2,6 +2,8 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <optional>
+#include <span>
 #include <vector>
 
 #include "modules/core/ids.hpp"
@@ -51,12 +53,17 @@ struct TreeSystem {
 /// column.
 struct TreeInverse {
   std::vector<float> diagonal = {};  ///< Lower triangles of the diagonal blocks.
-  /// The couplings that the system was sent with, as correlations in units of kCorrelation. The
-  /// error of a covariance is then at most 1.6e-5 of the product of its standard deviations.
+  /// The couplings that the system was sent with, as correlations in units of 1 / 32767. The error
+  /// of a covariance is then at most 1.6e-5 of the product of its standard deviations.
   std::vector<std::int16_t> correlations = {};
-  static constexpr double kCorrelation = 1.0 / 32767.0;
 
-  [[nodiscard]] bool empty() const { return diagonal.empty(); }
+  /// `inverse` has the variables and `pairs` of a system with the Schur complement `schur`.
+  /// Couplings that are zero there are not part of the factor, so the child does not need them.
+  [[nodiscard]] static TreeInverse of(const BlockMatrix& inverse, std::span<const NodePair> pairs,
+                                      const BlockMatrix& schur);
+  /// nullopt if the sizes differ from those of the system.
+  [[nodiscard]] std::optional<BlockMatrix> decoded(std::span<const NodePair> pairs,
+                                                   const BlockMatrix& schur) const;
 };
 
 /// A new weight of a sent edge, by its place in the edges of the system.

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "modules/robust/tree_messages.hpp"
+#include "modules/tree_newton/front_edges.hpp"
+
+namespace km {
+
+/// How an edge of the front of a member is weighed.
+struct EdgeWeight {
+  RobotId peer = 0;         ///< The other robot of the edge; this robot for an edge inside it.
+  bool is_between = false;  ///< `peer` is another robot.
+  bool is_odometry = false;
+  bool is_open = false;  ///< May be rejected.
+  /// Decided by the start: open, but not weighed unless the solution contradicts it.
+  bool is_settled = false;
+  bool is_contradicted = false;  ///< The present poses contradict its decided weight.
+  double weight = 1.0;           ///< At the accepted poses.
+  double candidate = 1.0;        ///< At the present poses.
+  double pair_limit = 1.0;       ///< Factor on the weight while the pair of the edge is limited.
+  bool is_limited = true;        ///< At the accepted poses.
+  bool may_be_limited = true;    ///< At the present poses.
+};
+
+/// The weights of the edges of a member while the team takes steps: graduated non-convexity, and
+/// the limits of pairs. Not thread-safe.
+class EdgeWeights {
+ public:
+  /// `edges`: of the first edges of the front.
+  explicit EdgeWeights(std::vector<EdgeWeight> edges) : edges_(std::move(edges)) {}
+
+  /// All open closures are weighed from now on.
+  void unsettle();
+  /// Computes the weights at the present poses of the nodes of `front`. The root may still reject
+  /// these poses. Adds the counts of closures to `sums`.
+  void weigh(const TreeVerdict& verdict, const FrontEdges& front, std::span<const SE3> present,
+             TreeSums& sums);
+  /// The weights at the present poses become the accepted ones.
+  void accept();
+
+  /// Weights of the edges in the equations, at the present or at the accepted poses.
+  [[nodiscard]] std::vector<double> in_equations(bool present) const;
+  [[nodiscard]] bool keeps(std::size_t edge) const { return edges_[edge].weight > 0.5; }
+
+ private:
+  void weigh_open(EdgeWeight& edge, const TreeVerdict& verdict, double residual, TreeSums& sums);
+  void limit_pairs(const TreeVerdict& verdict, const FrontEdges& front,
+                   std::span<const SE3> present);
+
+  std::vector<EdgeWeight> edges_;
+};
+
+}  // namespace km
