@@ -153,7 +153,7 @@ std::vector<Finding> what_stands_out(const RunFacts& facts, const Verdict& verdi
   return findings;
 }
 
-// What the robot, its network and its sensors report, beside the record.
+// Reports of the robot, its network and its sensors, beside the record.
 void add_reports(RunSummary& summary, const StoppedRun& run, const RunEnd& end,
                  const Watch& watch) {
   const auto& [options, config, robot, result, record] = run;

@@ -166,6 +166,19 @@ double log_odds_of_length(std::span<const NoiseCycle> cycles, std::span<const do
   return most - without;
 }
 
+// Log of the odds that some cycles have the usual noise and those of the factor `s` are false,
+// against all of them having this factor.
+double log_odds_of_two(std::span<const NoiseCycle> cycles, std::span<const double> weights,
+                       double usual, double s, double odometry) {
+  std::vector<double> wide, shorter;
+  for (const NoiseCycle& cycle : cycles) wide.push_back(log_ratio_of(cycle, s, odometry));
+  const double share = fit_cycle_mixture(wide, weights).share;
+  for (std::size_t k = 0; k < cycles.size(); ++k)
+    shorter.push_back(log_ratio_of(cycles[k], usual, odometry) -
+                      std::log(share * std::exp(wide[k]) + 1.0 - share));
+  return fit_cycle_mixture(shorter, weights).log_likelihood;
+}
+
 // The factor of cycles of one kind. A team whose cycles are shorter than claimed has better
 // odometry than it claims, too. Errors of its closures would otherwise be within the claims of
 // odometry.
@@ -181,6 +194,8 @@ double factor_of(std::span<const NoiseCycle> cycles, double observations, double
           kThousandToOne;
   if (!likely) return usual;
   const std::vector<double> weights = weights_of(cycles, observations);
+  if (log_odds_of_two(cycles, weights, usual, found.factor, odometry) >= kThousandToOne)
+    return usual;
   const bool other_length = log_odds_of_length(cycles, weights, usual, odometry) > found.log_odds;
   return other_length ? usual : found.factor;
 }

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <iterator>
 #include <random>
 
 #include "modules/robust/closure_noise.hpp"
@@ -93,6 +94,20 @@ TEST_CASE("The noise of the closures of a pair is estimated in the presence of f
   // 60 cycles of 3 axes determine a standard deviation to 5 %. The tolerance is three times this,
   // and the step of the grid.
   CHECK(found == Approx(scale).epsilon(0.25));
+}
+
+TEST_CASE("False closures that end near each other do not count as noise of true ones",
+          "[closure_noise]") {
+  const unsigned seed = GENERATE(range(1U, 6U));
+  const double share_false = GENERATE(0.74, 0.89, 0.95);
+  const int dimension = GENERATE(2, 3);
+  CAPTURE(seed, share_false, dimension);
+  std::mt19937 rng(seed);
+  const auto false_ones = static_cast<std::size_t>(200.0 * share_false);
+  std::vector<NoiseCycle> cycles = draw_cycles(false_ones, 12.0, 0.2, dimension, rng);
+  std::ranges::move(draw_cycles(200 - false_ones, 1.0, 0.0, dimension, rng),
+                    std::back_inserter(cycles));
+  CHECK(estimate_closure_noise(pair_of(std::move(cycles), {}), 1.0) == 1.0);
 }
 
 TEST_CASE("Closures that are as noisy as claimed keep the factor of the team", "[closure_noise]") {
