@@ -24,7 +24,7 @@ std::array<bool, 256> floor_ids(const LabelPalette& palette,
   return is_floor;
 }
 
-// Counts the rays through the band of each cell.
+// Counts the rays through the lower part of the band of each cell.
 class RayCounter {
  public:
   RayCounter(const Map2dConfig& config, const CellGrid& grid, const FloorHeights& floor)
@@ -69,7 +69,8 @@ class RayCounter {
     if (!grid_.contains(cell.x(), cell.y())) return;
     const std::uint32_t index = grid_.index(cell.x(), cell.y());
     const double above_m = z - static_cast<double>(floor_.height_m[index]);
-    if (above_m >= config_.min_height_m && above_m <= config_.max_height_m &&
+    // A ray shows nothing about lower obstacles.
+    if (above_m >= config_.min_height_m && above_m <= config_.min_height_m + config_.max_step_m &&
         rays_[index] < kLeast_rays)
       ++rays_[index];
   }

@@ -42,8 +42,8 @@ struct [[nodiscard]] Map2dResult {
 ///
 /// Occupied: surface in the band, unless it is labelled as floor, and steps of the floor above
 /// max_step_m. Free: other cells in which floor was seen, or which rays of the views cross within
-/// the band (by the traversal of Amanatides and Woo, "A Fast Voxel Traversal Algorithm for Ray
-/// Tracing", 1987). Unknown: the rest. For the floor see find_floor().
+/// the lowest max_step_m of the band (by the traversal of Amanatides and Woo, "A Fast Voxel
+/// Traversal Algorithm for Ray Tracing", 1987). Unknown: the rest. For the floor see find_floor().
 ///
 /// Deterministic. Time proportional to the surface of the mesh and the length of the rays.
 [[nodiscard]] Map2dResult make_map_2d(const Map2dConfig& config, const Map2dInput& input);

@@ -1,7 +1,13 @@
 #include "modules/map_2d/map_2d.hpp"
 
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
 #include <catch2/catch.hpp>
+#include <map>
 #include <set>
+#include <utility>
+#include <vector>
 
 #include "test/modules/map_2d/surfaces.hpp"
 
@@ -113,9 +119,9 @@ TEST_CASE("Rays through the band free cells, and follow the poses of their keyfr
   surfaces.level(0, 0, 1, 4, 0, kFloorLabel).wall(2.5F, 4, 2.5F, 0, 0, 2);
   std::vector<ViewRays> views(2);
   for (ViewRays& view : views) {  // two images, so that two rays cross each cell
-    view = {.keyframe = 1, .origin = {0.5F, 2, 1}, .ends = {}};
-    for (float y = 1.5F; y <= 2.5F; y += 0.02F) view.ends.emplace_back(2.5F, y, 0.5F);
-    view.ends.emplace_back(0.5F, 3.9F, 2.6F);  // above the band from y = 2.6 on
+    view = {.keyframe = 1, .origin = {0.5F, 2, 0.2F}, .ends = {}};
+    for (float y = 1.5F; y <= 2.5F; y += 0.02F) view.ends.emplace_back(2.5F, y, 0.3F);
+    view.ends.emplace_back(2.3F, 3.9F, 2.6F);  // too high from y = 2.2 on
   }
   std::vector<SE3> T_world_odom(2, SE3::Identity());
   const auto map = [&] {
@@ -131,6 +137,77 @@ TEST_CASE("Rays through the band free cells, and follow the poses of their keyfr
 
   T_world_odom.resize(1);  // the pose of the keyframe is unknown
   CHECK(values(map(), 1.1, 0.0, 2.4, 4.0) == Values{kUnknown});
+}
+
+// Two images from `eye` of a yard of 10 m x 6 m with a box.
+void look_from(const Eigen::Vector3d& eye, const Eigen::AlignedBox3d& box,
+               std::vector<ViewRays>& views) {
+  ViewRays view{.keyframe = 0, .origin = eye.cast<float>(), .ends = {}};
+  const auto look_at = [&](const Eigen::Vector3d& target) {
+    double t = 0.0;
+    while (t < 1.0 && !box.contains(Eigen::Vector3d(eye + t * (target - eye)))) t += 0.002;
+    view.ends.push_back((eye + std::min(t, 1.0) * (target - eye)).cast<float>());
+  };
+  for (double y = 0.05; y < 6.0; y += 0.05) {
+    for (double x = 0.05; x < 10.0; x += 0.1) look_at({x, y, 0.0});
+    for (double z = 0.1; z < 1.5; z += 0.1) look_at({10.0, y, z});
+  }
+  views.insert(views.end(), 2, view);
+}
+
+// The shortest path through free cells with no occupied one within 0.2 m, by A*.
+std::vector<Eigen::Vector2d> planned(const OccupancyGrid& grid, const Eigen::Vector2d& from,
+                                     const Eigen::Vector2d& to) {
+  using Cell = std::array<int, 2>;
+  const auto cell_at = [&](const Eigen::Vector2d& p) {
+    const Eigen::Vector2i cell = ((p - grid.origin) / grid.resolution_m).cast<int>();
+    return Cell{cell.x(), cell.y()};
+  };
+  const auto point_of = [&](const Cell& cell) -> Eigen::Vector2d {
+    return grid.origin + grid.resolution_m * Eigen::Vector2d(cell[0] + 0.5, cell[1] + 0.5);
+  };
+  const auto is_usable = [&](const Cell& cell) {
+    bool usable = grid.at(point_of(cell)) == kFree;
+    for (int x = -4; x <= 4; ++x)
+      for (int y = -4; y <= 4; ++y)
+        usable = usable && grid.at(point_of({cell[0] + x, cell[1] + y})) != kOccupied;
+    return usable;
+  };
+  const Cell start = cell_at(from), goal = cell_at(to);
+  std::map<Cell, std::pair<double, Cell>> best{{start, {0.0, start}}};  // length, predecessor
+  std::set<std::pair<double, Cell>> open{{0.0, start}};
+  while (!open.empty() && open.begin()->second != goal) {
+    const Cell cell = open.extract(open.begin()).value().second;
+    for (int k = 0; k < 9; ++k) {
+      const Cell next{cell[0] + k % 3 - 1, cell[1] + k / 3 - 1};
+      const double length = best[cell].first + (point_of(next) - point_of(cell)).norm();
+      if (!is_usable(next) || (best.contains(next) && best[next].first <= length)) continue;
+      best[next] = {length, cell};
+      open.emplace(length + (point_of(next) - point_of(goal)).norm(), next);
+    }
+  }
+  std::vector<Eigen::Vector2d> path;
+  if (open.empty()) return path;
+  for (Cell cell = goal; cell != start; cell = best[cell].second) path.push_back(point_of(cell));
+  return path;
+}
+
+TEST_CASE("A path through free cells does not touch a box of which only the front is mapped",
+          "[map_2d]") {
+  const Eigen::AlignedBox3d box(Eigen::Vector3d(4, 1.5, 0), Eigen::Vector3d(6, 4.5, 0.9));
+  Surfaces surfaces;
+  surfaces.level(0, 0, 3, 6, 0, kFloorLabel).level(7, 0, 9, 2, 0, kFloorLabel);
+  surfaces.wall(4, 4.5F, 4, 1.5F, 0, 0.9F).wall(10, 0, 10, 6, 0, 2.5F);
+  std::vector<ViewRays> views;
+  for (const Eigen::Vector3d& eye :
+       {Eigen::Vector3d(1, 0.8, 1.2), Eigen::Vector3d(1, 3, 1.2), Eigen::Vector3d(8, 1, 1.2)})
+    look_from(eye, box, views);
+  const std::vector<SE3> T_world_odom(1, SE3::Identity());
+  const OccupancyGrid grid = make_map_2d({}, {surfaces.mesh, palette(), views, T_world_odom}).grid;
+  const std::vector<Eigen::Vector2d> path = planned(grid, {1, 3}, {7.5, 3});
+  REQUIRE_FALSE(path.empty());
+  for (const Eigen::Vector2d& p : path)
+    CHECK_FALSE(box.contains(Eigen::Vector3d(p.x(), p.y(), 0.1)));
 }
 
 TEST_CASE("Without floor there is no map, and a map that is too large is refused", "[map_2d]") {
