@@ -26,12 +26,11 @@ namespace {
 // start from their odometry.
 std::vector<SessionGraph> divide(const G2oGraph& graph, RobotId robots) {
   if (graph.dimension != 3) throw std::invalid_argument("the graph is not 3D");
-  std::vector<BlockEdge> edges;
+  std::vector<PoseEdge> edges;
   KeyframeIndex poses = 0;
   for (const RelativePose& e : graph.edges) {
     if (e.from.robot != 0 || e.to.robot != 0) throw std::invalid_argument("the graph has robots");
-    const auto [kappa, tau] = precision_of(e.covariance);
-    edges.push_back({e.from.index, e.to.index, e.T_from_to, kappa, tau});
+    edges.push_back({e.from, e.to, e.T_from_to, precision_of(e.covariance)});
     poses = std::max({poses, e.from.index + 1, e.to.index + 1});
   }
   if (robots == 0 || robots > poses) throw std::invalid_argument("no poses for so many robots");
@@ -47,10 +46,10 @@ std::vector<SessionGraph> divide(const G2oGraph& graph, RobotId robots) {
 
   // Steps of odometry come first among the own edges of a robot. Both robots of an edge between
   // robots have this edge, and the pose of its other end.
-  std::stable_sort(edges.begin(), edges.end(), [](auto& a, auto& b) { return a.i < b.i; });
-  for (const BlockEdge& e : edges) {
-    const auto i = static_cast<KeyframeIndex>(e.i), j = static_cast<KeyframeIndex>(e.j);
-    const PoseEdge edge{id(i), id(j), e.T_i_j, {e.kappa, e.tau}};
+  std::stable_sort(edges.begin(), edges.end(), [](auto& a, auto& b) { return a.from < b.from; });
+  for (const PoseEdge& e : edges) {
+    const KeyframeIndex i = e.from.index, j = e.to.index;
+    const PoseEdge edge{id(i), id(j), e.T_from_to, e.precision};
     SessionGraph &from = parts[id(i).robot], &to = parts[id(j).robot];
     if (&from != &to) {
       from.between.push_back(edge);

@@ -72,7 +72,7 @@ QuadraticProblem MemberRbcd::make_problem() {
     own.push_back(
         {e.from.index, e.to.index, e.T_from_to, w * e.precision.kappa, w * e.precision.tau});
   }
-  for (const BlockEdge& fix : block_edges(graph_.fixes)) own.push_back(fix);
+  for (const PoseEdge& fix : graph_.fixes) own.push_back(BlockEdge::of(fix));
   std::vector<PublicEdge> to_others;
   Eigen::Index slots = 0;
   for (const auto* edges : {&graph_.between, &graph_.datum_ties, &graph_.to_absent})

@@ -36,6 +36,12 @@ bool usable(const SE3& T, double kappa, double tau) {
 
 }  // namespace
 
+std::vector<SE3> chordal_initialisation(Eigen::Index poses, std::span<const BlockEdge> edges) {
+  std::vector<PoseEdge> own;
+  for (const BlockEdge& e : edges) own.push_back(e.of_one_robot());
+  return chordal_initialisation(poses, own);
+}
+
 double edge_cost(const Eigen::Ref<const Eigen::MatrixXd>& X_i,
                  const Eigen::Ref<const Eigen::MatrixXd>& X_j, const SE3& T_i_j, double kappa,
                  double tau) {

@@ -7,10 +7,36 @@
 #include "modules/core/geometry.hpp"
 #include "modules/rbcd/block_cholesky.hpp"
 #include "modules/rbcd/stiefel.hpp"
-#include "modules/tree_newton/block_edge.hpp"
+#include "modules/tree_newton/chordal.hpp"
 #include "modules/tree_newton/vertical_prior.hpp"
 
 namespace km {
+
+/// A relative pose between poses i and j of one block: poses that are solved together, e.g. those
+/// of one robot. Its precisions are kappa of the rotation [1/rad^2], tau of the translation
+/// [1/m^2].
+struct BlockEdge {
+  Eigen::Index i = 0;
+  Eigen::Index j = 0;
+  SE3 T_i_j = SE3::Identity();
+  double kappa = 1.0;
+  double tau = 1.0;
+
+  [[nodiscard]] static BlockEdge of(const PoseEdge& e) {
+    return {e.from.index, e.to.index, e.T_from_to, e.precision.kappa, e.precision.tau};
+  }
+  /// The edge if the block is that of robot 0.
+  [[nodiscard]] PoseEdge of_one_robot() const {
+    return {{0, static_cast<KeyframeIndex>(i)},
+            {0, static_cast<KeyframeIndex>(j)},
+            T_i_j,
+            {kappa, tau}};
+  }
+};
+
+/// Chordal initialisation of a block.
+[[nodiscard]] std::vector<SE3> chordal_initialisation(Eigen::Index poses,
+                                                      std::span<const BlockEdge> edges);
 
 /// A relative pose between pose `own` of the block and pose `fixed` outside it. The cost of an edge
 /// is not symmetric in its two ends, so the direction of the measurement is kept.

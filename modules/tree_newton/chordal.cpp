@@ -32,7 +32,7 @@ void append(Entries& entries, Eigen::Index row, Eigen::Index col, const Eigen::M
 }
 
 // Transposed rotations, stacked: edge residual R_j^T - R_ij^T R_i^T. Pose 0 is known.
-std::vector<Eigen::Matrix3d> solve_rotations(Eigen::Index poses, std::span<const BlockEdge> edges) {
+std::vector<Eigen::Matrix3d> solve_rotations(Eigen::Index poses, std::span<const PoseEdge> edges) {
   Entries entries;
   Eigen::MatrixXd C = Eigen::MatrixXd::Zero(3 * (poses - 1), 3);
   const auto add = [&](Eigen::Index i, Eigen::Index j, const Eigen::Matrix3d& block) {
@@ -42,13 +42,15 @@ std::vector<Eigen::Matrix3d> solve_rotations(Eigen::Index poses, std::span<const
     else
       append(entries, i - 1, j - 1, block);
   };
-  for (const BlockEdge& e : edges) {
-    const Eigen::Matrix3d R = e.T_i_j.linear();
+  for (const PoseEdge& e : edges) {
+    const Eigen::Index i = e.from.index, j = e.to.index;
+    const Eigen::Matrix3d R = e.T_from_to.linear();
     const Eigen::Matrix3d I = Eigen::Matrix3d::Identity();
-    add(e.i, e.i, e.kappa * I);
-    add(e.j, e.j, e.kappa * I);
-    add(e.i, e.j, -e.kappa * R);
-    add(e.j, e.i, -e.kappa * R.transpose());
+    const double kappa = e.precision.kappa;
+    add(i, i, kappa * I);
+    add(j, j, kappa * I);
+    add(i, j, -kappa * R);
+    add(j, i, -kappa * R.transpose());
   }
   const Eigen::MatrixXd stacked = solve(entries, C);
   std::vector<Eigen::Matrix3d> rotations(1, Eigen::Matrix3d::Identity());
@@ -57,20 +59,20 @@ std::vector<Eigen::Matrix3d> solve_rotations(Eigen::Index poses, std::span<const
   return rotations;
 }
 
-Eigen::MatrixXd solve_translations(Eigen::Index poses, std::span<const BlockEdge> edges,
+Eigen::MatrixXd solve_translations(Eigen::Index poses, std::span<const PoseEdge> edges,
                                    const std::vector<Eigen::Matrix3d>& rotations) {
   Entries entries;
   Eigen::MatrixXd C = Eigen::MatrixXd::Zero(poses - 1, 3);
-  for (const BlockEdge& e : edges) {
-    const Eigen::Vector3d step =
-        e.tau * (rotations[static_cast<std::size_t>(e.i)] * e.T_i_j.translation());
-    const auto i = static_cast<int>(e.i) - 1;
-    const auto j = static_cast<int>(e.j) - 1;
-    if (i >= 0) entries.emplace_back(i, i, e.tau);
-    if (j >= 0) entries.emplace_back(j, j, e.tau);
+  for (const PoseEdge& e : edges) {
+    const double tau = e.precision.tau;
+    const Eigen::Vector3d step = tau * (rotations[e.from.index] * e.T_from_to.translation());
+    const auto i = static_cast<int>(e.from.index) - 1;
+    const auto j = static_cast<int>(e.to.index) - 1;
+    if (i >= 0) entries.emplace_back(i, i, tau);
+    if (j >= 0) entries.emplace_back(j, j, tau);
     if (i >= 0 && j >= 0) {
-      entries.emplace_back(i, j, -e.tau);
-      entries.emplace_back(j, i, -e.tau);
+      entries.emplace_back(i, j, -tau);
+      entries.emplace_back(j, i, -tau);
     }
     if (i >= 0) C.row(i) -= step.transpose();
     if (j >= 0) C.row(j) += step.transpose();
@@ -89,7 +91,7 @@ double cost_of(std::span<const PoseEdge> edges, const std::vector<SE3>& poses) {
 
 }  // namespace
 
-std::vector<SE3> chordal_initialisation(Eigen::Index poses, std::span<const BlockEdge> edges) {
+std::vector<SE3> chordal_initialisation(Eigen::Index poses, std::span<const PoseEdge> edges) {
   std::vector<SE3> result(static_cast<std::size_t>(poses), SE3::Identity());
   if (poses < 2) return result;
   const std::vector<Eigen::Matrix3d> rotations = solve_rotations(poses, edges);
@@ -106,8 +108,7 @@ std::vector<SE3> better_of_chordal(std::vector<SE3> poses, std::span<const PoseE
   for (PoseEdge& e : edges)
     e.precision = {std::max(e.precision.kappa, kLeast.kappa),
                    std::max(e.precision.tau, kLeast.tau)};
-  std::vector<SE3> chordal =
-      chordal_initialisation(static_cast<Eigen::Index>(poses.size()), block_edges(edges));
+  std::vector<SE3> chordal = chordal_initialisation(static_cast<Eigen::Index>(poses.size()), edges);
   for (SE3& T : chordal) T = poses.front() * T;
   return cost_of(edges, chordal) < cost_of(edges, poses) ? chordal : poses;
 }

@@ -111,7 +111,7 @@ CentralSolver::CentralSolver(const std::vector<BlockEdge>& edges, LiftedPoses st
     : staircase_(edges, start, verticals) {
   if (!rigid(start)) return;
   SessionGraph graph{.start = round_to_poses(start, lifted_identity(3))};
-  for (const BlockEdge& e : edges) graph.own.push_back(edge_of_one_robot(e));
+  for (const BlockEdge& e : edges) graph.own.push_back(e.of_one_robot());
   graph.upright = !verticals.empty();
   graph.verticals = std::move(verticals);
   newton_ = std::make_unique<TreeNewton>(std::move(graph), TreePlace{.members = {0}},

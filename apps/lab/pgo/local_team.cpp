@@ -22,7 +22,7 @@ SE3 pose_at(const LiftedPoses& X, Eigen::Index i) {
 }
 
 std::vector<SE3> start_of(const SessionGraph& part, Eigen::Index poses) {
-  return levelled(chordal_initialisation(poses, block_edges(part.own)), part.verticals);
+  return levelled(chordal_initialisation(poses, part.own), part.verticals);
 }
 
 SE3 levelled_frame(const SE3& T, const Eigen::Vector3d& origin) {
@@ -62,7 +62,9 @@ int LocalTeam::step(RoundMeter& meter) {
 void LocalTeam::solve(std::size_t k) {
   const SessionGraph& part = parts_[k];
   const Eigen::Index poses = pose_count(blocks_[k]);
-  const QuadraticProblem problem(kRank, poses, block_edges(part.own), {}, part.verticals);
+  std::vector<BlockEdge> edges;
+  for (const PoseEdge& e : part.own) edges.push_back(BlockEdge::of(e));
+  const QuadraticProblem problem(kRank, poses, edges, {}, part.verticals);
   blocks_[k] = minimise(problem, lift(start_of(part, poses), kRank), kExact).X;
 }
 

@@ -95,7 +95,7 @@ PlacedTeam solve_centrally(const TeamGraph& graph, std::vector<bool> kept, std::
   for (const ConnectedPart& part : connected_parts(graph, placed.kept)) {
     SessionGraph alone;
     for (const std::size_t i : part.poses) alone.start.push_back(placed.T_frame_kf[i]);
-    for (const BlockEdge& e : part.graph.edges) alone.own.push_back(edge_of_one_robot(e));
+    for (const BlockEdge& e : part.graph.edges) alone.own.push_back(e.of_one_robot());
     const LoneSolution solved = solve_alone(std::move(alone), {.dimension = graph.dimension,
                                                                .absolute_tolerance = kEnd,
                                                                .max_rounds = 300,

@@ -20,13 +20,6 @@ KeyframeId TeamGraph::keyframe_of(Eigen::Index pose) const {
   return {static_cast<RobotId>(robot), static_cast<KeyframeIndex>(pose - first[robot])};
 }
 
-PoseEdge edge_of_one_robot(const BlockEdge& edge) {
-  return {{0, static_cast<KeyframeIndex>(edge.i)},
-          {0, static_cast<KeyframeIndex>(edge.j)},
-          edge.T_i_j,
-          {edge.kappa, edge.tau}};
-}
-
 std::vector<bool> odometry_edges(const TeamGraph& graph) {
   std::vector<bool> odometry;
   std::set<KeyframeId> has_step;

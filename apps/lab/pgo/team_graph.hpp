@@ -35,9 +35,6 @@ struct TeamGraph {
   [[nodiscard]] KeyframeId keyframe_of(Eigen::Index pose) const;
 };
 
-/// `edge` in a graph whose poses all belong to robot 0.
-[[nodiscard]] PoseEdge edge_of_one_robot(const BlockEdge& edge);
-
 /// By edge: whether it is odometry, that is the first edge from a pose to the next of the same
 /// robot of the file.
 [[nodiscard]] std::vector<bool> odometry_edges(const TeamGraph& graph);
