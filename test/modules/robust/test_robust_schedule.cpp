@@ -42,11 +42,6 @@ struct Weighed {
   }
 };
 
-TEST_CASE("A residual that is not a number has no weight", "[pose_graph]") {
-  const double mu = GENERATE(1e-3, 1.0, 2.0 * kHardMu);
-  CHECK(robust_weight(std::numeric_limits<double>::quiet_NaN(), 9.0, mu) == 0.0);
-}
-
 TEST_CASE("The weight of a closure minimises the surrogate of the truncated cost", "[pose_graph]") {
   const double c2 = 9.0;
   const double mu = GENERATE(1e-6, 1e-3, 0.1, 1.0, 30.0);
@@ -62,9 +57,9 @@ TEST_CASE("The weight of a closure minimises the surrogate of the truncated cost
 
 TEST_CASE("Weights are 0 or 1 once the surrogate is steep", "[pose_graph]") {
   const double mu = GENERATE(100.0, 1e6, 1e30);
-  REQUIRE(mu >= kHardMu);
-  REQUIRE(mu <= kLargestMu);
   CAPTURE(mu);
+  CHECK(robust_weight(std::nan(""), 9.0, mu) == 0.0);
+  CHECK(robust_weight(std::nan(""), 9.0, 1e-3) == 0.0);
   CHECK(robust_weight(8.999, 9.0, mu) == 1.0);
   CHECK(robust_weight(9.001, 9.0, mu) == 0.0);
   CHECK(robust_weight(0.0, 9.0, mu) == 1.0);
@@ -120,16 +115,7 @@ TEST_CASE("Decided weights that the poses contradict are reopened a bounded numb
 
 TEST_CASE("The schedule ends, and the residual of every closure decides its weight",
           "[pose_graph]") {
-  Weighed weighing{.residuals = {0.5, 2.9, 3.1, 400.0}, .barc = 3.0};
-  weighing.run();
-  CHECK(weighing.schedule.decided());
-  CHECK(weighing.weights == std::vector<double>{1.0, 1.0, 0.0, 0.0});
-  CHECK(weighing.updates < 60);
-}
-
-TEST_CASE("The schedule ends after a bounded number of steps for residuals of any size",
-          "[pose_graph]") {
-  const double largest = GENERATE(3.001, 30.0, 1e4, 1e9);
+  const double largest = GENERATE(3.001, 30.0, 400.0, 1e4, 1e9);
   CAPTURE(largest);
   Weighed weighing{.residuals = {0.0, 2.999, 3.001, largest}, .barc = 3.0};
   weighing.run();
@@ -148,15 +134,10 @@ TEST_CASE("Weights that never settle are decided nevertheless", "[pose_graph]") 
     ++steps;
   }
   CHECK(schedule.decided());
-}
-
-TEST_CASE("Without closures that may be rejected all weights are final", "[pose_graph]") {
-  RobustSchedule schedule;
-  CHECK(schedule.decided());
-  schedule.start(1e3F, 0, 3.0);
-  CHECK(schedule.decided());
-  schedule.next({1, 1});
-  CHECK(schedule.decided());
+  RobustSchedule without;  // closures that may be rejected
+  without.start(1e3F, 0, 3.0);
+  without.next({1, 1});
+  CHECK(without.decided());
 }
 
 }  // namespace

@@ -286,112 +286,60 @@ TEST_CASE("A message with a wrong byte is refused, or is another valid message",
   CHECK(largest_resident_kb() - before_kb < 512 * 1024);
 }
 
-// A message without its last `bytes`, which are zeros.
-ByteWriter without_zeros(Bytes message, std::size_t bytes) {
-  REQUIRE(std::all_of(message.end() - static_cast<std::ptrdiff_t>(bytes), message.end(),
-                      [](std::uint8_t byte) { return byte == 0; }));
-  message.resize(message.size() - bytes);
-  ByteWriter w;
-  w.bytes(message);
-  return w;
-}
-
-// The beginning of a message up, before the number of lengths. The numbers of lengths, votes, and
-// rows, the flag of the system and the number of weights follow it.
-ByteWriter up_to_lengths() {
-  return without_zeros(encode(UpMessage{.round = 1, .sums = {}}), 5);
-}
-
-// The beginning of a message up, before the number of variables.
-ByteWriter up_to_variables(std::uint8_t block) {
-  ByteWriter w = up_to_lengths();
-  for (int k = 0; k < 3; ++k) w.varint(0);  // lengths, votes, right-hand side
-  w.u8(1);
-  w.u8(block);
-  return w;
-}
-
-void variables(ByteWriter& w, std::uint64_t count) {
-  w.varint(count);
-  for (std::uint64_t k = 0; k < count; ++k)
-    for (const std::uint64_t x : {std::uint64_t{1}, k, std::uint64_t{1}, std::uint64_t{1}})
-      w.varint(x);
-}
-
-Bytes with_zeros(ByteWriter& w) {
-  w.bytes(Bytes(1000, 0));
-  return w.release();
-}
-
+// `count` in place of each byte, and so also in place of each count.
 TEST_CASE("Counts beyond the size of the message are refused", "[pose_graph]") {
-  const std::uint64_t count =
-      GENERATE(std::uint64_t{2000}, std::uint64_t{1} << 24U, std::uint64_t{1} << 32U,
-               std::uint64_t{1} << 61U, ~std::uint64_t{0});
+  const std::uint64_t count = GENERATE(std::uint64_t{1} << 61U, ~std::uint64_t{0});
   CAPTURE(count);
   const std::size_t before_kb = largest_resident_kb();
-  for (int field = 0; field < 7; ++field) {
-    CAPTURE(field);
-    ByteWriter w = field < 3 ? up_to_lengths() : up_to_variables(6);
-    if (field < 3) {
-      for (int k = 0; k < field; ++k) w.varint(0);  // lengths, votes, right-hand side
-    } else if (field == 4 || field == 5) {
-      variables(w, 2);  // couplings; edges
-      if (field == 5) {
-        w.varint(0);
-        w.u8(0);
-      }
-    } else if (field == 6) {  // new weights
-      w = up_to_lengths();
-      for (int k = 0; k < 3; ++k) w.varint(0);
-      w.u8(0);
+  ByteWriter out;
+  out.varint(count);
+  const Bytes huge = out.release();
+  for (const Bytes& bytes : one_of_each())
+    for (std::size_t k = 0; k < bytes.size(); ++k) {
+      Bytes changed = bytes;
+      changed.erase(changed.begin() + static_cast<std::ptrdiff_t>(k));
+      changed.insert(changed.begin() + static_cast<std::ptrdiff_t>(k), huge.begin(), huge.end());
+      check_harmless(changed);
     }
-    w.varint(count);
-    CHECK_FALSE(decode_up(with_zeros(w)));
-  }
-  for (int field = 0; field < 4; ++field) {
-    // The numbers of moves, of rows of the step, and of entries of the inverse follow.
-    ByteWriter w = without_zeros(encode(DownMessage{}), 4);
-    for (int k = 0; k < field; ++k) w.varint(0);
-    w.varint(count);
-    CHECK_FALSE(decode_down(with_zeros(w)));
-  }
   CHECK(largest_resident_kb() - before_kb < 64 * 1024);
 }
 
 TEST_CASE("Verdicts with numbers out of range are refused", "[pose_graph]") {
-  const auto with = [](auto&& change) {
-    DownMessage message =
-        some_down_message(TreeVerdict::Next::kStep, TreeVerdict::Weighing::kWeigh);
-    change(message.verdict);
-    return decode_down(encode(message)).has_value();
-  };
-  CHECK(with([](TreeVerdict&) {}));
-  CHECK_FALSE(with([](TreeVerdict& v) { v.scale = 1.5; }));
-  CHECK_FALSE(with([](TreeVerdict& v) { v.scale = 0.0; }));
-  CHECK_FALSE(with([](TreeVerdict& v) { v.mu = -1.0; }));
-  CHECK_FALSE(with([](TreeVerdict& v) { v.barc = -1.0; }));
-  CHECK_FALSE(with([](TreeVerdict& v) { v.noise_scale = 0.0; }));
-  CHECK_FALSE(with([](TreeVerdict& v) { v.usual_pair.kappa = 0.0; }));
-  CHECK_FALSE(with([](TreeVerdict& v) { v.usual_noise = 0.5; }));
-  CHECK_FALSE(with([](TreeVerdict& v) { v.usual_pair.tau = -1.0; }));
-  CHECK_FALSE(with([](TreeVerdict& v) { v.gradient = -1.0; }));
-  CHECK_FALSE(with([](TreeVerdict& v) { v.cost = INFINITY; }));
+  using V = TreeVerdict;
+  const std::vector<void (*)(V&)> faults{[](V& v) { v.scale = 1.5; },
+                                         [](V& v) { v.scale = 0.0; },
+                                         [](V& v) { v.mu = -1.0; },
+                                         [](V& v) { v.barc = -1.0; },
+                                         [](V& v) { v.noise_scale = 0.0; },
+                                         [](V& v) { v.usual_noise = 0.5; },
+                                         [](V& v) { v.usual_pair.tau = -1.0; },
+                                         [](V& v) { v.usual_pair.kappa = 0.0; },
+                                         [](V& v) { v.gradient = -1.0; },
+                                         [](V& v) { v.cost = INFINITY; }};
+  for (std::size_t k = 0; k < faults.size(); ++k) {
+    CAPTURE(k);
+    DownMessage message = some_down_message(V::Next::kStep, V::Weighing::kWeigh);
+    faults[k](message.verdict);
+    CHECK_FALSE(decode_down(encode(message)));
+  }
 }
 
 TEST_CASE("Inconsistent systems are refused", "[pose_graph]") {
-  const auto with = [](auto&& change) {
+  using S = TreeSystem;
+  const std::vector<void (*)(S&)> faults{[](S& s) { s.edges[0].pair = 3; },
+                                         [](S& s) { s.edges[0].kappa = 0.0F; },
+                                         [](S& s) { s.edges[0].tau = -1.0F; },
+                                         [](S& s) { s.edges[0].weight = 1.5F; },
+                                         [](S& s) { s.edges[0].present.q.coeffs() *= 2.0F; },
+                                         [](S& s) { s.edges[0].present.t.x() = std::nanf(""); },
+                                         [](S& s) { s.schur.at(0)(0, 0) = std::nan(""); },
+                                         [](S& s) { s.schur = BlockMatrix::zero(4, 4, 3); }};
+  for (std::size_t k = 0; k < faults.size(); ++k) {
+    CAPTURE(k);
     UpMessage message = some_up_message(6, true);
-    change(*message.system);
-    return decode_up(encode(message)).has_value();
-  };
-  CHECK(with([](TreeSystem&) {}));
-  CHECK_FALSE(with([](TreeSystem& s) { s.edges[0].pair = 3; }));
-  CHECK_FALSE(with([](TreeSystem& s) { s.edges[0].kappa = 0.0F; }));
-  CHECK_FALSE(with([](TreeSystem& s) { s.edges[0].tau = -1.0F; }));
-  CHECK_FALSE(with([](TreeSystem& s) { s.edges[0].weight = 1.5F; }));
-  CHECK_FALSE(with([](TreeSystem& s) { s.edges[0].present.q.coeffs() *= 2.0F; }));
-  CHECK_FALSE(with([](TreeSystem& s) { s.edges[0].present.t.x() = std::nanf(""); }));
-  CHECK_FALSE(with([](TreeSystem& s) { s.schur.at(0)(0, 0) = std::nan(""); }));
+    faults[k](*message.system);
+    CHECK_FALSE(decode_up(encode(message)));
+  }
   // The encoder needs pairs of existing variables, so these are changed in the bytes.
   const auto with_first_pair = [](std::uint8_t i, std::uint8_t j) {
     Bytes bytes = encode(some_up_message(6, true));
@@ -405,10 +353,6 @@ TEST_CASE("Inconsistent systems are refused", "[pose_graph]") {
   CHECK(with_first_pair(0, 1));
   CHECK_FALSE(with_first_pair(0, 4));
   CHECK_FALSE(with_first_pair(0, 0));
-  const auto block = GENERATE(as<std::uint8_t>(), 0, 1, 4, 7, 255);
-  ByteWriter w = up_to_variables(block);
-  for (int k = 0; k < 4; ++k) w.varint(0);
-  CHECK_FALSE(decode_up(w.release()));
 }
 
 }  // namespace
