@@ -97,32 +97,32 @@ bool MemberEdges::reports(const Known& k) const {
   return graph_.self <= std::min(k.edge.from.robot, k.edge.to.robot);
 }
 
-// The own poses by odometry alone, from the first one. Unknown steps are those of the start.
-std::vector<SE3> MemberEdges::odometry_poses() const {
-  const std::vector<SE3>& start = graph_.start;
-  std::vector<SE3> poses{start.front()};
-  for (std::size_t k = 0; k < graph_.odometry; ++k) {
-    const PoseEdge& step = known_[k].edge;
-    poses.push_back(poses.back() *
-                    (is_unknown_step(step) ? start[k].inverse() * start[k + 1] : step.T_from_to));
-  }
-  return poses;
-}
-
-// The poses of the ends of closures to `peer`, for cycles. Poses that were optimised with closures
-// hide errors of cycles, so closures inside this robot are compared with its odometry. For closures
-// to another robot, both robots use the starts of public poses, because they know nothing else of
-// each other.
-Corroboration::PoseOf MemberEdges::pose_before_closures(RobotId peer,
-                                                        const std::vector<SE3>& odometry) const {
-  if (peer == graph_.self)
-    return [&odometry](const KeyframeId& id) { return odometry.at(id.index); };
-  return [this](const KeyframeId& id) { return start_of(id); };
-}
-
 Corroboration MemberEdges::corroboration(std::span<const PoseEdge> closures,
                                          const Corroboration::PoseOf& pose) const {
   return {closures, pose, graph_.step_precision, options_.dimension, graph_.later_runs};
+}
+
+// Calls visit(peer, indices, open), where `open` are the open closures of a pair at their poses for
+// cycles. Poses that were optimised with closures hide errors of cycles, so closures inside this
+// robot are compared with its odometry; unknown steps are those of the start. For closures to
+// another robot, both robots use the starts of public poses, because they know nothing else of each
+// other.
+void MemberEdges::for_cycles(auto&& visit) {
+  std::vector<SE3> odometry{graph_.start.front()};
+  for (std::size_t k = 0; k < graph_.odometry; ++k) {
+    const PoseEdge& step = known_[k].edge;
+    odometry.push_back(odometry.back() * (is_unknown_step(step)
+                                              ? graph_.start[k].inverse() * graph_.start[k + 1]
+                                              : step.T_from_to));
+  }
+  for (const auto& [peer, indices] : by_peer()) {
+    const Corroboration::PoseOf pose = [&, inside = peer == graph_.self](const KeyframeId& id) {
+      return inside ? odometry.at(id.index) : start_of(id);
+    };
+    const std::vector<PoseEdge> open =
+        select(indices, [](const Known& k) { return k.trust == Trust::kOpen; });
+    visit(peer, indices, corroboration(open, pose));
+  }
 }
 
 TreeSums MemberEdges::count() {
@@ -143,7 +143,12 @@ TreeSums MemberEdges::count() {
       sums.votes.push_back(std::move(vote));
   }
   if (!std::exchange(lengths_due_, false)) return sums;
-  if (!graph_.again) count_lengths();
+  const std::size_t most =
+      place_.members.size() < kEnoughToOutvote ? kEnoughLengths : kShareOfLengths;
+  if (!graph_.again)
+    for_cycles([&](RobotId peer, const Indices&, const Corroboration& open) {
+      if (graph_.self <= peer) open.count_lengths(graph_.noise.lengths, most);
+    });
   sums.lengths = graph_.noise.lengths;
   return sums;
 }
@@ -163,18 +168,6 @@ PairVote MemberEdges::vote_on(RobotId peer, const Indices& indices, bool first) 
   if (noise_known_ && cycles != graph_.noise.pairs.end() && shows_noise(cycles->second))
     vote.noise = static_cast<float>(cycles->second.factor);
   return vote;
-}
-
-void MemberEdges::count_lengths() {
-  const std::size_t most =
-      place_.members.size() < kEnoughToOutvote ? kEnoughLengths : kShareOfLengths;
-  const std::vector<SE3> odometry = odometry_poses();
-  for (const auto& [peer, indices] : by_peer()) {
-    const Corroboration::PoseOf pose = pose_before_closures(peer, odometry);
-    const std::vector<PoseEdge> closures =
-        select(indices, [&](const Known& k) { return k.trust == Trust::kOpen && reports(k); });
-    corroboration(closures, pose).count_lengths(graph_.noise.lengths, most);
-  }
 }
 
 void MemberEdges::follow(const TreeVerdict& verdict) {
@@ -210,24 +203,17 @@ void MemberEdges::weaken_odometry() {
   }
 }
 
-void MemberEdges::weaken(const Indices& closures, double factor) {
-  for (const std::size_t k : closures) divide(known_[k].edge.precision, factor * factor);
-}
-
 // A pair with more noise than the team as a whole has less weight.
 void MemberEdges::weigh_by_noise(double noise_scale) {
   if (!options_.robust || std::exchange(noise_known_, true)) return;
-  const std::vector<SE3> odometry = odometry_poses();
-  for (const auto& [peer, indices] : by_peer()) {
-    const Corroboration::PoseOf pose = pose_before_closures(peer, odometry);
-    const std::vector<PoseEdge> closures =
-        select(indices, [](const Known& k) { return k.trust == Trust::kOpen; });
+  for_cycles([&](RobotId peer, const Indices& indices, const Corroboration& open) {
     PairCycles& cycles = graph_.noise.pairs[peer];
     if (!graph_.again)  // the poses now fit the closures that the first look has kept
-      corroboration(closures, pose).count_cycles(cycles);
+      open.count_cycles(cycles);
     cycles.factor = estimate_closure_noise(cycles, noise_scale) / noise_scale;
-    weaken(indices, cycles.factor);
-  }
+    for (const std::size_t k : indices)
+      divide(known_[k].edge.precision, cycles.factor * cycles.factor);
+  });
 }
 
 // A pair whose cycles do not show how noisy its closures are is assumed to have the noise of the
@@ -239,7 +225,8 @@ void MemberEdges::weigh_by_usual_noise(double usual, double noise_scale) {
     if (!(cycles.factor < usual) ||
         excludes_noise(cycles, usual * noise_scale, cycles.factor * noise_scale))
       continue;
-    weaken(closures, usual / cycles.factor);
+    const double factor = usual / cycles.factor;
+    for (const std::size_t k : closures) divide(known_[k].edge.precision, factor * factor);
     cycles.factor = usual;
   }
 }

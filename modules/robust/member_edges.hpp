@@ -66,18 +66,14 @@ class MemberEdges {
   [[nodiscard]] bool reports(const Known& k) const;
   [[nodiscard]] std::map<RobotId, Indices> by_peer() const;
   [[nodiscard]] std::vector<PoseEdge> select(const Indices& closures, auto&& condition) const;
-  [[nodiscard]] std::vector<SE3> odometry_poses() const;
-  [[nodiscard]] Corroboration::PoseOf pose_before_closures(RobotId peer,
-                                                           const std::vector<SE3>& odometry) const;
   [[nodiscard]] Corroboration corroboration(std::span<const PoseEdge> closures,
                                             const Corroboration::PoseOf& pose) const;
+  void for_cycles(auto&& visit);
   void classify();
   [[nodiscard]] PairVote vote_on(RobotId peer, const Indices& closures, bool first) const;
-  void count_lengths();
   void weaken_odometry();
   void weigh_by_noise(double noise_scale);
   void weigh_by_usual_noise(double usual, double noise_scale);
-  void weaken(const Indices& closures, double factor);
   void move_robots(const std::vector<std::pair<RobotId, SinglePose>>& moves);
   void settle(double barc);
   void find_isolated(const TreeVerdict& verdict);
