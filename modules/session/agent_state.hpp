@@ -121,8 +121,7 @@ struct AgentState {
   }
   [[nodiscard]] bool all_solved() const { return part->all_solved(roster.public_poses()); }
   [[nodiscard]] std::size_t closures_inside() const {
-    const auto* inside = graph.newest_edges(self.robot);
-    return inside == nullptr ? 0 : inside->size();
+    return graph.newest_edges(self.robot).size();
   }
 };
 

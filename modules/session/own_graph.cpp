@@ -196,36 +196,31 @@ const std::vector<PoseEdge>* OwnGraph::edges(RobotId peer, const EdgeSetId& id) 
   return nullptr;
 }
 
-const std::vector<PoseEdge>* OwnGraph::newest_edges(RobotId peer) const {
+std::span<const PoseEdge> OwnGraph::newest_edges(RobotId peer) const {
   const auto sets = sets_.find(peer);
-  return sets == sets_.end() || sets->second.complete.empty() ? nullptr
-                                                              : &sets->second.complete[0].edges;
+  if (sets == sets_.end() || sets->second.complete.empty()) return {};
+  return sets->second.complete[0].edges;
 }
 
 void OwnGraph::judge_odometry(bool corrects) {
-  const std::vector<PoseEdge>* inside = newest_edges(self_);
-  odometry_judgement_ = inside == nullptr
-                            ? OdometryJudgement()
-                            : km::judge_odometry(odometry_, *inside, dimension_, step_s_, corrects);
+  odometry_judgement_ =
+      km::judge_odometry(odometry_, newest_edges(self_), dimension_, step_s_, corrects);
 }
 
 std::vector<PoseEdge> OwnGraph::own_edges() const {
   std::vector<PoseEdge> edges = odometry_;
   odometry_judgement_.correct(edges);
   const OdometryNoise& noise = odometry_judgement_.noise;
-  if (const std::vector<PoseEdge>* inside = newest_edges(self_))
-    for (PoseEdge e : *inside) {
-      if (noise.of_closures) e.precision = noise.corrected(e.precision);
-      edges.push_back(e);
-    }
+  for (PoseEdge e : newest_edges(self_)) {
+    if (noise.of_closures) e.precision = noise.corrected(e.precision);
+    edges.push_back(e);
+  }
   return edges;
 }
 
 std::vector<PoseEdge> OwnGraph::closures_across(KeyframeIndex run, KeyframeIndex end) const {
   std::vector<PoseEdge> across;
-  const std::vector<PoseEdge>* inside = newest_edges(self_);
-  if (inside == nullptr) return across;
-  for (const PoseEdge& e : *inside) {
+  for (const PoseEdge& e : newest_edges(self_)) {
     const auto [first, second] = std::minmax(e.from.index, e.to.index);
     if (first < run && run <= second && second < end) across.push_back(e);
   }

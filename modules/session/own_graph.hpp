@@ -65,8 +65,8 @@ class OwnGraph {
   /// Edges of an offered set, ascending by id; nullptr if this robot does not (or no longer) hold
   /// it.
   [[nodiscard]] const std::vector<PoseEdge>* edges(RobotId peer, const EdgeSetId& id) const;
-  /// Edges of the newest complete set with a peer; nullptr if there is none.
-  [[nodiscard]] const std::vector<PoseEdge>* newest_edges(RobotId peer) const;
+  /// Edges of the newest complete set with a peer, if there is one.
+  [[nodiscard]] std::span<const PoseEdge> newest_edges(RobotId peer) const;
 
   /// The odometry of this robot and a peer by each known closure between them, selected or not.
   /// Ascending by closure.

@@ -123,13 +123,13 @@ std::vector<SE3> own_start(const OwnGraph& graph, RobotId self, bool trusted) {
   extend_by_odometry(graph, poses);
   correct(graph.odometry_breaks(), poses);
   (void)place_runs(graph, self, poses);
-  const std::vector<PoseEdge>* inside = graph.newest_edges(self);
-  if (inside == nullptr) return poses;
+  const std::span<const PoseEdge> inside = graph.newest_edges(self);
+  if (inside.empty()) return poses;
   const std::vector<PoseEdge> all = graph.own_edges();
   if (trusted) return better_of_chordal(std::move(poses), all);
   const std::size_t steps = graph.keyframes() - 1;
   std::vector<PoseEdge> likely(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(steps));
-  for (const PoseEdge& closure : likely_closures(graph, self, poses, *inside))
+  for (const PoseEdge& closure : likely_closures(graph, self, poses, inside))
     likely.push_back(closure);
   if (likely.size() < steps + kEnoughForChordal) return poses;
   std::vector<SE3> chordal = better_of_chordal(poses, likely);

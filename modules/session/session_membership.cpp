@@ -180,12 +180,8 @@ void set_start(AgentState& s, const Session& session, SessionGraph& graph) {
 
 // Number of closures of this robot in the newest sets of edges.
 std::size_t known_closures(const AgentState& s) {
-  std::size_t closures = 0;
-  const auto count = [&](RobotId robot) {
-    if (const auto* edges = s.graph.newest_edges(robot)) closures += edges->size();
-  };
-  count(s.self.robot);
-  for (const auto& [robot, peer] : s.roster.peers()) count(robot);
+  std::size_t closures = s.closures_inside();
+  for (const auto& [robot, peer] : s.roster.peers()) closures += s.graph.newest_edges(robot).size();
   return closures;
 }
 
@@ -273,7 +269,7 @@ void advance(AgentState& s, TeamOutput& output) {
     if (s.part->stage() == MemberStage::kFailed)
       s.notices.add("session " + std::to_string(s.part->session().id.number) + " of robot " +
                     std::to_string(s.part->session().id.coordinator.robot) +
-                    " cannot be solved: " + s.part->failure());
+                    " cannot be solved: " + s.part->result().failure);
     publish_poses(s, output);
   }
   if (s.in_session()) conclude(s, output);

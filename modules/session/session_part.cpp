@@ -20,7 +20,7 @@ void add_public_poses(const MemberPoses& poses, std::map<KeyframeId, SE3>& publi
 }
 
 // Adds the received poses of a robot that is not a member, and the closures to these poses.
-void add_absent(const MemberPoses& poses, RobotId self, const std::vector<PoseEdge>& edges,
+void add_absent(const MemberPoses& poses, RobotId self, std::span<const PoseEdge> edges,
                 SessionGraph& graph) {
   add_public_poses(poses, graph.public_poses);
   for (const PoseEdge& e : edges)
@@ -67,12 +67,12 @@ std::optional<FrozenPart> freeze_part(const Session& session, RobotId self, cons
   std::ranges::sort(frozen.between, {}, &PoseEdge::id);
   std::set<KeyframeIndex> ends{0};
   for (const RobotId robot : peers) {
-    const auto* edges = graph.newest_edges(robot);
-    if (edges == nullptr) continue;
-    for (const PoseEdge& e : *edges) ends.insert(e.end_on(self).index);
+    const std::span<const PoseEdge> edges = graph.newest_edges(robot);
+    if (edges.empty()) continue;
+    for (const PoseEdge& e : edges) ends.insert(e.end_on(self).index);
     const auto poses = results.find(robot);
     if (!plan.has_member(robot) && poses != results.end() && poses->second.frame == plan.frame)
-      add_absent(poses->second, self, *edges, frozen);
+      add_absent(poses->second, self, edges, frozen);
   }
   for (const PoseEdge& e : frozen.between) ends.insert(e.end_on(self).index);
   frozen.datum_ties = datum_ties(plan, self);
@@ -129,7 +129,11 @@ bool SessionPart::joins_members(const ClosureId& closure) const {
 
 SessionWork SessionPart::advance(const PublicPoses& published, double now_s) {
   if (state_ == SessionState::kEntering) {
-    work_.any = enter(published);
+    work_.any = in_frame_ || align(published);
+    if (work_.any) {
+      round_public_poses();
+      take(SessionEvent::kEntered);
+    }
   } else if (state_ == SessionState::kGathering || state_ == SessionState::kLooking) {
     work_.any = gather(published);
     if (work_.any) start_solver(now_s);
@@ -151,13 +155,6 @@ std::vector<SinglePose> SessionPart::public_poses() const {
   for (const KeyframeIndex keyframe : public_)
     rounded.push_back(SinglePose::of(result_.poses[keyframe]));
   return rounded;
-}
-
-bool SessionPart::enter(const PublicPoses& published) {
-  if (!in_frame_ && !align(published)) return false;
-  round_public_poses();
-  take(SessionEvent::kEntered);
-  return true;
 }
 
 void SessionPart::round_public_poses() {
@@ -247,8 +244,11 @@ void SessionPart::solve(double now_s) {
   if (state.failed) return fail("the team's equations cannot be solved");
   // A second look without closures to weigh ends in its first round: the first one is the result.
   if (state_ == SessionState::kSolving || state.round > 1)
-    result_ = {progress(), solver_->verdicts(), solver_->noise(), solver_->covariances(),
-               solver_->poses()};
+    result_ = {.state = progress(),
+               .verdicts = solver_->verdicts(),
+               .noise = solver_->noise(),
+               .covariances = solver_->covariances(),
+               .poses = solver_->poses()};
   solver_.reset();
   if (state.deferred && state_ == SessionState::kSolving) return look_again();
   take(SessionEvent::kConverged);
@@ -265,7 +265,7 @@ void SessionPart::look_again() {
 }
 
 void SessionPart::fail(const std::string& why) {
-  failure_ = why;
+  result_.failure = why;
   take(SessionEvent::kBroken);
 }
 

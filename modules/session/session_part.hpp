@@ -53,6 +53,7 @@ struct SessionResult {
   ClosureNoiseRecord noise = {};
   std::vector<Matrix6> covariances = {};  ///< At `poses`; empty if the solver computes none.
   std::vector<SE3> poses = {};
+  std::string failure = {};  ///< Why the session cannot be solved.
 };
 
 /// The outcome of a piece of work of a session.
@@ -105,7 +106,6 @@ class SessionPart {
 
   [[nodiscard]] SessionState state() const { return state_; }
   [[nodiscard]] std::optional<MemberStage> stage() const { return stage_of(state_); }
-  [[nodiscard]] const std::string& failure() const { return failure_; }
   /// Poses that a member has sent in this session at `stage` or later; nullptr if there are none.
   [[nodiscard]] const MemberPoses* poses_of(const PublicPoses& published, RobotId robot,
                                             MemberStage stage) const;
@@ -129,7 +129,6 @@ class SessionPart {
   [[nodiscard]] const SessionCost& cost() const { return cost_; }
 
  private:
-  [[nodiscard]] bool enter(const PublicPoses& published);
   void round_public_poses();
   [[nodiscard]] bool align(const PublicPoses& published);
   [[nodiscard]] bool gather(const PublicPoses& published);
@@ -158,7 +157,6 @@ class SessionPart {
   std::unique_ptr<MemberSolver> solver_;
   SessionResult result_;
   SessionState state_ = SessionState::kEntering;
-  std::string failure_;
   SessionCost cost_;
 };
 
