@@ -4,7 +4,6 @@
 #include <Eigen/LU>
 #include <cmath>
 #include <fstream>
-#include <iterator>
 #include <limits>
 #include <sstream>
 #include <stdexcept>
@@ -40,11 +39,7 @@ SE3 read_pose(TextFields& fields, int dimension, const Bounds<double>& bounds_m)
     const Eigen::AngleAxisd R(fields.number("angle", kAngle_rad), Eigen::Vector3d::UnitZ());
     return make_pose(R.toRotationMatrix(), t);
   }
-  Eigen::Quaterniond q;
-  for (double& c : q.coeffs()) c = fields.number("quaternion");
-  if (!(std::abs(q.norm() - 1.0) <= kUnitTolerance))
-    fields.fail("quaternion has length " + std::to_string(q.norm()));
-  return make_pose(q.normalized().toRotationMatrix(), t);
+  return make_pose(fields.rotation(), t);
 }
 
 // Upper triangle of an NxN information matrix.
@@ -278,8 +273,6 @@ std::uint64_t key_of_keyframe(const KeyframeId& id) {
   return (robot << 32U) | id.index;
 }
 
-namespace {
-
 G2oGraph parse_g2o(const std::string& text, const std::string& file) {
   constexpr std::size_t kMaxFields = 64;  // a valid line has at most 31
   Reader reader;
@@ -290,14 +283,6 @@ G2oGraph parse_g2o(const std::string& text, const std::string& file) {
   }
   if (reader.graph.dimension == 0) throw std::runtime_error(file + ": no vertex and no edge");
   return std::move(reader.graph);
-}
-
-}  // namespace
-
-G2oGraph read_g2o(std::istream& in, const std::string& file) {
-  const std::string text(std::istreambuf_iterator<char>(in), {});
-  if (in.bad()) throw std::runtime_error(file + ": cannot be read to its end");
-  return parse_g2o(text, file);
 }
 
 G2oGraph read_g2o(const std::filesystem::path& file) {

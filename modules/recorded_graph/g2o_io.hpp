@@ -71,7 +71,8 @@ struct G2oGraph {
 /// duplicate vertices, edges from a pose to itself, priors of any other kind, and two priors on one
 /// pose. Edges and priors may name vertices that are not in the file, because these vertices belong
 /// to another robot.
-[[nodiscard]] G2oGraph read_g2o(std::istream& in, const std::string& file);
+/// `file` names the source of `text` in errors.
+[[nodiscard]] G2oGraph parse_g2o(const std::string& text, const std::string& file);
 [[nodiscard]] G2oGraph read_g2o(const std::filesystem::path& file);
 
 /// Writes a 3D graph. read_g2o() returns the same graph up to rounding. Throws

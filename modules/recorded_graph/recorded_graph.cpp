@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <istream>
-#include <iterator>
 #include <limits>
 #include <optional>
 #include <set>
@@ -37,13 +35,10 @@ RelativePose read_row(TextFields& fields) {
   row.from = read_keyframe(fields);
   row.to = read_keyframe(fields);
   if (row.from == row.to) fields.fail("measurement from " + to_string(row.from) + " to itself");
-  Eigen::Quaterniond q;
-  for (double& c : q.coeffs()) c = fields.number("quaternion");
-  if (!(std::abs(q.norm() - 1.0) <= kUnitTolerance))
-    fields.fail("quaternion has length " + std::to_string(q.norm()));
+  const Eigen::Matrix3d R = fields.rotation();
   Eigen::Vector3d t;
   for (double& c : t) c = fields.number("translation", kStep_m);
-  row.T_from_to = make_pose(q.normalized().toRotationMatrix(), t);
+  row.T_from_to = make_pose(R, t);
   const Precision precision{fields.number("kappa"), fields.number("tau")};
   if (!(precision.kappa > 0.0 && precision.tau > 0.0))
     fields.fail("kappa and tau must be positive");
@@ -178,8 +173,6 @@ RecordedGraph make_recorded_graph(const std::vector<RelativePose>& edges, const 
   return graph;
 }
 
-namespace {
-
 std::vector<RelativePose> parse_measurements(const std::string& text, const std::string& file) {
   std::string_view content = text;
   if (content.starts_with(kByteOrderMark)) content.remove_prefix(kByteOrderMark.size());
@@ -195,14 +188,6 @@ std::vector<RelativePose> parse_measurements(const std::string& text, const std:
     rows.push_back(read_row(fields));
   }
   return rows;
-}
-
-}  // namespace
-
-std::vector<RelativePose> read_measurements_csv(std::istream& in, const std::string& file) {
-  const std::string text(std::istreambuf_iterator<char>(in), {});
-  if (in.bad()) throw std::runtime_error(file + ": cannot be read to its end");
-  return parse_measurements(text, file);
 }
 
 RecordedGraph read_recorded_graph(const std::filesystem::path& file, std::optional<RobotId> robot) {

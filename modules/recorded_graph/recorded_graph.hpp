@@ -56,8 +56,8 @@ struct RecordedGraph {
 /// kappa, tau [, ...] below one line of column names. Further columns must be numbers and are not
 /// used. kappa and tau weigh rotation and translation, see precision.hpp. Quaternions are
 /// normalised. Throws std::runtime_error "file:line: what".
-[[nodiscard]] std::vector<RelativePose> read_measurements_csv(std::istream& in,
-                                                              const std::string& file);
+[[nodiscard]] std::vector<RelativePose> parse_measurements(const std::string& text,
+                                                           const std::string& file);
 
 /// Reads the part of one robot from a g2o file (*.g2o) with its verticals, or from a table of
 /// measurements (*.csv). From the JRL file of a team (*.jrl) it reads the part of `robot`. Throws

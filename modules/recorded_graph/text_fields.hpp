@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Geometry>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -9,6 +10,7 @@
 #include <string_view>
 
 #include "modules/core/config.hpp"
+#include "modules/core/measurement_limits.hpp"
 #include "modules/core/text_rows.hpp"
 
 namespace km {
@@ -57,6 +59,15 @@ class TextFields {
       fail(std::string(what) + " is not an integer from 0 to " + std::to_string(max) + ": '" +
            std::string(field) + '\'');
     return static_cast<std::uint64_t>(*value);
+  }
+
+  /// The next four fields as a quaternion of unit length, x, y, z, w.
+  Eigen::Matrix3d rotation() {
+    Eigen::Quaterniond q;
+    for (double& c : q.coeffs()) c = number("quaternion");
+    if (!(std::abs(q.norm() - 1.0) <= kUnitTolerance))
+      fail("quaternion has length " + std::to_string(q.norm()));
+    return q.normalized().toRotationMatrix();
   }
 
  private:

@@ -13,8 +13,7 @@ namespace km {
 namespace {
 
 G2oGraph read_graph(const std::string& text) {
-  std::istringstream in(text);
-  return read_g2o(in, "test.g2o");
+  return parse_g2o(text, "test.g2o");
 }
 
 const std::string kVertex = "VERTEX_SE3:QUAT 0 1 2 3 0 0 0 1\n";
@@ -68,7 +67,7 @@ TEST_CASE("A graph is unchanged after writing and reading it", "[g2o]") {
 
   std::stringstream file;
   write_g2o(file, graph);
-  const G2oGraph back = read_g2o(file, "written");
+  const G2oGraph back = parse_g2o(file.str(), "written");
 
   REQUIRE(back.vertices.size() == 4);
   REQUIRE(back.edges.size() == 3);
@@ -99,7 +98,7 @@ TEST_CASE("Verticals are unchanged after writing and reading them", "[g2o][verti
   }
   std::stringstream file;
   write_g2o(file, graph);
-  const G2oGraph back = read_g2o(file, "written");
+  const G2oGraph back = parse_g2o(file.str(), "written");
   REQUIRE(back.verticals.size() == 4);
   for (std::size_t i = 0; i < 4; ++i) {
     CHECK(back.verticals[i].id == graph.verticals[i].id);

@@ -88,8 +88,7 @@ TEST_CASE("Rotations are w x y z, and covariances have the rotation first", "[jr
   const int order[] = {3, 4, 5, 0, 1, 2};
   for (int r = 0; r < 6; ++r)
     for (int c = r; c < 6; ++c) g2o << ' ' << information(order[r], order[c]);
-  std::istringstream in(g2o.str() + '\n');
-  const RelativePose same = read_g2o(in, "same.g2o").edges.at(0);
+  const RelativePose same = parse_g2o(g2o.str() + '\n', "same.g2o").edges.at(0);
   CHECK((same.covariance - edge.covariance).cwiseAbs().maxCoeff() < 1e-12);
   CHECK(same.T_from_to.isApprox(edge.T_from_to, 1e-12));
 }

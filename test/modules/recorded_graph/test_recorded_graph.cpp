@@ -1,7 +1,6 @@
 #include <catch2/catch.hpp>
 
 #include <fstream>
-#include <sstream>
 
 #include "modules/core/measurement_limits.hpp"
 #include "modules/core/precision.hpp"
@@ -63,8 +62,7 @@ const std::string kHeader =
     "robot_src,pose_src,robot_dst,pose_dst,qx,qy,qz,qw,tx,ty,tz,kappa,tau,is_known_inlier,weight\n";
 
 std::vector<RelativePose> read(const std::string& text) {
-  std::istringstream in(text);
-  return read_measurements_csv(in, "test.csv");
+  return parse_measurements(text, "test.csv");
 }
 
 TEST_CASE("A row of measurements is read with its units", "[recorded]") {

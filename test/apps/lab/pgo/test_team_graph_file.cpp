@@ -1,7 +1,6 @@
 #include "apps/lab/pgo/team_graph_file.hpp"
 
 #include <catch2/catch.hpp>
-#include <sstream>
 
 #include "test/support/shared_data.hpp"
 #include "test/support/temporary_folder.hpp"
@@ -12,8 +11,7 @@ namespace {
 using Catch::Contains;
 
 G2oGraph graph_of(const std::string& text) {
-  std::istringstream in(text);
-  return read_g2o(in, "graph.g2o");
+  return parse_g2o(text, "graph.g2o");
 }
 
 std::string planar_edge(int i, int j, const std::string& information = "4 0 0 4 0 9") {
