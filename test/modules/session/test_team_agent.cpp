@@ -68,19 +68,25 @@ TEST_CASE("the frame at the end is the odometry frame of the lowest robot", "[po
   CHECK(network.robots.at(7).trajectory->T_world_kf[0].isApprox(T_odom_first, 1e-6));
 }
 
-TEST_CASE("a resumed robot takes part again with its known closures", "[pose_graph][agent]") {
-  const RobotId resumed = GENERATE(RobotId{7}, RobotId{50});
+TEST_CASE("a robot that resumes, or restarts without its data, takes part again",
+          "[pose_graph][agent]") {
+  const RobotId back = GENERATE(RobotId{7}, RobotId{50});
   const bool chain = GENERATE(true, false);
-  CAPTURE(resumed, chain);
+  const bool resumes = GENERATE(true, false);
+  CAPTURE(back, chain, resumes);
   const TeamProblem problem = ring(9);
   const std::uint64_t boot = 1U << kResumeBits;
   TeamNetwork network;
   for (const RobotId id : kIds) feed(network.add({id, boot}, {}, gather()), id, problem);
   if (chain) network.wire({{7, 33}, {33, 50}, {50, 1200}});
   REQUIRE(settle(network));
-  network.kill(resumed);
+  network.kill(back);
   (void)network.run(1.0);
-  feed(network.add({resumed, next_boot(boot)}, {}, gather()), resumed, problem);
+  const std::uint64_t next = resumes ? next_boot(boot) : 2U << kResumeBits;
+  feed(network.add({back, next}, {}, gather()), back, problem);
+  (void)network.run(0.5);
+  if (!resumes)  // closures to the new process are found again
+    for (const RobotId id : kIds) feed_closures(network.agent(id), id, problem, 3);
   (void)network.run(1.0);
   REQUIRE(settle(network));
   check_optimum(network, problem);
@@ -117,28 +123,6 @@ TEST_CASE("a robot resumed without its team continues from the last solution",
   CHECK_FALSE(after->public_poses.empty());
   for (const auto& [id, T] : after->public_poses)
     CHECK((T.matrix() - solution.trajectory.public_poses.at(id).matrix()).norm() < kSame);
-}
-
-TEST_CASE("the data of a restarted robot is discarded, and it takes part again",
-          "[pose_graph][agent]") {
-  const RobotId restarted = GENERATE(RobotId{7}, RobotId{50});
-  const bool chain = GENERATE(true, false);
-  CAPTURE(restarted, chain);
-  const TeamProblem problem = ring(9);
-  TeamNetwork network;
-  for (const RobotId id : kIds) feed(network.add({id, 1}, {}, gather()), id, problem);
-  if (chain) network.wire({{7, 33}, {33, 50}, {50, 1200}});
-  REQUIRE(settle(network));
-  network.kill(restarted);
-  (void)network.run(1.0);
-  feed(network.add({restarted, 2U << kResumeBits}, {}, gather()), restarted, problem);
-  (void)network.run(0.5);
-  for (const RobotId id : kIds)  // closures to the new process are found again
-    if (id != restarted) feed_closures(network.agent(id), id, problem, 3);
-  feed_closures(network.agent(restarted), restarted, problem, 3);
-  (void)network.run(1.0);
-  REQUIRE(settle(network));
-  check_optimum(network, problem);
 }
 
 TEST_CASE("decisions on closures are valid for both robots", "[pose_graph][agent]") {

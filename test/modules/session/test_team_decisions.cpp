@@ -72,6 +72,12 @@ std::set<ClosureId> add_cluster(TeamProblem& problem, std::uint32_t count, unsig
   return added;
 }
 
+ClosureId first_between(const TeamProblem& problem, RobotId a, RobotId b) {
+  for (const PoseEdge& e : problem.edges)
+    if (e.id().from.robot == a && e.id().to.robot == b) return e.id();
+  throw std::runtime_error("no closure between the robots");
+}
+
 std::set<ClosureId> rejected(const TeamNetwork& network) {
   std::set<ClosureId> closures;
   for (const auto& [id, robot] : network.robots)
@@ -187,10 +193,7 @@ TEST_CASE("a session after new closures decides on all as a single session does"
 TEST_CASE("deferred closures that fit are weighed in a second look of the session",
           "[pose_graph][decisions]") {
   const TeamProblem problem = problem_of(3);
-  const auto closure = std::find_if(problem.edges.begin(), problem.edges.end(), [](const auto& e) {
-    return e.id().from.robot == 5 && e.id().to.robot == 9;
-  });
-  REQUIRE(closure != problem.edges.end());
+  const ClosureId closure = first_between(problem, 5, 9);
   const bool fits = GENERATE(true, false);
   CAPTURE(fits);
   using Decision = std::optional<bool>;
@@ -199,11 +202,11 @@ TEST_CASE("deferred closures that fit are weighed in a second look of the sessio
                                           TreePlace place) {
     ScriptedSolver::Options options{.barc = fits ? 100.0 : 1e-3, .deferred = true};
     if (place.members.size() == kFour.size()) {
-      const auto decided = graph.decided.find(closure->id());
+      const auto decided = graph.decided.find(closure);
       if (graph.self == 5 || graph.self == 9)
         looks[session.id].push_back(decided == graph.decided.end() ? Decision()
                                                                    : Decision(decided->second));
-      if (!graph.again || !fits) options.rejects = {closure->id()};
+      if (!graph.again || !fits) options.rejects = {closure};
     }
     return std::make_unique<ScriptedSolver>(std::move(graph), std::move(place), options);
   };
@@ -216,20 +219,16 @@ TEST_CASE("deferred closures that fit are weighed in a second look of the sessio
   const Decision second = fits ? Decision() : Decision(false);
   CHECK(looks.begin()->second == std::vector<Decision>{{}, {}, second, second});
   for (const RobotId robot : {RobotId{5}, RobotId{9}})
-    CHECK(network.agent(robot).decided().at(closure->id()) == fits);
+    CHECK(network.agent(robot).decided().at(closure) == fits);
 }
 
 TEST_CASE("decisions that a team makes without a robot do not outlast its absence",
           "[pose_graph][decisions]") {
   const TeamProblem problem = problem_of(3);
-  const auto closure = std::find_if(problem.edges.begin(), problem.edges.end(), [](const auto& e) {
-    return e.id().from.robot == 2 && e.id().to.robot == 3;
-  });
-  REQUIRE(closure != problem.edges.end());
+  const ClosureId closure = first_between(problem, 2, 3);
   const MemberSolverFactory factory = [&](const Session&, SessionGraph graph, TreePlace place) {
     ScriptedSolver::Options options;
-    if (place.members.size() == 3 || graph.decided.contains(closure->id()))
-      options.rejects = {closure->id()};
+    if (place.members.size() == 3 || graph.decided.contains(closure)) options.rejects = {closure};
     return std::make_unique<ScriptedSolver>(std::move(graph), std::move(place), options);
   };
   TeamNetwork network;
@@ -237,7 +236,7 @@ TEST_CASE("decisions that a team makes without a robot do not outlast its absenc
   REQUIRE(settle(network));
   const auto check_kept = [&](bool kept) {
     for (const RobotId robot : {RobotId{2}, RobotId{3}})
-      CHECK(network.agent(robot).decided().at(closure->id()) == kept);
+      CHECK(network.agent(robot).decided().at(closure) == kept);
   };
   check_kept(true);
   network.kill(9);

@@ -170,20 +170,19 @@ TEST_CASE("No truncated message is accepted", "[pose_graph]") {
 }
 
 TEST_CASE("Impossible counts are refused before memory is allocated", "[pose_graph]") {
-  ByteWriter out;
-  out.varint(7);  // poses
-  out.u64(1);
-  out.varint(3);
-  out.varint(1);
-  out.varint(7);
-  out.u64(1);
-  out.varint(0);
-  out.f64(1.0);
-  out.f64(1.0);
-  out.varint(GENERATE(std::uint64_t{kMaxPublicPoses}, std::uint64_t{kMaxPublicPoses} + 1,
-                      std::numeric_limits<std::uint64_t>::max()));
-  out.bytes(Bytes(1000, 0));
-  CHECK_FALSE(decoded_as(some_poses(), out.release()).value);
+  ByteWriter count;
+  count.varint(GENERATE(std::uint64_t{1} << 61U, std::numeric_limits<std::uint64_t>::max()));
+  const Bytes huge = count.release();
+  for (const TeamMessage& message :
+       {TeamMessage(some_status()), TeamMessage(some_session()), TeamMessage(some_poses())}) {
+    const Bytes bytes = encode(message);
+    for (std::size_t k = 0; k < bytes.size(); ++k) {  // also in place of each count
+      Bytes changed = bytes;
+      changed.erase(changed.begin() + static_cast<std::ptrdiff_t>(k));
+      changed.insert(changed.begin() + static_cast<std::ptrdiff_t>(k), huge.begin(), huge.end());
+      CHECK_FALSE(decoded_as(message, changed).value);
+    }
+  }
 }
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();

@@ -97,6 +97,8 @@ TEST_CASE("the plan contains the connected component, best connected robots firs
   CHECK(order_of(plan_session(statuses, 21)) == std::vector<RobotId>{20, 21});
   CHECK(order_of(plan_session(statuses, 30)) == std::vector<RobotId>{30});
   CHECK_THROWS_AS(plan_session(statuses, 4), std::invalid_argument);
+  CHECK(order_of(plan_session(chain_of({1, 2, 3, 4}, {3, 4, 2}), 1)) ==
+        std::vector<RobotId>{2, 3, 1, 4});
 }
 
 TEST_CASE("ties join the members of each datum to the lowest one", "[pose_graph][session]") {
@@ -123,37 +125,19 @@ TEST_CASE("ties join the members of each datum to the lowest one", "[pose_graph]
   CHECK(datum_ties(without_7, 7).empty());
 }
 
-TEST_CASE("the order of alignment begins with the robot with the most edges",
-          "[pose_graph][session]") {
-  const auto statuses = chain_of({1, 2, 3, 4}, {3, 4, 2});
-  const SessionPlan plan = plan_session(statuses, 1);
-  CHECK(order_of(plan) == std::vector<RobotId>{2, 3, 1, 4});
-  CHECK(coordinator_of(plan) == 1);
-}
-
 TEST_CASE("the tree follows links with the most agreed edges, its root in the middle",
           "[pose_graph][session]") {
   const auto statuses = chain_of({1, 2, 3, 4, 5}, {5, 5, 5, 5});
-  SECTION("a line") {
-    const auto plan = planned(statuses, links_of({{1, 2}, {2, 3}, {3, 4}, {4, 5}}), 1);
-    CHECK(parents_of(plan) == std::map<RobotId, RobotId>{{1, 2}, {2, 3}, {4, 3}, {5, 4}});
-  }
-  SECTION("a line of links without closures") {
-    const auto plan = planned(statuses, links_of({{1, 3}, {3, 5}, {5, 2}, {2, 4}}), 1);
-    CHECK(parents_of(plan) == std::map<RobotId, RobotId>{{1, 3}, {3, 5}, {2, 5}, {4, 2}});
-  }
-  SECTION("a star") {
-    const auto plan = planned(statuses, links_of({{1, 5}, {2, 5}, {3, 5}, {4, 5}}), 1);
-    CHECK(parents_of(plan) == std::map<RobotId, RobotId>{{1, 5}, {2, 5}, {3, 5}, {4, 5}});
-  }
-  SECTION("an intermediate robot that is not a member") {
-    const auto plan = planned(statuses, links_of({{1, 2}, {2, 9}, {9, 3}, {3, 4}, {4, 5}}), 1);
-    CHECK(parents_of(plan) == std::map<RobotId, RobotId>{{1, 2}, {2, 3}, {4, 3}, {5, 4}});
-  }
-  SECTION("unknown links") {
-    const auto plan = planned(statuses, {}, 1);
-    CHECK(parents_of(plan).size() == 4);
-  }
+  using Links = std::vector<std::pair<RobotId, RobotId>>;
+  using Parents = std::map<RobotId, RobotId>;
+  const Parents line{{1, 2}, {2, 3}, {4, 3}, {5, 4}};
+  const auto [links, parents] = GENERATE_COPY(table<Links, Parents>(
+      {{{{1, 2}, {2, 3}, {3, 4}, {4, 5}}, line},
+       {{{1, 3}, {3, 5}, {5, 2}, {2, 4}}, {{1, 3}, {3, 5}, {2, 5}, {4, 2}}},  // without closures
+       {{{1, 5}, {2, 5}, {3, 5}, {4, 5}}, {{1, 5}, {2, 5}, {3, 5}, {4, 5}}},
+       {{{1, 2}, {2, 9}, {9, 3}, {3, 4}, {4, 5}}, line}}));  // robot 9 is no member
+  CHECK(parents_of(planned(statuses, links_of(links), 1)) == parents);
+  CHECK(parents_of(planned(statuses, {}, 1)).size() == 4);  // unknown links
 }
 
 TEST_CASE("the link with the fewest edges of a cycle is not in the tree", "[pose_graph][session]") {

@@ -56,6 +56,22 @@ const OptimizerProgress& progress_of(const TeamNetwork& network, RobotId robot) 
   return network.robots.at(robot).progress;
 }
 
+// Gives the closures `later`, then the set, to both robots of the set.
+void add_later(TeamNetwork& network, const TeamProblem& problem, const std::set<ClosureId>& later,
+               const InlierSet& set) {
+  for (const RobotId robot : {set.a, set.b}) {
+    for (const PoseEdge& e : problem.edges)
+      if (later.contains(e.id())) (void)network.agent(robot).add(closure_of(e, &problem));
+    (void)network.agent(robot).add(set);
+  }
+}
+
+bool settle_and_report(TeamNetwork& network) {
+  const bool settled = settle(network);
+  (void)network.run(5.0);
+  return settled;
+}
+
 bool has_notice(const TeamNetwork& network, RobotId robot, const std::string& text) {
   return std::ranges::any_of(network.robots.at(robot).notices, [&](const std::string& notice) {
     return notice.find(text) != notice.npos;
@@ -73,8 +89,7 @@ TEST_CASE("Robots that closures at one place join are tentative, and report it",
   const TeamProblem problem = team_of_three(1, at);
   TeamNetwork network;
   add_robots(network, problem);
-  REQUIRE(settle(network));
-  (void)network.run(5.0);
+  REQUIRE(settle_and_report(network));
   CHECK(progress_of(network, 2).tentative == Robots{4, 6});
   CHECK(progress_of(network, 4).tentative == Robots{2});
   CHECK(progress_of(network, 6).tentative == Robots{2});
@@ -100,15 +115,10 @@ TEST_CASE(
     if (e.from.robot == 2 && e.to.robot == 4 && !wrong.contains(e.id())) later.insert(e.id());
   TeamNetwork network(seed);
   add_robots(network, without(all, later));
-  REQUIRE(settle(network));
-  (void)network.run(5.0);
+  REQUIRE(settle_and_report(network));
   CHECK(progress_of(network, 2).tentative == Robots{4, 6});
 
-  for (const RobotId robot : {RobotId{2}, RobotId{4}}) {
-    for (const PoseEdge& e : all.edges)
-      if (later.contains(e.id())) (void)network.agent(robot).add(closure_of(e, &all));
-    (void)network.agent(robot).add(inlier_set(all, 2, 4, 2));
-  }
+  add_later(network, all, later, inlier_set(all, 2, 4, 2));
   const std::uint32_t sessions = network.agent(2).part()->session().id.number;
   (void)network.run(1.0);
   REQUIRE(settle(network));
@@ -134,8 +144,7 @@ TEST_CASE("Robots with two single closures that contradict each other are not jo
   (void)add_false(problem, 40, 1);
   TeamNetwork network(seed);
   add_robots(network, problem);
-  REQUIRE(settle(network));
-  (void)network.run(5.0);
+  REQUIRE(settle_and_report(network));
   CHECK(progress_of(network, 2).not_joined == Robots{4, 6});
   CHECK(progress_of(network, 4).not_joined == Robots{2});
   CHECK(progress_of(network, 4).anchor == 4);
@@ -152,8 +161,7 @@ TEST_CASE("Robots are not joined if as many places agree on another relative pos
     (void)add_false(problem, first, 2, alike ? std::optional(seed) : std::nullopt);
   TeamNetwork network(seed);
   add_robots(network, problem);
-  REQUIRE(settle(network));
-  (void)network.run(5.0);
+  REQUIRE(settle_and_report(network));
   CHECK(progress_of(network, 2).tentative.empty());
   CHECK(progress_of(network, 2).not_joined == (alike ? Robots{4, 6} : Robots{}));
   CHECK(progress_of(network, 4).not_joined == (alike ? Robots{2} : Robots{}));
@@ -176,8 +184,7 @@ TEST_CASE("Robots whose closures are all rejected publish in two frames, until o
   };
   TeamNetwork network;
   add_robots(network, without(problem, later), factory);
-  REQUIRE(settle(network));
-  (void)network.run(5.0);
+  REQUIRE(settle_and_report(network));
   CHECK(progress_of(network, 2).not_joined == Robots{4, 6});
   CHECK(progress_of(network, 4).not_joined == Robots{2});
   CHECK(progress_of(network, 2).anchor == 2);
@@ -201,11 +208,7 @@ TEST_CASE("Robots whose closures are all rejected publish in two frames, until o
   CAPTURE(instead);
   InlierSet selected = inlier_set(problem, 2, 4, 2);
   if (instead) selected.closures.assign(later.begin(), later.end());
-  for (const RobotId robot : {RobotId{2}, RobotId{4}}) {
-    for (const PoseEdge& e : problem.edges)
-      if (later.contains(e.id())) (void)network.agent(robot).add(closure_of(e, &problem));
-    (void)network.agent(robot).add(selected);
-  }
+  add_later(network, problem, later, selected);
   (void)network.run(1.0);  // the next session waits for two seconds at rest
   CHECK_FALSE(network.agent(2).in_session());
   CHECK(progress_of(network, 4).not_joined == Robots{2});
@@ -215,18 +218,15 @@ TEST_CASE("Robots whose closures are all rejected publish in two frames, until o
 
   network.kill(2);
   (void)network.run(10.0);
-  REQUIRE(settle(network));
-  (void)network.run(5.0);
+  REQUIRE(settle_and_report(network));
   for (const RobotId robot : {RobotId{4}, RobotId{6}})
     CHECK(network.robots.at(robot).trajectory->anchor == 4);  // still not that of robot 2
   network.revive(2);
 
   rejects = false;
-  for (const RobotId robot : {RobotId{2}, RobotId{4}})
-    (void)network.agent(robot).add(inlier_set(problem, 2, 4, 3));
+  add_later(network, problem, {}, inlier_set(problem, 2, 4, 3));
   (void)network.run(1.0);
-  REQUIRE(settle(network));
-  (void)network.run(5.0);
+  REQUIRE(settle_and_report(network));
   for (const RobotId robot : {RobotId{2}, RobotId{4}, RobotId{6}}) {
     CHECK(progress_of(network, robot).not_joined.empty());
     CHECK(progress_of(network, robot).anchor == 2);
@@ -254,15 +254,10 @@ TEST_CASE(
   };
   TeamNetwork network;
   add_robots(network, without(problem, later), factory);
-  REQUIRE(settle(network));
-  (void)network.run(5.0);
+  REQUIRE(settle_and_report(network));
   REQUIRE(progress_of(network, 6).not_joined == Robots{2});
 
-  for (const RobotId robot : {RobotId{2}, RobotId{6}}) {
-    for (const PoseEdge& e : problem.edges)
-      if (later.contains(e.id())) (void)network.agent(robot).add(closure_of(e, &problem));
-    (void)network.agent(robot).add(inlier_set(problem, 2, 6));
-  }
+  add_later(network, problem, later, inlier_set(problem, 2, 6));
   (void)network.run(1.0);  // the next session waits for two seconds at rest
   REQUIRE_FALSE(network.agent(2).in_session());
   CHECK(progress_of(network, 2).not_joined == Robots{4, 6});
@@ -273,8 +268,7 @@ TEST_CASE(
   }
 
   rejects = false;
-  REQUIRE(settle(network));
-  (void)network.run(5.0);
+  REQUIRE(settle_and_report(network));
   for (const RobotId robot : {RobotId{2}, RobotId{4}, RobotId{6}}) {
     CHECK(progress_of(network, robot).not_joined.empty());
     CHECK(network.robots.at(robot).trajectory->anchor == 2);
