@@ -122,6 +122,8 @@ InputFile open_input_file(const fs::path& file, std::uintmax_t max_bytes) {
     if (read.bytes.size() > max_bytes) fail_as_too_large(file, max_bytes);
     more = count != 0;
   }
+  if (read.bytes.starts_with("\xFF\xFE") || read.bytes.starts_with("\xFE\xFF"))
+    fail(file, "a text in UTF-16: save it as UTF-8 (iconv -f UTF-16 -t UTF-8)");
   return read;
 }
 

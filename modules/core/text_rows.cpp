@@ -8,7 +8,7 @@
 namespace km {
 namespace {
 
-constexpr std::string_view kBlanks = " \t\r\f\v";
+constexpr std::string_view kBlanks = " \t\f\v";
 
 std::string_view trimmed(std::string_view text) {
   const std::size_t first = text.find_first_not_of(kBlanks);
@@ -16,11 +16,16 @@ std::string_view trimmed(std::string_view text) {
   return text.substr(first, text.find_last_not_of(kBlanks) - first + 1);
 }
 
+std::string_view unquoted(std::string_view field) {
+  const bool is_quoted = field.size() > 1 && field.starts_with('"') && field.ends_with('"');
+  return is_quoted ? field.substr(1, field.size() - 2) : field;
+}
+
 std::vector<std::string_view> split_at_commas(std::string_view line, std::size_t max_fields) {
   std::vector<std::string_view> fields;
   while (fields.size() < max_fields) {
     const std::size_t comma = line.find(',');
-    fields.push_back(trimmed(line.substr(0, comma)));
+    fields.push_back(unquoted(trimmed(line.substr(0, comma))));
     if (comma == line.npos) break;
     line.remove_prefix(comma + 1);
   }
@@ -57,11 +62,12 @@ RowReader::RowReader(std::string_view text, std::size_t max_fields)
 std::optional<TextRow> RowReader::next() {
   while (!text_.empty()) {
     ++line_;
-    const std::size_t end = text_.find('\n');
+    const std::size_t end = std::min(text_.find_first_of("\r\n"), text_.size());
     std::string_view line = text_.substr(0, end);
-    text_.remove_prefix(end == text_.npos ? text_.size() : end + 1);
+    text_.remove_prefix(text_.substr(end).starts_with("\r\n") ? end + 2
+                                                              : std::min(end + 1, text_.size()));
     line = trimmed(line.substr(0, line.find('#')));
-    if (line.empty()) continue;
+    if (line.empty() || line == "\"") continue;
     return TextRow{line_, line.find(',') == line.npos ? split_at_blanks(line, max_fields_)
                                                       : split_at_commas(line, max_fields_)};
   }

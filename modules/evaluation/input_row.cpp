@@ -14,7 +14,9 @@ void InputRow::fail(const std::string& why) const {
 
 double InputRow::number(std::size_t i) const {
   const auto value = parse_double(text(i));
-  if (!value || !std::isfinite(*value)) fail(std::string(text(i)) + " is not a finite number");
+  if (!value || !std::isfinite(*value))
+    fail(std::string(text(i)) + " is not a finite number" +
+         (text(i).find(' ') != std::string_view::npos ? "; are there decimal commas?" : ""));
   return *value;
 }
 

@@ -48,7 +48,7 @@ std::optional<Stamp> parse_time(std::string_view field) {
 std::string_view header_of(std::string_view text) {
   std::size_t end = 0;
   for (std::size_t line = 0; line < text.size(); line = end) {
-    end = std::min(text.find('\n', line), text.size() - 1) + 1;
+    end = std::min(text.find_first_of("\r\n", line), text.size() - 1) + 1;
     const auto rows = split_rows(text.substr(line, end - line));
     if (!rows.empty() && number_in(rows.front(), 0)) return text.substr(0, line);
   }

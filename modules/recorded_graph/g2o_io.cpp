@@ -64,6 +64,10 @@ bool usable(double weight) {
   return weight > 0.0 && std::isfinite(weight);
 }
 
+std::string shown(double weight) {
+  return std::isfinite(weight) ? std::to_string(weight) : "0: they are singular";
+}
+
 // Covariance of an edge, in the order of the file.
 template <int N>
 struct EdgeCovariance {
@@ -82,7 +86,7 @@ EdgeCovariance<N> covariance_of_blocks(const Eigen::Matrix<double, N, N>& inform
       mean_precision(information.template bottomRightCorner<kTurns, kTurns>().eval());
   if (!usable(tau) || !usable(rotation))
     fields.fail("information matrix is not positive definite, and its blocks weigh rotation by " +
-                std::to_string(rotation) + " and translation by " + std::to_string(tau));
+                shown(rotation) + " and translation by " + shown(tau));
   Eigen::Matrix<double, N, 1> variances;
   variances.template head<kAxes>().setConstant(1.0 / tau);
   variances.template tail<kTurns>().setConstant(1.0 / rotation);
@@ -136,7 +140,9 @@ class Reader {
     const std::string_view tag = fields.text("tag");
     if (tag == "FIX") return;
     const auto read_rest = reader_of(tag);
-    if (read_rest == nullptr) fields.fail("unknown tag '" + std::string(tag) + '\'');
+    if (read_rest == nullptr)
+      fields.fail("unknown tag '" + std::string(tag) + '\'' +
+                  (tag.find(' ') != tag.npos ? "; are there decimal commas?" : ""));
     set_dimension(tag.ends_with("SE2") ? 2 : 3, fields);
     (this->*read_rest)(fields);
     if (!fields.at_end()) fields.fail("more fields than " + std::string(tag) + " has");

@@ -25,6 +25,7 @@ std::optional<double> finite_number(const YAML::Node& node) {
 YAML::Node load(const std::filesystem::path& file) {
   std::string text = read_file(file);
   if (text.starts_with(kByteOrderMark)) text.erase(0, kByteOrderMark.size());
+  if (text.find('\n') == text.npos) std::ranges::replace(text, '\r', '\n');
   if (text.starts_with('%')) text.front() = '#';  // OpenCV's "%YAML:1.0" is not YAML
   if (const auto first = text.find_first_not_of(" \t\r\n");
       first != text.npos && text[first] == '{')
@@ -32,7 +33,8 @@ YAML::Node load(const std::filesystem::path& file) {
   try {
     return YAML::Load(text);
   } catch (const YAML::Exception& e) {
-    throw DatasetError(at_line(file, e.mark.line + 1) + ": not YAML: " + readable(e.msg));
+    throw DatasetError(at_line(file, e.mark.line + 1) + ": not YAML: " + readable(e.msg) +
+                       (text.find('\t') != text.npos ? "; YAML does not allow tabs" : ""));
   }
 }
 

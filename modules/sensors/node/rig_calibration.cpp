@@ -37,8 +37,8 @@ struct Chains {
     const bool has_imu = map.has("imu0") || is_flat_imu(map);
     if (!has_cameras && !has_imu)
       throw DatasetError(file.string() +
-                         ": neither cam0 nor imu0 nor the noise of an inertial sensor: not a file "
-                         "of Kalibr");
+                         ": neither cam0 nor imu0 with indented keys nor the noise of an inertial "
+                         "sensor: not a file of Kalibr");
     if ((has_cameras && cameras) || (has_imu && imu))
       throw DatasetError(file.string() + ": a second file of " + (has_imu ? "imu0" : "cam0"));
     if (has_cameras) cameras.emplace(map);

@@ -39,6 +39,12 @@ TEST_CASE("A path that is not a file is refused with its kind", "[core]") {
   CHECK(problem_of_file("/dev/zero") == "not a file");
 }
 
+TEST_CASE("A text in UTF-16 is refused by name", "[core]") {
+  const TemporaryFolder folder;
+  CHECK_THROWS_WITH(read_input_file(folder.write("a.csv", std::string("\xFF\xFE\x31\0", 4))),
+                    Catch::Contains("a.csv: a text in UTF-16: save it as UTF-8"));
+}
+
 TEST_CASE("A file beyond the limit is not read", "[core]") {
   const TemporaryFolder folder;
   const auto file = folder.write("some", "12345");

@@ -182,6 +182,9 @@ TEST_CASE("A bad g2o file is refused with its line and the reason", "[g2o]") {
   const auto [line, reason] = GENERATE(table<std::string, std::string>({
       {"VERTEX_XYZ 1 0 0 0", "unknown tag 'VERTEX_XYZ'"},
       {"0410268 0.7588833", "unknown tag '0410268'"},
+      {"VERTEX_SE3:QUAT 1 0,5 0 0 0 0 0 1", "0'; are there decimal commas?"},
+      {"EDGE_SE3:QUAT 0 1" + kPose + " 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0",
+       "weigh rotation by 0: they are singular and"},
       {"VERTEX_SE3:QUAT 1 0 0 0 0 0 0", "line ends before quaternion"},
       {"VERTEX_SE3:QUAT 1 0 0 0 0 0 0 1 9", "more fields"},
       {"VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1", "given twice"},
