@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <utility>
 
 #include "modules/core/lie.hpp"
@@ -16,6 +17,7 @@
 #include "modules/diagnosis/stereo_fit.hpp"
 #include "modules/evaluation/statistics.hpp"
 #include "modules/recordings/bag_summary.hpp"
+#include "modules/sensors/stream_stamps.hpp"
 #include "modules/sensors/usual_numbers.hpp"
 
 namespace km {
@@ -66,6 +68,12 @@ void examine_rate(const char* sensor, const std::string& id, const std::vector<S
   result.figure(std::string(sensor) + ", rate", fixed(found.rate_hz, 1) + " Hz, largest gap " +
                                                     fixed(found.largest_gap_s, 3) + " s, jitter " +
                                                     milliseconds(found.jitter_s));
+  if (found.largest_gap_s > kLongestPause_s)
+    return result.add(kWarning, id + ".clock",
+                      std::string(sensor) + " whose stamps jump by " +
+                          fixed(found.largest_gap_s, 1) + " s: the clock was set",
+                      "odometry starts again there, and charts show a gap",
+                      "set the clock before the recording, or choose a part by --from and --to");
   const UsualNumber rate = id == "imu" ? UsualNumber::kImuRate_hz : UsualNumber::kImageRate_hz;
   if (const auto unusual = doubt(rate, found.rate_hz); unusual && found.rate_hz > least_hz)
     result.findings.push_back(finding_of(*unusual));
@@ -259,13 +267,12 @@ void examine_focal(const SensorSample& sample, const StereoRig& rig, const Visua
              "the gyroscope");
 }
 
-// False if the norm of the accelerations is not that of gravity.
-bool examine_gravity(const SensorSample& sample, Examination& result) {
-  const double found = median_acceleration(sample.imu);
-  result.figure("accelerometer", "median norm " + fixed(found, 2) + " m/s^2");
-  const auto unusual = doubt(UsualNumber::kGravity_mps2, found);
+std::optional<Doubt> examine_gravity(const SensorSample& sample, Examination& result) {
+  result.figure("accelerometer",
+                "median norm " + fixed(median_acceleration(sample.imu), 2) + " m/s^2");
+  auto unusual = gravity_doubt(sample.imu);
   if (unusual) result.findings.push_back(finding_of(*unusual));
-  return !unusual;
+  return unusual;
 }
 
 // Compares accelerations by images and depth with those of the accelerometer. Vibration and errors
@@ -340,7 +347,8 @@ Examination examine_images(const SensorSample& sample) {
   if (level < kDark)
     result.add(kWarning, "images.dark", "a mean grey level of " + fixed(level, 0) + " of 255",
                "few features are found, and some of them are noise",
-               "use a longer exposure, more gain or more light");
+               "use a longer exposure, more gain or more light; values of 10 or 12 bits must fill "
+               "the 16 bits of mono16");
   if (level > kBright || saturated > kSaturated)
     result.add(kWarning, "images.bright",
                percent(saturated) + " of the pixels are saturated, mean level " + fixed(level, 0),
@@ -438,14 +446,18 @@ Examination examine_depth(const SensorSample& sample, const StereoRig& rig) {
 Examination examine_inertial(const SensorSample& sample, const StereoRig& rig) {
   Examination result;
   if (sample.imu.empty()) return result;
-  const bool has_gravity = examine_gravity(sample, result);
+  const std::optional<Doubt> unusual = examine_gravity(sample, result);
+  if (unusual && unusual->id == "imu.exchanged") return result;
   const bool has_right = rig.depth_source == DepthSource::kRightImage;
-  if (has_right && best_alternative(sample.stereo, rig).fault == StereoFault::kOtherMode) {
+  const bool fits = !has_right || is_sound(fit_of(sample.stereo, rig));
+  const StereoFault fault =
+      fits ? StereoFault::kSwappedImages : best_alternative(sample.stereo, rig).fault;
+  if (fault == StereoFault::kOtherMode || fault == StereoFault::kNone) {
     result.figure("images against the gyroscope",
-                  "not determined: the calibration is that of images of another size");
+                  "not determined: the calibration does not fit the images");
     return result;
   }
-  const bool use_depth = !has_right || is_sound(fit_of(sample.stereo, rig));
+  const bool use_depth = fits && (!has_right || rig_doubts(rig).empty());
   const VisualRotations seen = visual_rotations(sample.steps, rig, use_depth);
   const auto fit = fit_inertial(seen.steps, sample.imu);
   if (!fit || !(fit->image_rms >= kMinRate_radps)) {
@@ -463,14 +475,16 @@ Examination examine_inertial(const SensorSample& sample, const StereoRig& rig) {
   if (!(fit->explained >= kRelated)) return result;
   examine_scale(*fit, result);
   examine_offset(*fit, result);
-  if (fit->gyro_rms[1] * fit->scale > kSecondAxis_radps)
+  if (!rig_doubts(rig).empty())
+    result.figure("camera to inertial sensor", "not determined: wrong lengths change it");
+  else if (fit->gyro_rms[1] * fit->scale > kSecondAxis_radps)
     examine_direction(*fit, rig.cameras[0], result);
   else
     result.figure("camera to inertial sensor",
                   "not determined: the camera turns about one axis only");
   if (std::abs(fit->scale - 1.0) > 0.1) return result;
   examine_focal(sample, rig, seen, *fit, result);
-  if (has_gravity && rig_doubts(rig).empty()) examine_acceleration(sample, rig, seen, *fit, result);
+  if (!unusual && rig_doubts(rig).empty()) examine_acceleration(sample, rig, seen, *fit, result);
   return result;
 }
 

@@ -81,7 +81,7 @@ std::optional<StereoPoint> stereo_point(const StereoRig& rig, const SE3& T_right
                      .depth_m = A.colPivHouseholderQr().solve(-t).x()};
 }
 
-StereoFit fit_of(std::span<const StereoMatches> images, const StereoRig& rig) {
+StereoFit fit_of(std::span<const StereoMatches> images, const StereoRig& rig, double inlier_px) {
   const SE3 T_right_left = rig.T_left_right().inverse();
   StereoFit fit;
   std::vector<double> errors_px, depths_m;
@@ -91,7 +91,7 @@ StereoFit fit_of(std::span<const StereoMatches> images, const StereoRig& rig) {
       ++fit.points;
       const auto point = stereo_point(rig, T_right_left, pair);
       errors_px.push_back(point ? point->error_px : std::numeric_limits<double>::infinity());
-      if (!point || !(point->error_px <= kEpipolarInlier_px)) continue;
+      if (!point || !(point->error_px <= inlier_px)) continue;
       if (point->depth_m < 0.0 && point->parallax_px > kMinParallax_px) continue;  // behind it
       ++inliers;
       if (point->depth_m > 0.0) depths_m.push_back(point->depth_m);
@@ -144,8 +144,12 @@ StereoAlternative best_alternative(std::span<const StereoMatches> images, const 
        {StereoFault::kInvertedPair, StereoFault::kInvertedCameras, StereoFault::kInvertedLeft,
         StereoFault::kInvertedRight, StereoFault::kExchangedLenses})
     consider({.fault = fault, .fit = fit_of(images, undone(rig, fault))});
+  // Errors are compared as angles, because a focal length scales them. Too long a focal length
+  // shows errors so large that the pair is not sound.
   for (const double ratio : {0.5, 2.0})
-    consider({StereoFault::kOtherMode, ratio, fit_of(images, with_scaled_images(rig, ratio))});
+    if (ratio > 1.0 || !is_sound(given.fit))
+      consider({StereoFault::kOtherMode, ratio,
+                fit_of(images, with_scaled_images(rig, ratio), ratio * kEpipolarInlier_px)});
   // Only without such a fault, because another focal length compensates some errors of a fault.
   if (best.fit.inlier_ratio < given.fit.inlier_ratio + kClearGain)
     consider(best_focal_ratio(images, rig));

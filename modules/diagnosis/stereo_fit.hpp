@@ -28,7 +28,7 @@ struct StereoPoint {
 /// over the whole image and not only near their epipolar lines.
 struct StereoFit {
   std::size_t points = 0;
-  /// Share of points within kEpipolarInlier_px of their epipolar line and not behind the cameras.
+  /// Share of points near their epipolar line (kEpipolarInlier_px) and not behind the cameras.
   double inlier_ratio = 0.0;
   double error_px =
       0.0;               ///< Median distance from the line, in the right image; NaN without points.
@@ -40,7 +40,8 @@ inline constexpr double kEpipolarInlier_px = 2.0;
 /// Least number of points for a statement.
 inline constexpr std::size_t kLeastStereoPoints = 100;
 
-[[nodiscard]] StereoFit fit_of(std::span<const StereoMatches> images, const StereoRig& rig);
+[[nodiscard]] StereoFit fit_of(std::span<const StereoMatches> images, const StereoRig& rig,
+                               double inlier_px = kEpipolarInlier_px);
 
 /// True if there are enough points and at least half of them are on their lines. In sound pairs
 /// the ratio is 0.65 to 0.97.

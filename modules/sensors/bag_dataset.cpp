@@ -321,12 +321,11 @@ bool BagDataset::has_motion(const JoinedFrame& frame) {
   while (!reaches() && seconds_between(frame.left.log_time, newest_log_time_) < kImuPatience_s &&
          read_message()) {
   }
-  const bool starts_by =
-      gives_poses() ? poses_.starts_by(frame.stamp) : imu_.starts_by(frame.stamp);
-  if (starts_by && reaches()) return true;
-  report_.add(gives_poses() ? ReaderFault::kFrameWithoutPose : ReaderFault::kPairWithoutImu,
-              place_of(frame.left) + (gives_poses() ? ": the poses " : ": the inertial samples ") +
-                  (starts_by ? "end before it" : "start later"));
+  const std::string why = gives_poses() ? poses_.why_not(frame.stamp) : imu_.why_not(frame.stamp);
+  if (why.empty()) return true;
+  report_.add(
+      gives_poses() ? ReaderFault::kFrameWithoutPose : ReaderFault::kPairWithoutImu,
+      place_of(frame.left) + (gives_poses() ? ": the poses " : ": the inertial samples ") + why);
   return false;
 }
 

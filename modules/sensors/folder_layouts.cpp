@@ -339,11 +339,10 @@ FolderReader::FolderReader(ImageFolder folder, const RecordingPart& part)
 
 bool FolderReader::has_imu(const StereoPairFile& files) {
   if (!folder_.rig.has_imu) return true;
-  const bool starts_by = folder_.imu.starts_by(files.stamp);
-  if (starts_by && folder_.imu.reaches(files.stamp)) return true;
+  const std::string why = folder_.imu.why_not(files.stamp);
+  if (why.empty()) return true;
   folder_.report.add(ReaderFault::kPairWithoutImu,
-                     at_line(folder_.list, files.line) + ": the inertial samples " +
-                         (starts_by ? "end before it" : "start later"));
+                     at_line(folder_.list, files.line) + ": the inertial samples " + why);
   return false;
 }
 

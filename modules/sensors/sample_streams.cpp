@@ -8,6 +8,7 @@
 
 #include "modules/core/covariance.hpp"
 #include "modules/core/lie.hpp"
+#include "modules/core/text_table.hpp"
 #include "modules/sensors/text_file.hpp"
 
 namespace km {
@@ -38,7 +39,24 @@ std::variant<MeasuredPose, RowFault> parse_pose(const TextRow& row) {
       SE3::Identity());
 }
 
+// See ImuStream::why_not(). `first`, `last`: stamps of a stream.
+std::string why_not_between(std::optional<Stamp> first, Stamp last, Stamp stamp) {
+  constexpr double kOtherClock_s = 2.0;
+  if (first && *first <= stamp && last >= stamp) return {};
+  if (!first) return "are missing";
+  const bool is_late = *first > stamp;
+  const double seconds = seconds_between(is_late ? stamp : last, is_late ? *first : stamp);
+  return (is_late ? "start " : "end ") + fixed(seconds, 1) +
+         (is_late ? " s after it" : " s before it") +
+         (seconds > kOtherClock_s ? ": are the clocks different?" : "");
+}
+
 }  // namespace
+
+std::string ImuStream::why_not(Stamp stamp) const {
+  return why_not_between(first_, samples_.empty() ? first_.value_or(0) : samples_.back().stamp,
+                         stamp);
+}
 
 void ImuStream::add(const ImuSample& sample) {
   if (!first_) first_ = sample.stamp;
@@ -108,6 +126,10 @@ std::optional<ImuSample> ImuJoiner::next() {
     return ImuSample{stamp, gyro, before.value + share * (after.value - before.value)};
   }
   return std::nullopt;
+}
+
+std::string PoseStream::why_not(Stamp stamp) const {
+  return why_not_between(first_, poses_.empty() ? first_.value_or(0) : poses_.back().stamp, stamp);
 }
 
 void PoseStream::add(Stamp stamp, const MeasuredPose& pose) {

@@ -28,16 +28,17 @@ class ImuStream {
   /// Stamps must ascend.
   void add(const ImuSample& sample);
 
-  /// starts_by(): a sample at or before the stamp has been added. reaches(): a sample at or after
-  /// the stamp has been added.
-  [[nodiscard]] bool starts_by(Stamp stamp) const { return first_ && *first_ <= stamp; }
+  /// True if a sample at or after the stamp has been added.
   [[nodiscard]] bool reaches(Stamp stamp) const {
     return !samples_.empty() && samples_.back().stamp >= stamp;
   }
+  /// Empty if samples at or before the stamp and at or after it have been added; otherwise as in
+  /// "end 37.0 s before it: are the clocks different?".
+  [[nodiscard]] std::string why_not(Stamp stamp) const;
 
   /// The samples of the packet whose frame has this stamp (see SensorPacket). The last sample is
-  /// also the first sample of the next packet. Preconditions: starts_by(stamp) and reaches(stamp);
-  /// stamps ascend from call to call.
+  /// also the first sample of the next packet. Preconditions: why_not(stamp) is empty; stamps
+  /// ascend from call to call.
   [[nodiscard]] std::vector<ImuSample> until(Stamp stamp);
 
   /// The next packet begins at this stamp. Precondition: no packet has been made.
@@ -100,12 +101,11 @@ class PoseStream {
     while (!poses_.empty() && poses_.front().stamp < stamp) poses_.pop_front();
   }
 
-  /// starts_by(): a pose at or before the stamp has been added. reaches(): a pose at or after the
-  /// stamp has been added.
-  [[nodiscard]] bool starts_by(Stamp stamp) const { return first_ && *first_ <= stamp; }
+  /// As in ImuStream.
   [[nodiscard]] bool reaches(Stamp stamp) const {
     return !poses_.empty() && poses_.back().stamp >= stamp;
   }
+  [[nodiscard]] std::string why_not(Stamp stamp) const;
 
   /// The pose at an instant, interpolated at constant velocity, with an interpolated covariance.
   /// nullopt if the neighbouring poses are more than kLongestStep_s apart, or one is missing.

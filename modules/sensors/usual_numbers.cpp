@@ -100,6 +100,12 @@ std::string number_text(double value) {
   return value >= 1e3 && value < 1e7 ? fixed(value, 0) : rounded(value, 4);
 }
 
+double median_norm(const std::vector<ImuSample>& samples, Eigen::Vector3d ImuSample::*value) {
+  std::vector<double> norms;
+  for (const ImuSample& sample : samples) norms.push_back((sample.*value).norm());
+  return quantile(std::move(norms), 0.5);
+}
+
 }  // namespace
 
 std::optional<Doubt> doubt(UsualNumber number, double value) {
@@ -142,9 +148,19 @@ std::vector<Doubt> rig_doubts(const StereoRig& rig) {
 }
 
 double median_acceleration(const std::vector<ImuSample>& samples) {
-  std::vector<double> norms;
-  for (const ImuSample& sample : samples) norms.push_back(sample.accel.norm());
-  return quantile(std::move(norms), 0.5);
+  return median_norm(samples, &ImuSample::accel);
+}
+
+std::optional<Doubt> gravity_doubt(const std::vector<ImuSample>& samples) {
+  auto found = doubt(UsualNumber::kGravity_mps2, median_acceleration(samples));
+  const double gyro = median_norm(samples, &ImuSample::gyro);
+  if (!found || doubt(UsualNumber::kGravity_mps2, gyro)) return found;
+  found->id = "imu.exchanged";
+  found->what +=
+      ", and a gyroscope with one of " + number_text(gyro) + " rad/s: they are exchanged";
+  found->to_do = "exchange the columns or the topics of gyroscope and accelerometer";
+  found->is_explained = true;
+  return found;
 }
 
 void FirstPackets::add_depth(const StereoFrame& frame) {
@@ -173,7 +189,7 @@ std::vector<Doubt> FirstPackets::add(const SensorPacket& packet) {
   if (!samples_.empty())
     judge(UsualNumber::kImuRate_hz,
           rate_hz(samples_.front().stamp, samples_.back().stamp, samples_.size()));
-  judge(UsualNumber::kGravity_mps2, median_acceleration(samples_));
+  if (const auto found = gravity_doubt(samples_)) doubts.push_back(*found);
   const auto measured = std::ranges::partition(depths_m_, [](double m) { return m > 0.0; });
   const auto count = static_cast<std::size_t>(measured.begin() - depths_m_.begin());
   judge(UsualNumber::kDepthShare,

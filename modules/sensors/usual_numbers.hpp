@@ -40,6 +40,9 @@ struct Doubt {
 /// Median norm of the accelerations [m/s^2]; NaN without samples.
 [[nodiscard]] double median_acceleration(const std::vector<ImuSample>& samples);
 
+/// The doubt about the accelerations, also if they are those of the gyroscope.
+[[nodiscard]] std::optional<Doubt> gravity_doubt(const std::vector<ImuSample>& samples);
+
 /// Judges rates, accelerations and depths of the first packets of a source.
 class FirstPackets {
  public:

@@ -85,6 +85,11 @@ TEST_CASE("Rates and gaps of a recording are found", "[diagnosis]") {
                     [](auto& sample) {
                       sample.imu.erase(sample.imu.begin() + 500, sample.imu.begin() + 520);
                     }},
+               Case{"warning frames.clock ",  // from 1970 to today
+                    [](auto& sample) {
+                      for (std::size_t k = 50; k < sample.frames.size(); ++k)
+                        sample.frames[k] += 1'700'000'000'000'000'000;
+                    }},
                Case{"error recording.no_frames ", [](auto& sample) { sample.frames.clear(); }});
   CAPTURE(c.ids);
   SensorSample sample = regular();

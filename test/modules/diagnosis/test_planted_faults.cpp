@@ -96,6 +96,12 @@ TEST_CASE("MH_01 gives no findings, and an inserted fault is the only one", "[di
       rig.cameras[1].T_body_cam = rig.cameras[0].T_body_cam * T_left_right;
     };
   };
+  const auto scale_mode = [](double ratio) {
+    return [ratio](StereoRig& rig, auto&) {
+      for (Camera& camera : rig.cameras)
+        camera.fx *= ratio, camera.fy *= ratio, camera.cx *= ratio, camera.cy *= ratio;
+    };
+  };
   const auto change_gyro = [](const std::function<void(Eigen::Vector3d&)>& change) {
     return [change](auto&, SensorSample& sample) { rotate_gyro(sample, change); };
   };
@@ -124,15 +130,21 @@ TEST_CASE("MH_01 gives no findings, and an inserted fault is the only one", "[di
              for (Camera& camera : rig.cameras) camera.T_body_cam.translation() *= 1000.0;
            }},
       Case{{"depth.scale"}, stretch(4.0)}, Case{{"stereo.baseline"}, stretch(100.0)},
+      Case{{"stereo.baseline"}, stretch(1000.0)},
+      Case{{"imu.exchanged"},
+           [](auto&, auto& sample) {
+             for (ImuSample& measured : sample.imu) std::swap(measured.gyro, measured.accel);
+           }},
+      Case{{"stereo.epipolar"},
+           [](auto& rig, auto&) {
+             for (Camera& camera : rig.cameras)
+               camera.lens = Lens(LensModel::kRadialTangential, {-2.9, 40.0, 0.0, 0.0});
+           }},
       Case{{"imu.accel_negated"},
            [](auto&, auto& sample) {
              for (ImuSample& measured : sample.imu) measured.accel *= -1.0;
            }},
-      Case{{"stereo.other_mode"},
-           [](auto& rig, auto&) {
-             for (Camera& camera : rig.cameras)
-               camera.fx *= 0.5, camera.fy *= 0.5, camera.cx *= 0.5, camera.cy *= 0.5;
-           }},
+      Case{{"stereo.other_mode"}, scale_mode(0.5)}, Case{{"stereo.other_mode"}, scale_mode(2.0)},
       Case{{"imu.gyro_in_degrees"}, change_gyro([](auto& gyro) { gyro *= kDegrees; })},
       Case{{"imu.mirrored"}, change_gyro([](auto& gyro) { gyro.y() *= -1.0; })},
       Case{{"imu.accel_in_g"},
@@ -150,6 +162,14 @@ TEST_CASE("MH_01 gives no findings, and an inserted fault is the only one", "[di
   Recorded recorded = *machine_hall();
   c.insert(recorded.rig.stereo, recorded.sample);
   CHECK(found_in(recorded) == c.ids);
+}
+
+TEST_CASE("A pair that is turned a little is not one of another mode", "[diagnosis]") {
+  if (!machine_hall()) return;
+  StereoRig rig = machine_hall()->rig.stereo;
+  rig.cameras[1].T_body_cam.linear() *=
+      Eigen::AngleAxisd(0.2 / kDegrees, Eigen::Vector3d::UnitX()).toRotationMatrix();
+  CHECK(best_alternative(machine_hall()->sample.stereo, rig).fault != StereoFault::kOtherMode);
 }
 
 TEST_CASE("V1_01 at rest gives no findings and no figures that need motion", "[diagnosis]") {

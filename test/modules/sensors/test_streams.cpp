@@ -145,8 +145,9 @@ TEST_CASE("Between poses the body moves at constant velocity", "[sensors][poses]
   PoseStream poses;
   for (const double t_s : {10.0, 10.4, 11.0})
     poses.add(nanoseconds(t_s), {pose_at(t_s), t_s * Matrix6::Identity()});
-  CHECK(!poses.starts_by(nanoseconds(9.9)));
-  CHECK(poses.starts_by(nanoseconds(10.0)));
+  CHECK(poses.why_not(nanoseconds(9.9)) == "start 0.1 s after it");
+  CHECK(poses.why_not(nanoseconds(10.0)).empty());
+  CHECK(poses.why_not(nanoseconds(48.0)) == "end 37.0 s before it: are the clocks different?");
   CHECK(!poses.at(nanoseconds(9.9)));
   for (const double t_s : {10.0, 10.1, 10.4, 10.75, 11.0}) {
     CAPTURE(t_s);
@@ -296,6 +297,9 @@ TEST_CASE("Numbers of sensors outside the usual range are named by their confusi
   CHECK_THAT(found->what, Catch::Contains(c.words));
   CHECK_FALSE(doubt(UsualNumber::kBaseline_m, 0.54));  // KITTI
   CHECK_FALSE(doubt(UsualNumber::kImageRate_hz, std::nan("")));
+  const auto exchanged = gravity_doubt({{1, {0.0, 9.8, 0.0}, {0.1, 0.0, 0.0}}});
+  REQUIRE(exchanged);
+  CHECK(exchanged->id == "imu.exchanged");
 }
 
 TEST_CASE("The first packets of a source show its rates and units once", "[sensors]") {
