@@ -24,6 +24,9 @@ namespace km {
 namespace {
 
 constexpr double kMaxCoordinate_m = 1e9;  // squares of floats stay finite
+// Vertices or faces, far more than a team maps in a day. A file of 2 GB with a valid header would
+// otherwise take 3 GB.
+constexpr std::size_t kMostElements = 50'000'000;
 
 enum class PlyFormat { kAscii, kLittleEndian, kBigEndian };
 enum class PlyType { kInt8, kUint8, kInt16, kUint16, kInt32, kUint32, kFloat, kDouble };
@@ -95,6 +98,9 @@ bool parse_line(const std::string& line, PlyHeader& header, bool& has_format) {
   } else if (key == "element") {
     PlyElement element;
     if (!(words >> element.name >> element.count)) throw std::runtime_error("bad element");
+    if (element.count > kMostElements)
+      throw std::runtime_error(std::to_string(element.count) + " elements, at most " +
+                               std::to_string(kMostElements) + " are read");
     header.elements.push_back(element);
   } else if (key == "property") {
     if (header.elements.empty()) throw std::runtime_error("property before any element");

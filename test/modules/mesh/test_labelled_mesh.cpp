@@ -95,8 +95,10 @@ TEST_CASE("A file that is no mesh is refused with the file and the reason") {
   refuses("solid stl\n", "not a PLY file");
   refuses("ply\n" + std::string(5000, 'x') + "\nend_header\n", "header without end_header");
   refuses("ply\nformat ascii 2.0\nelement vertex many\n", "line 3: bad element");
+  refuses("ply\nformat ascii 1.0\nelement vertex 170000000\n",
+          "line 3: 170000000 elements, at most 50000000 are read");
   refuses("ply\nelement vertex 0\nproperty float x\nend_header\n", "format");
-  refuses("ply\nformat ascii 1.0\nelement void 99999999999\nend_header\n", "without properties");
+  refuses("ply\nformat ascii 1.0\nelement void 9999999\nend_header\n", "without properties");
   refuses(kAsciiHeader + "0 0 0 4\n1 0 0 4\n", "ends before");
   refuses(kAsciiHeader + "0 0 0 4\n1 nan 0 4\n1 1 0 9\n3 0 1 2\n", "vertex 1 is not finite");
   refuses(kAsciiHeader + "0 0 0 4\n1 0 0 300\n1 1 0 9\n3 0 1 2\n", "label 300");
