@@ -227,6 +227,8 @@ int conclude(const StoppedRun& run, std::optional<Watch>& watch, FinalRoom& room
     for (Finding& found : causes_of_failed_odometry(options, config, signals))
       if (std::ranges::find(summary.noticed, found.id, &Finding::id) == summary.noticed.end())
         summary.noticed.push_back(std::move(found));
+    const auto fault = std::ranges::find(summary.noticed, Severity::kError, &Finding::severity);
+    if (fault != summary.noticed.end()) end.odometry_fault = fault->what;
   }
   end.lost_results = results.lost();
   summary.exit_reason = verdict_of(end).reason;

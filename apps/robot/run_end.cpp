@@ -134,6 +134,8 @@ Verdict verdict_of_run(const RunEnd& end) {
   if (end.result.interrupted) return {0, "interrupted"};
   if (end.images && end.images->with_pose == 0)
     return {kNothingEstimated, why_no_pose(*end.images)};
+  if (!end.odometry_fault.empty())
+    return {kNothingEstimated, "odometry is wrong: " + end.odometry_fault};
   const std::string departure = end.departure != nullptr ? end.departure : "unknown";
   if (end.missed.empty() && end.unmet.empty()) return {0, departure};
   return {0, (departure == kAllSettled ? "settled" : departure) + " without " + names_of(end)};

@@ -116,6 +116,7 @@ struct RunEnd {
   bool id_taken = false;                   ///< Another running robot had the same id first.
   const char* departure = nullptr;         ///< Reason why the robot left its team, if it did.
   std::optional<ImageCounts> images = {};  ///< Absent for a robot without sensors.
+  std::string odometry_fault = {};         ///< Error of the input for which odometry failed.
   bool is_live = false;                    ///< With live sensors, a signal is the usual end.
   /// By file, the reason why a result could not be written.
   std::map<std::string, std::string> lost_results = {};
@@ -130,9 +131,9 @@ struct Verdict {
 };
 
 /// 5 if a module hung. 3 if a module failed, or another robot claimed the id: the team may then
-/// have used the data of either. 1 if the run ended and no image has a pose, or live sensors gave
-/// no image. 4 if results could not be written. 0 otherwise. If others of the team were missing,
-/// the reason names them, why, and for how long.
+/// have used the data of either. 1 if the run ended and no image has a pose, odometry failed for a
+/// fault of the input, or live sensors gave no image. 4 if results could not be written. 0
+/// otherwise. If others of the team were missing, the reason names them, why, and for how long.
 [[nodiscard]] Verdict verdict_of(const RunEnd& end);
 
 /// "2910 of 2912 images have a pose".

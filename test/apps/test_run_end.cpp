@@ -159,6 +159,9 @@ TEST_CASE("A run is judged by the gravest that happened to it", "[run_end]") {
        "no pose estimated: of 100 images, 4 could not be used, 6 were skipped because processors "
        "were short, 90 were read but odometry did not start on them"},
       {{[](RunEnd& end) { end.images.reset(); }}, 0, "all present robots have settled"},
+      {{[](RunEnd& end) { end.odometry_fault = "a baseline of 110 m"; }},
+       1,
+       "odometry is wrong: a baseline of 110 m"},
       {{have_no_pose, interrupt}, 0, "interrupted"},
       {{be_silent, interrupt}, 1, "no image came: kimera_multi_doctor --live"},
       {{be_silent, interrupt, [](RunEnd& end) { end.images->read = 1; }}, 0, "interrupted"},
