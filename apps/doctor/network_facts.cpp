@@ -217,14 +217,7 @@ void examine_echo(const PeerEcho& peer, Examination& result) {
                fixed(100.0 * loss, 0) + " % of the echoes of " + peer.host + " are lost",
                "lost messages have to be sent again",
                "use --link wifi or intermittent, and a budget");
-  if (peer.passing_bytes < peer.packet_bytes)
-    result.add(kError, "network.path_mtu",
-               peer.host + " answers packets of up to " + std::to_string(peer.passing_bytes) +
-                   " B, but none of " + std::to_string(peer.packet_bytes) + " B",
-               "statuses arrive, keyframes and closures do not: the robots meet and never join",
-               "set dds.max_message_bytes to " + std::to_string(peer.passing_bytes - 28) +
-                   " on all robots, or the MTU of their interfaces to " +
-                   std::to_string(peer.passing_bytes));
+  if (auto path = path_finding(peer)) result.findings.push_back(*std::move(path));
   if (peer.received > 0 && peer.median_s > kSlow_s)
     result.add(kWarning, "network.slow",
                "a round trip of " + fixed(1e3 * peer.median_s, 0) + " ms to " + peer.host,

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "apps/doctor/examine.hpp"
+#include "apps/robot/peer_echo.hpp"
 #include "modules/diagnosis/finding.hpp"
 #include "runtime/dds/dds_config.hpp"
 #include "runtime/dds/participant.hpp"
@@ -21,16 +22,6 @@ struct DiscoveredRobot {
   std::optional<RobotIdentity> identity = {};  ///< Absent if its announcement is not readable.
   bool has_keys = false;
   double unanswered_s = 0.0;  ///< Time for which it was heard, without an answer; 0: it answers.
-};
-
-/// Result of echo requests to a peer.
-struct PeerEcho {
-  std::string host;
-  std::size_t sent = 0, received = 0;
-  double median_s = 0.0, worst_s = 0.0;  ///< Round trip time; NaN without a reply.
-  bool may_send_icmp = true;             ///< False if this user has no permission for ICMP.
-  int packet_bytes = 0;   ///< Largest packet that robots send to the peer [B]; 0: not tried.
-  int passing_bytes = 0;  ///< Largest packet, up to this one, that the peer answers [B].
 };
 
 /// Offset of the wall clock of a robot from the clock of this host. It is the least difference over

@@ -10,6 +10,7 @@
 #include "apps/program_version.hpp"
 #include "apps/result_files.hpp"
 #include "apps/robot/failed_odometry.hpp"
+#include "apps/robot/peer_echo.hpp"
 #include "apps/robot/results.hpp"
 #include "apps/robot/run_end.hpp"
 #include "apps/robot/run_findings.hpp"
@@ -182,6 +183,23 @@ void add_reports(RunSummary& summary, const StoppedRun& run, const RunEnd& end,
   summary.forged_announcements = robot.bridge().peers().ask(&PeerTable::forged_announcements);
 }
 
+// Reasons why robots that were met did not join: paths that drop large packets.
+std::vector<Finding> path_findings(const StoppedRun& run) {
+  constexpr std::size_t kEchoes = 2;
+  constexpr int kHeaders_bytes = 28;
+  std::vector<Finding> found;
+  const std::vector<RobotId>& joined = run.record.progress().members;
+  const int packet_bytes = largest_datagram(run.config.dds, run.robot.interface()) + kHeaders_bytes;
+  for (const Peer& peer : run.robot.bridge().peers().list()) {
+    const std::size_t host = peer.addresses.find("udp/");
+    if (host == std::string::npos || std::ranges::count(joined, peer.identity.robot) > 0) continue;
+    PeerEcho echo = ask_peer(peer.addresses.substr(host + 4), packet_bytes, kEchoes);
+    echo.host = peer.identity.name;
+    if (auto finding = path_finding(echo)) found.push_back(*std::move(finding));
+  }
+  return found;
+}
+
 void warn_unlocated(const RobotOptions& options, const RunSummary& summary,
                     const RunRecord& record) {
   if (summary.fixes && !summary.fixes->located)
@@ -229,6 +247,10 @@ int conclude(const StoppedRun& run, std::optional<Watch>& watch, FinalRoom& room
         summary.noticed.push_back(std::move(found));
     const auto fault = std::ranges::find(summary.noticed, Severity::kError, &Finding::severity);
     if (fault != summary.noticed.end()) end.odometry_fault = fault->what;
+  }
+  for (Finding& path : path_findings(run)) {
+    log::warn("peers") << path.what;
+    summary.noticed.push_back(std::move(path));
   }
   end.lost_results = results.lost();
   summary.exit_reason = verdict_of(end).reason;
