@@ -1,17 +1,16 @@
 #include "modules/distance_field/distance_field.hpp"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
-#include <stdexcept>
-#include <string>
-
-#include "modules/core/config.hpp"
+#include <cstdint>
 
 namespace km {
 namespace {
 
 constexpr std::uint64_t kColumnX0 = 0x0101010101010101, kColumnX7 = kColumnX0 << 7U;
+constexpr int kNoSurface = 1 << 28;  // beyond every squared distance [voxels^2]
 
 bool any(const BlockBits& bits) {
   return std::ranges::any_of(bits, [](std::uint64_t word) { return word != 0; });
@@ -21,40 +20,36 @@ bool bit(const BlockBits& bits, int x, int y, int z) {
   return (bits[static_cast<std::size_t>(z)] >> (x + kBlockSide * y) & 1U) != 0;
 }
 
-double checked_voxel(double voxel_m, double max_m) {
-  if (!(voxel_m > 0.0) || max_m > DistanceField::kMaxReach * voxel_m)
-    throw std::invalid_argument("distance field: " + shortest_text(max_m) + " m in voxels of " +
-                                shortest_text(voxel_m) + " m");
-  return voxel_m;
+// The transform along the rows (Felzenszwalb and Huttenlocher, "Distance Transforms of Sampled
+// Functions", 2012, Sec. 2): the minimum of f(q) + (p - q)^2 over all q within reach of p.
+Eigen::ArrayXXi transformed(const Eigen::ArrayXXi& f, int reach) {
+  Eigen::ArrayXXi result = f;
+  for (Eigen::Index d = 1; d <= std::min<Eigen::Index>(reach, f.rows() - 1); ++d) {
+    const Eigen::Index rows = f.rows() - d;
+    const int squared = static_cast<int>(d * d);
+    result.topRows(rows) = result.topRows(rows).min(f.bottomRows(rows) + squared);
+    result.bottomRows(rows) = result.bottomRows(rows).min(f.topRows(rows) + squared);
+  }
+  return result;
 }
 
 }  // namespace
 
-DistanceField::DistanceField(double max_distance_m, double voxel_size_m)
-    : voxel_m_(checked_voxel(voxel_size_m, max_distance_m)),
-      max_m_(max_distance_m),
-      reach_(static_cast<int>(std::ceil(max_m_ / voxel_m_)) + 1),
-      reach_blocks_((reach_ + kBlockSide - 1) / kBlockSide) {}
-
-const DistanceField::Block* DistanceField::find(const Eigen::Vector3i& position) const {
-  const auto found = blocks_.find(position);
-  return found == blocks_.end() ? nullptr : found->second.get();
-}
-
 // Voxels behind a surface beside an observed voxel in front of it, by shifted copies of the bits.
-BlockBits DistanceField::surface_of(const Eigen::Vector3i& position, const Block& block) const {
-  const auto front = [](const Block* other, int z) {
+BlockBits DistanceField::surface_of(const BlockSpace& block) const {
+  const auto front = [](const BlockSpace* other, int z) {
     return other == nullptr ? 0
                             : other->observed[static_cast<std::size_t>(z)] &
                                   ~other->inside[static_cast<std::size_t>(z)];
   };
-  const auto beside = [&](int axis, int step) {
-    Eigen::Vector3i next = position;
+  const auto beside = [&](int axis, int step) -> const BlockSpace* {
+    Eigen::Vector3i next = block.position;
     next[axis] += step;
-    return find(next);
+    const auto found = blocks_.find(next);
+    return found == blocks_.end() ? nullptr : &found->second;
   };
-  const std::array<const Block*, 6> around = {beside(0, -1), beside(0, 1),  beside(1, -1),
-                                              beside(1, 1),  beside(2, -1), beside(2, 1)};
+  const std::array<const BlockSpace*, 6> around = {beside(0, -1), beside(0, 1),  beside(1, -1),
+                                                   beside(1, 1),  beside(2, -1), beside(2, 1)};
   BlockBits surface = {};
   for (int z = 0; z < kBlockSide; ++z) {
     const std::uint64_t own = front(&block, z);
@@ -75,97 +70,55 @@ void DistanceField::set(const SpaceChanges& changes) {
       blocks_.erase(change.position);
       continue;
     }
-    auto& block = blocks_[change.position];
-    if (block == nullptr) block = std::make_unique<Block>();
-    block->observed = change.observed;
-    for (std::size_t z = 0; z < change.inside.size(); ++z)
-      block->inside[z] = change.inside[z] & change.observed[z];
+    BlockSpace& block = blocks_[change.position] = change;
+    for (std::size_t z = 0; z < block.inside.size(); ++z) block.inside[z] &= block.observed[z];
   }
-  is_surface_outdated_ = true;
-  for (const auto& [position, block] : blocks_) block->outdated = true;
 }
 
-void DistanceField::find_surface() {
-  for (const auto& [position, block] : blocks_) block->surface = surface_of(position, *block);
-  is_surface_outdated_ = false;
-}
-
-void DistanceField::compute(const std::vector<Eigen::Vector3i>& targets) {
-  if (targets.empty()) return;
-  if (is_surface_outdated_) find_surface();
-  Box box{targets.front(), targets.front()};
-  std::vector<DistanceTarget> outputs;
-  for (const Eigen::Vector3i& target : targets) {
-    box = {box.low.cwiseMin(target), box.high.cwiseMax(target)};
-    Block& block = *blocks_.at(target);
-    outputs.push_back({target, &block.squared});
-    block.outdated = false;
-  }
-  find_surface_distances(surface_near({box.low, box.high.array() + 1}), reach_, outputs);
-}
-
-// The surface within reach of `box`.
-SurfaceBox DistanceField::surface_near(const Box& box) const {
-  std::vector<std::pair<Eigen::Vector3i, const Block*>> found;
-  Eigen::Vector3i low = box.high, high = box.low;
+// One transform per axis. The first one, along z, is at a single height.
+std::vector<DistanceField::SlicePoint> DistanceField::slice(double z_m) const {
+  const int slice_z = static_cast<int>(std::lround(z_m / voxel_m_));
+  const int reach = static_cast<int>(std::ceil(max_m_ / voxel_m_)) + 1;
+  std::vector<const BlockSpace*> blocks;
+  Eigen::Array3i low = Eigen::Array3i::Constant(kNoSurface), high = -low;
   for (const auto& [position, block] : blocks_) {
-    const auto at = position.array();
-    if (!any(block->surface) || (at < box.low.array() - reach_blocks_).any() ||
-        (at >= box.high.array() + reach_blocks_).any())
-      continue;
-    low = found.empty() ? position : low.cwiseMin(position);
-    high = found.empty() ? position : high.cwiseMax(position);
-    found.emplace_back(position, block.get());
+    if (position.z() != slice_z >> 3) continue;
+    blocks.push_back(&block);
+    low = low.min(kBlockSide * position.array() - reach);
+    high = high.max(kBlockSide * (position.array() + 1) + reach);
   }
-  if (found.empty()) return {};
-  const Eigen::Vector3i blocks = high - low + Eigen::Vector3i::Ones();
-  SurfaceBox surface{low, blocks, std::vector<BlockBits>(static_cast<std::size_t>(blocks.prod()))};
-  for (const auto& [position, block] : found) {
-    const Eigen::Vector3i at = position - low;
-    surface
-        .surface[static_cast<std::size_t>(at.x() + blocks.x() * (at.y() + blocks.y() * at.z()))] =
-        block->surface;
-  }
-  return surface;
-}
-
-double DistanceField::signed_distance(const Block& block, int x, int y, int z) const {
-  const std::uint16_t squared = block.squared[voxel_index(x, y, z)];
-  const bool is_inside = bit(block.inside, x, y, z);
-  if (squared == kBeyondReach) return is_inside ? -max_m_ : max_m_;
-  const double d = std::sqrt(static_cast<double>(squared));
-  return std::clamp((is_inside ? -(d + 0.5) : d - 0.5) * voxel_m_, -max_m_, max_m_);
-}
-
-std::optional<double> DistanceField::at_voxel(const Eigen::Vector3i& voxel) {
-  const Eigen::Vector3i position = voxel.unaryExpr([](int v) { return v >> 3; });
-  const Block* block = find(position);
-  if (block == nullptr) return std::nullopt;
-  const Eigen::Vector3i in = voxel - position * kBlockSide;
-  if (!bit(block->observed, in.x(), in.y(), in.z())) return std::nullopt;
-  if (block->outdated) compute({position});
-  return signed_distance(*block, in.x(), in.y(), in.z());
-}
-
-std::vector<DistanceField::SlicePoint> DistanceField::slice(double z_m) {
-  const int voxel_z = static_cast<int>(std::lround(z_m / voxel_m_));
-  std::vector<Eigen::Vector3i> positions, outdated;
+  if (blocks.empty()) return {};
+  std::ranges::sort(blocks, BlockOrder(), &BlockSpace::position);
+  Eigen::ArrayXXi squared =
+      Eigen::ArrayXXi::Constant(high.x() - low.x(), high.y() - low.y(), kNoSurface);
   for (const auto& [position, block] : blocks_) {
-    if (position.z() != voxel_z >> 3) continue;
-    positions.push_back(position);
-    if (block->outdated) outdated.push_back(position);
+    const int below = kBlockSide * position.z() - slice_z;
+    if (below > reach || below + kBlockSide <= -reach) continue;
+    const BlockBits surface = surface_of(block);
+    for (int z = 0; z < kBlockSide; ++z)
+      for (std::uint64_t word = surface[static_cast<std::size_t>(z)]; word != 0; word &= word - 1) {
+        const int place = std::countr_zero(word);
+        const int x = kBlockSide * position.x() + place % kBlockSide - low.x();
+        const int y = kBlockSide * position.y() + place / kBlockSide - low.y();
+        if (x >= 0 && y >= 0 && x < squared.rows() && y < squared.cols())
+          squared(x, y) = std::min(squared(x, y), (below + z) * (below + z));
+      }
   }
-  compute(outdated);
-  std::ranges::sort(positions, BlockOrder());
+  squared = transformed(squared, reach);
+  squared = transformed(squared.transpose(), reach);
   std::vector<SlicePoint> points;
-  for (const Eigen::Vector3i& position : positions)
+  for (const BlockSpace* block : blocks)
     for (int y = 0; y < kBlockSide; ++y)
       for (int x = 0; x < kBlockSide; ++x) {
-        Eigen::Vector3i voxel = position * kBlockSide + Eigen::Vector3i(x, y, 0);
-        voxel.z() = voxel_z;
-        if (const auto distance = at_voxel(voxel))
-          points.push_back(
-              {voxel.cast<float>() * static_cast<float>(voxel_m_), static_cast<float>(*distance)});
+        if (!bit(block->observed, x, y, slice_z & 7)) continue;
+        const Eigen::Vector3i voxel(kBlockSide * block->position.x() + x,
+                                    kBlockSide * block->position.y() + y, slice_z);
+        const double d =
+            std::sqrt(static_cast<double>(squared(voxel.y() - low.y(), voxel.x() - low.x())));
+        const double signed_voxels = bit(block->inside, x, y, slice_z & 7) ? -(d + 0.5) : d - 0.5;
+        points.push_back(
+            {static_cast<float>(voxel_m_) * voxel.cast<float>(),
+             static_cast<float>(std::clamp(signed_voxels * voxel_m_, -max_m_, max_m_))});
       }
   return points;
 }

@@ -24,8 +24,7 @@ DistanceFieldNode::DistanceFieldNode(const DistanceFieldTopics& topics)
 
 void DistanceFieldNode::step(const SpaceUpdate& update) {
   if (update.is_first)
-    field_.emplace(std::min(kMaxDistance_m, DistanceField::kMaxReach * update.voxel_m),
-                   update.voxel_m);
+    field_.emplace(std::min(kMaxDistance_m, kMaxDistance_voxels * update.voxel_m), update.voxel_m);
   field_->set(update.changes);
   newest_ = update.stamp;
   camera_z_m_ = update.camera_z_m;

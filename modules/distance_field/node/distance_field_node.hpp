@@ -21,8 +21,8 @@ class DistanceFieldNode final : public WorkerNode<Topic<SpaceUpdate>::Message> {
  public:
   static constexpr double kSlice_s = 1.0;  ///< Interval of slices, by stamps.
 
-  /// Largest distance of the slices, or the 100 voxels that DistanceField can compute.
-  static constexpr double kMaxDistance_m = 2.0;
+  /// Largest distance of the slices: both hold. The time of a slice is proportional to the voxels.
+  static constexpr double kMaxDistance_m = 2.0, kMaxDistance_voxels = 100.0;
 
   explicit DistanceFieldNode(const DistanceFieldTopics& topics);
   ~DistanceFieldNode() override { stop(); }
