@@ -18,8 +18,8 @@ struct PeerEcho {
   int passing_bytes = 0;  ///< Largest packet, up to this one, that the peer answers [B].
 };
 
-/// Sends `echoes` echo requests to the host (name or address, with or without ":port") one after
-/// the other, and then ever larger ones, up to `packet_bytes`, the largest packet that robots send.
+/// Sends `echoes` echo requests to the host (name or address, with or without ":port"), one after
+/// the other. Then sends larger ones, up to `packet_bytes`, the largest packet that robots send.
 [[nodiscard]] PeerEcho ask_peer(const std::string& host, int packet_bytes, std::size_t echoes);
 
 /// The error of a path on which small packets pass and large ones do not; nullopt if all pass.
