@@ -112,8 +112,7 @@ MappingSummary map_counts(const RunRecord& record) {
           .vertices = map.size.vertices,
           .faces = map.size.faces,
           .superseded_faces_dropped = map.size.dropped_faces,
-          .corrections = corrections.deformed,
-          .moves_as_a_whole = corrections.moved,
+          .corrections = corrections.count,
           .correction_seconds = corrections.seconds,
           .unbound_vertices = corrections.last.unbound_vertices};
 }

@@ -162,7 +162,7 @@ void RunRecord::add(const PeerEvent& event) {
 
 void RunRecord::add(const OptimizedMesh& mesh) {
   ++activity_;
-  ++(mesh.deformed ? mesh_corrections_.deformed : mesh_corrections_.moved);
+  ++mesh_corrections_.count;
   mesh_corrections_.seconds += mesh.seconds;
   mesh_corrections_.last = mesh.report;
   if (stated_cells_.anchor != mesh.anchor) stated_cells_ = {mesh.anchor, {}};

@@ -108,8 +108,7 @@ class RunRecord {
 
   /// Number of corrections of the mesh.
   struct MeshCorrections {
-    std::size_t deformed = 0;         ///< Deformations by Local Mesh Optimization.
-    std::size_t moved = 0;            ///< Rigid motions of the whole mesh.
+    std::size_t count = 0;
     double seconds = 0.0;             ///< Total time.
     MeshDeformationReport last = {};  ///< Report of the last optimisation.
   };

@@ -64,7 +64,7 @@ struct MappingSummary {
   std::uint64_t blocks_refused =
       0;  ///< Requests for blocks that the map refused, over all frames (see NearBlocks).
   std::uint64_t blocks = 0, vertices = 0, faces = 0, superseded_faces_dropped = 0;
-  std::uint64_t corrections = 0, moves_as_a_whole = 0;
+  std::uint64_t corrections = 0;
   double correction_seconds = 0.0;
   std::uint64_t unbound_vertices = 0;  ///< In the last correction.
 
@@ -75,8 +75,7 @@ struct MappingSummary {
                "label_pixels_outside_palette", label_pixels_outside_palette, "blocks_refused",
                blocks_refused, "blocks", blocks, "vertices", vertices, "faces", faces,
                "superseded_faces_dropped", superseded_faces_dropped, "corrections", corrections,
-               "moves_as_a_whole", moves_as_a_whole, "correction_seconds", correction_seconds,
-               "unbound_vertices", unbound_vertices);
+               "correction_seconds", correction_seconds, "unbound_vertices", unbound_vertices);
   }
 };
 

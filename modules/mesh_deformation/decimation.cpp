@@ -11,6 +11,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include "modules/mesh/grid_cell.hpp"
 #include "modules/mesh_deformation/mesh_node.hpp"
 
 namespace km {
@@ -200,13 +201,11 @@ std::vector<std::uint32_t> central_vertices(const std::vector<Eigen::Vector3f>& 
                                             std::size_t count) {
   std::vector<Eigen::Vector4d> sums(count, Eigen::Vector4d::Zero());
   for (std::size_t v = 0; v < vertices.size(); ++v)
-    if (cluster_of_vertex[v] != kNoIndex)
-      sums[cluster_of_vertex[v]] += vertices[v].cast<double>().homogeneous();
+    sums[cluster_of_vertex[v]] += vertices[v].cast<double>().homogeneous();
   std::vector<std::uint32_t> best(count, kNoIndex);
   std::vector<double> best_distance2(count, std::numeric_limits<double>::infinity());
   for (std::uint32_t v = 0; v < vertices.size(); ++v) {
     const std::uint32_t c = cluster_of_vertex[v];
-    if (c == kNoIndex) continue;
     const double distance2 = (vertices[v].cast<double>() - sums[c].hnormalized()).squaredNorm();
     if (distance2 >= best_distance2[c]) continue;
     best_distance2[c] = distance2;
@@ -222,7 +221,6 @@ std::vector<LabelledMesh::Face> cluster_faces(const std::vector<LabelledMesh::Fa
     LabelledMesh::Face face = {};
     for (std::size_t i = 0; i < 3; ++i) face[i] = cluster_of_vertex[corners[i]];
     if (face[0] == face[1] || face[1] == face[2] || face[2] == face[0]) continue;
-    if (std::ranges::find(face, kNoIndex) != face.end()) continue;
     std::ranges::rotate(face, std::ranges::min_element(face));  // lowest first, same orientation
     result.push_back(face);
   }
@@ -234,13 +232,62 @@ std::vector<LabelledMesh::Face> cluster_faces(const std::vector<LabelledMesh::Fa
 constexpr double kClustersPerSpacing = 2.0;
 constexpr double kNearSpacings = 0.5;  // nodes closer than this are merged
 
-// Assigns vertices without a node to the nearest existing node, if one is near.
-void join_near_nodes(SimplifiedMesh& simplified, const MapMesh& map, const NodeGrid& grid) {
-  if (simplified.nodes.empty()) return;
-  for (std::size_t v = 0; v < map.mesh.vertices.size(); ++v)
-    if (simplified.node_of_vertex[v] == kNoIndex)
-      simplified.node_of_vertex[v] =
-          grid.nearest(map.mesh.vertices[v].cast<double>(), map.seen_by[v]);
+// Nodes by position, for searches within one radius while nodes are added.
+class NodeGrid {
+ public:
+  // Nodes whose keyframe_gap() exceeds `max_gap_keyframes` are not near.
+  NodeGrid(double radius_m, KeyframeIndex max_gap_keyframes)
+      : radius_m_(radius_m), max_gap_keyframes_(max_gap_keyframes) {}
+
+  void insert(const MeshNode& node, std::uint32_t index) {
+    cells_[grid_cell(node.position, radius_m_)].emplace_back(node, index);
+  }
+
+  // Index of the nearest node within the radius that is near in time. At equal distance the lowest
+  // index; kNoIndex if there is no such node.
+  [[nodiscard]] std::uint32_t nearest(const Eigen::Vector3d& point, const SeenBy& seen_by) const {
+    const auto [cx, cy, cz] = grid_cell(point, radius_m_);
+    std::pair<double, std::uint32_t> best{radius_m_ * radius_m_, kNoIndex};
+    for (int i = 0; i < 27; ++i) {
+      const auto cell = cells_.find({cx + i % 3 - 1, cy + i / 3 % 3 - 1, cz + i / 9 - 1});
+      if (cell == cells_.end()) continue;
+      for (const auto& [node, index] : cell->second) {
+        if (keyframe_gap(node.seen_by, seen_by) > max_gap_keyframes_) continue;
+        best = std::min(best, std::pair{(node.position - point).squaredNorm(), index});
+      }
+    }
+    return best.second;
+  }
+
+ private:
+  double radius_m_;
+  KeyframeIndex max_gap_keyframes_;
+  std::unordered_map<GridCell, std::vector<std::pair<MeshNode, std::uint32_t>>, GridCellHash>
+      cells_;
+};
+
+// Vertices of a mesh clustered by the cells of a grid, and the triangles between the clusters.
+struct VertexClusters {
+  TimedTriangles triangles;  // a point per cluster: the vertex nearest to its centroid
+  std::vector<std::uint32_t> cluster_of_vertex;
+};
+
+// Faces with corners in three clusters remain, each once.
+VertexClusters cluster_vertices(const MapMesh& map, double width_m,
+                                KeyframeIndex max_gap_keyframes) {
+  const auto& vertices = map.mesh.vertices;
+  VertexClusters clusters;
+  Clustering clustering(width_m, max_gap_keyframes);
+  for (std::size_t v = 0; v < vertices.size(); ++v)
+    clusters.cluster_of_vertex.push_back(
+        clustering.cluster_of(vertices[v].cast<double>(), map.seen_by[v]));
+  for (const std::uint32_t v :
+       central_vertices(vertices, clusters.cluster_of_vertex, clustering.count())) {
+    clusters.triangles.points.push_back(vertices[v].cast<double>());
+    clusters.triangles.seen_by.push_back(map.seen_by[v]);
+  }
+  clusters.triangles.faces = cluster_faces(map.mesh.faces, clusters.cluster_of_vertex);
+  return clusters;
 }
 
 double area_of(const TimedTriangles& triangles) {
@@ -260,18 +307,19 @@ std::size_t lattice_points(double area_m2, double spacing_m) {
 }
 
 // The node of every cluster; a node is added if none is near.
-std::vector<std::uint32_t> nodes_of_clusters(const VertexClusters& clusters,
-                                             const CollapsedPoints& collapsed, NodeGrid& grid,
+std::vector<std::uint32_t> nodes_of_clusters(const TimedTriangles& clusters,
+                                             const CollapsedPoints& collapsed,
+                                             const DecimationScale& scale,
                                              std::vector<MeshNode>& nodes) {
+  NodeGrid grid(kNearSpacings * scale.spacing_m, scale.max_gap_keyframes);
   std::vector<std::uint32_t> node_of_kept;
   for (const std::uint32_t cluster : collapsed.kept) {
-    const Eigen::Vector3d& position = clusters.triangles.points[cluster];
-    const SeenBy& seen_by = clusters.triangles.seen_by[cluster];
-    std::uint32_t node = grid.nearest(position, seen_by);
+    const MeshNode candidate{clusters.points[cluster], clusters.seen_by[cluster]};
+    std::uint32_t node = grid.nearest(candidate.position, candidate.seen_by);
     if (node == kNoIndex) {
       node = static_cast<std::uint32_t>(nodes.size());
-      nodes.push_back({position, seen_by, clusters.vertex[cluster]});
-      grid.insert(nodes.back(), node);
+      nodes.push_back(candidate);
+      grid.insert(candidate, node);
     }
     node_of_kept.push_back(node);
   }
@@ -303,43 +351,19 @@ CollapsedPoints collapse_edges(const TimedTriangles& triangles, std::size_t targ
   return collapsed;
 }
 
-VertexClusters cluster_vertices(const MapMesh& map, std::span<const std::uint32_t> node_of_vertex,
-                                double width_m, KeyframeIndex max_gap_keyframes) {
-  const auto& vertices = map.mesh.vertices;
-  VertexClusters clusters;
-  clusters.cluster_of_vertex.assign(vertices.size(), kNoIndex);
-  Clustering clustering(width_m, max_gap_keyframes);
-  for (std::size_t v = 0; v < vertices.size(); ++v)
-    if (node_of_vertex[v] == kNoIndex)
-      clusters.cluster_of_vertex[v] =
-          clustering.cluster_of(vertices[v].cast<double>(), map.seen_by[v]);
-  clusters.vertex = central_vertices(vertices, clusters.cluster_of_vertex, clustering.count());
-  for (const std::uint32_t v : clusters.vertex) {
-    clusters.triangles.points.push_back(vertices[v].cast<double>());
-    clusters.triangles.seen_by.push_back(map.seen_by[v]);
-  }
-  clusters.triangles.faces = cluster_faces(map.mesh.faces, clusters.cluster_of_vertex);
-  return clusters;
-}
-
-void extend(SimplifiedMesh& simplified, const MapMesh& map, const DecimationScale& scale) {
-  simplified.node_of_vertex.resize(map.mesh.vertices.size(), kNoIndex);
-  NodeGrid grid(kNearSpacings * scale.spacing_m, scale.max_gap_keyframes);
-  for (std::uint32_t n = 0; n < simplified.nodes.size(); ++n) grid.insert(simplified.nodes[n], n);
-  join_near_nodes(simplified, map, grid);
-
+SimplifiedMesh simplify(const MapMesh& map, const DecimationScale& scale) {
+  SimplifiedMesh simplified;
   const VertexClusters clusters =
-      cluster_vertices(map, simplified.node_of_vertex, scale.spacing_m / kClustersPerSpacing,
-                       scale.max_gap_keyframes);
-  if (clusters.vertex.empty()) return;
+      cluster_vertices(map, scale.spacing_m / kClustersPerSpacing, scale.max_gap_keyframes);
+  if (clusters.cluster_of_vertex.empty()) return simplified;
   const std::size_t target = lattice_points(area_of(clusters.triangles), scale.spacing_m);
   const CollapsedPoints collapsed =
       collapse_edges(clusters.triangles, target, scale.max_gap_keyframes);
   const std::vector<std::uint32_t> node_of_cluster =
-      nodes_of_clusters(clusters, collapsed, grid, simplified.nodes);
-  for (std::size_t v = 0; v < map.mesh.vertices.size(); ++v)
-    if (simplified.node_of_vertex[v] == kNoIndex)
-      simplified.node_of_vertex[v] = node_of_cluster[clusters.cluster_of_vertex[v]];
+      nodes_of_clusters(clusters.triangles, collapsed, scale, simplified.nodes);
+  for (const std::uint32_t cluster : clusters.cluster_of_vertex)
+    simplified.node_of_vertex.push_back(node_of_cluster[cluster]);
+  return simplified;
 }
 
 std::vector<std::array<std::uint32_t, 2>> region_edges(const SimplifiedMesh& simplified,

@@ -28,26 +28,11 @@ struct CollapsedPoints {
 };
 
 /// Decimates by half-edge collapses in OpenMesh until `target` points with faces remain, or no
-/// collapse is possible. extend() describes their order. Points whose keyframe_gap() exceeds
+/// collapse is possible. simplify() describes their order. Points whose keyframe_gap() exceeds
 /// `max_gap_keyframes` are not merged. If more than two faces share an edge, the surface is cut
 /// open there.
 [[nodiscard]] CollapsedPoints collapse_edges(const TimedTriangles& triangles, std::size_t target,
                                              KeyframeIndex max_gap_keyframes);
-
-/// Vertices of a mesh clustered by the cells of a grid, and the triangles between the clusters.
-struct VertexClusters {
-  TimedTriangles triangles;           ///< One point per cluster: the position of `vertex`.
-  std::vector<std::uint32_t> vertex;  ///< For each cluster the vertex nearest to its centroid.
-  std::vector<std::uint32_t> cluster_of_vertex;  ///< kNoIndex for vertices without a cluster.
-};
-
-/// Clusters those vertices of `map` whose `node_of_vertex` is kNoIndex, in cells of `width_m`.
-/// Vertices of a cell are in one cluster if their keyframe_gap() to the first vertex of the cluster
-/// is within the window.
-/// Faces with corners in three clusters remain, each once. Linear.
-[[nodiscard]] VertexClusters cluster_vertices(const MapMesh& map,
-                                              std::span<const std::uint32_t> node_of_vertex,
-                                              double width_m, KeyframeIndex max_gap_keyframes);
 
 /// Resolution of the simplified mesh, and the surfaces that it does not merge.
 struct DecimationScale {
@@ -59,24 +44,22 @@ struct DecimationScale {
 /// its region.
 struct SimplifiedMesh {
   std::vector<MeshNode> nodes;
-  std::vector<std::uint32_t> node_of_vertex;  ///< kNoIndex: not yet assigned.
+  std::vector<std::uint32_t> node_of_vertex;
 };
 
-/// Assigns every vertex of `map` that has no node in `simplified` to one. Vertices within half a
-/// spacing of a node are assigned to it. The others are simplified to new nodes, which are
-/// appended. For speed they are first clustered on a grid of half the spacing. Then OpenMesh
-/// decimates the mesh of the clusters to as many points as a triangular lattice with this spacing
-/// has on the area of the mesh.
+/// The nodes of a map. For speed its vertices are first clustered on a grid of half the spacing.
+/// Vertices of a cell are in one cluster if their keyframe_gap() to the first vertex of the cluster
+/// is within the window. Then OpenMesh decimates the triangles between the clusters to as many
+/// points as a triangular lattice with this spacing has on their area.
 ///
 /// The order of collapses is that of quadric error (Garland and Heckbert, "Surface Simplification
 /// Using Quadric Error Metrics", 1997) plus the spread of the merged region (area times squared
 /// length of the edge). The spread distributes nodes over flat surface too, because the deformation
 /// also bends flat surface. Nodes closer than half a spacing are merged.
 ///
-/// `simplified.node_of_vertex` is first extended with kNoIndex to the length of map.mesh.vertices.
-/// Precondition: fault_of() finds no fault in the map. Linear in the new vertices except for the
+/// Precondition: fault_of() finds no fault in the map. Linear in the vertices except for the
 /// decimation of the clusters (n log n).
-void extend(SimplifiedMesh& simplified, const MapMesh& map, const DecimationScale& scale);
+[[nodiscard]] SimplifiedMesh simplify(const MapMesh& map, const DecimationScale& scale);
 
 /// Pairs of nodes a < b, ascending, whose regions share a face: the mesh edges of the simplified
 /// mesh. Pairs whose keyframe_gap() exceeds `max_gap_keyframes` are excluded.

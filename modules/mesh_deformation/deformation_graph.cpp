@@ -406,27 +406,6 @@ DeformationPoses initial_poses(const DeformationGraph& graph, std::span<const SE
   return poses;
 }
 
-DeformationPoses warm_start_poses(const DeformationGraph& graph, const DeformationPoses& last,
-                                  std::span<const SE3> T_world_kf_last,
-                                  std::span<const SE3> T_world_kf) {
-  DeformationPoses poses = initial_poses(graph, T_world_kf);
-  std::vector<SE3> moved;  // motion of each known keyframe since the last solution
-  for (std::size_t i = 0; i < std::min(T_world_kf_last.size(), T_world_kf.size()); ++i) {
-    moved.push_back(rigid_motion(T_world_kf[i], T_world_kf_last[i]));
-    if (i < last.T_world_kf.size()) poses.T_world_kf[i] = moved[i] * last.T_world_kf[i];
-  }
-  const std::vector<std::size_t> first = first_keyframe_edges(graph);
-  for (std::size_t n = 0; n < std::min(last.T_world_node.size(), graph.nodes.size()); ++n) {
-    if (first[n] == graph.keyframe_edges.size()) {
-      poses.T_world_node[n] = last.T_world_node[n];
-      continue;
-    }
-    const KeyframeIndex keyframe = graph.keyframe_edges[first[n]].keyframe;
-    if (keyframe < moved.size()) poses.T_world_node[n] = moved[keyframe] * last.T_world_node[n];
-  }
-  return poses;
-}
-
 DeformationSolution solve(const DeformationGraph& graph, std::span<const SE3> T_world_kf,
                           const DeformationNoise& noise, const DeformationStop& stop,
                           DeformationPoses initial) {

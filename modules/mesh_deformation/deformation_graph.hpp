@@ -107,20 +107,11 @@ struct [[nodiscard]] DeformationSolution {
   double final_cost = 0.0;
 };
 
-/// First guess without an earlier solution. Keyframes are at their anchors. Each node is at the
+/// First guess. Keyframes are at their anchors. Each node is at the
 /// mean of the positions that its keyframes predict, with the rotation of its first keyframe.
 /// `T_world_kf` are the optimised poses, as many as graph.T_odom_kf. Exact for every rigid motion.
 [[nodiscard]] DeformationPoses initial_poses(const DeformationGraph& graph,
                                              std::span<const SE3> T_world_kf);
-
-/// First guess from the solution `last` for the anchors `T_world_kf_last`. Each keyframe of `last`
-/// moves as its anchor has moved since `last`, and each node as the anchor of its first keyframe.
-/// Keyframes and nodes that `last` lacks are as in initial_poses(). Precondition: the vertices of
-/// `last` are the first ones of the graph.
-[[nodiscard]] DeformationPoses warm_start_poses(const DeformationGraph& graph,
-                                                const DeformationPoses& last,
-                                                std::span<const SE3> T_world_kf_last,
-                                                std::span<const SE3> T_world_kf);
 
 /// Minimises Eq. (1): anchors of the keyframes, rigidity between neighbouring nodes in both
 /// directions, rigidity between keyframes and the nodes they saw. The method is Levenberg-Marquardt

@@ -4,8 +4,9 @@
 #include <iterator>
 #include <utility>
 
+#include "modules/core/lie.hpp"
 #include "modules/mesh/seen_through.hpp"
-#include "modules/mesh_deformation/local_mesh_optimizer.hpp"
+#include "modules/mesh_deformation/local_mesh_optimization.hpp"
 #include "modules/mesh_deformation/superseded_surface.hpp"
 
 namespace km {
@@ -15,6 +16,16 @@ template <typename T>
 std::vector<T> elements_of(std::vector<T> values, const std::vector<std::uint32_t>& kept) {
   keep_elements(values, kept);
   return values;
+}
+
+// True if a keyframe has moved so far that the mesh is corrected. New keyframes do not count.
+bool has_moved(const std::vector<SE3>& before, const std::vector<SE3>& after) {
+  constexpr double kTranslation_m = 0.01, kRotation_rad = 0.005;
+  for (std::size_t i = 0; i < std::min(before.size(), after.size()); ++i)
+    if ((after[i].translation() - before[i].translation()).norm() > kTranslation_m ||
+        angle_of(before[i].linear().transpose() * after[i].linear()) > kRotation_rad)
+      return true;
+  return false;
 }
 
 // Number of faces of a map that stay after its mapper has dropped surface.
@@ -35,40 +46,27 @@ std::size_t faces_after(const MapMesh& map, const SupersededSurface& dropped) {
 }  // namespace
 
 MeshCorrector::MeshCorrector(const MeshDeformationConfig& config, const CopyLimits& limits)
-    : limits_(limits),
-      duplicate_faces_(static_cast<std::size_t>(config.duplicate_faces)),
-      max_gap_keyframes_(static_cast<KeyframeIndex>(config.time_window_keyframes)),
-      seen_through_views_(config.seen_through_views),
-      optimizer_(config) {}
+    : config_(checked(config)), limits_(limits) {}
 
 std::optional<MeshCorrection> MeshCorrector::correct(const CorrectionInput& input) {
   check_trajectories(input.T_odom_kf, input.T_world_kf);
   std::vector<SE3> anchors = complete(input.T_odom_kf, input.T_world_kf);
-  if (input.map_version != map_version_) return deform(input, std::move(anchors));
-  const KeyframeMotion motion = keyframe_motion(origin_.T_world_kf, anchors, {});
-  if (motion.non_rigid > 1.0) return deform(input, std::move(anchors));
-  if (largest_difference(origin_.T_world_kf, motion.T_after_before, T_result_optimized_, {}) <= 1.0)
-    return std::nullopt;
-  T_result_optimized_ = motion.T_after_before;
-  MeshCorrection result{optimized_, report_, false, {}, 0, 0, origin_};
-  result.mesh.transform(T_result_optimized_);
-  for (SE3& pose : result.origin.T_world_kf) pose = T_result_optimized_ * pose;
-  return result;
+  if (input.map_version == map_version_ && !has_moved(anchors_, anchors)) return std::nullopt;
+  return deform(input, std::move(anchors));
 }
 
 MeshCorrection MeshCorrector::correct_from_scratch(const CorrectionInput& input) {
   check_trajectories(input.T_odom_kf, input.T_world_kf);
-  optimizer_.reset();
   distinct_faces_ = 0;
   gone_.clear();
   return deform(input, complete(input.T_odom_kf, input.T_world_kf));
 }
 
-// For each vertex of optimized_, which are those of the map, whether later views saw through it.
-std::vector<bool> MeshCorrector::seen_through(const CorrectionInput& input) const {
-  const std::vector<Eigen::Vector3f>& vertices = optimized_.vertices;
-  const std::size_t known = std::min(input.covariances.size(), origin_.T_world_kf.size());
-  if (seen_through_views_ == 0 || known == 0 || input.map.voxel_m <= 0.0)
+// For each corrected vertex of the map, whether later views saw through it.
+std::vector<bool> MeshCorrector::seen_through(const CorrectionInput& input,
+                                              const std::vector<Eigen::Vector3f>& vertices) const {
+  const std::size_t known = std::min(input.covariances.size(), anchors_.size());
+  if (config_.seen_through_views == 0 || known == 0 || input.map.voxel_m <= 0.0)
     return std::vector(vertices.size(), false);
   std::vector<SightPoint> points;
   points.reserve(vertices.size());
@@ -83,10 +81,10 @@ std::vector<bool> MeshCorrector::seen_through(const CorrectionInput& input) cons
     if (view->keyframe >= known) break;
     if (std::exchange(keyframe, view->keyframe) != view->keyframe)
       sigmas = relative_sigmas(input.covariances.first(known), keyframe);
-    const SE3 T_world_odom = origin_.T_world_kf[keyframe] * input.T_odom_kf[keyframe].inverse();
+    const SE3 T_world_odom = anchors_[keyframe] * input.T_odom_kf[keyframe].inverse();
     votes.add(*view, T_world_odom * view->T_odom_cam, view->keyframe, sigmas);
   }
-  return votes.seen_through(seen_through_views_);
+  return votes.seen_through(config_.seen_through_views);
 }
 
 // True if a search for copies is due. It takes long, and follows the growth of the mesh. All
@@ -95,18 +93,18 @@ std::vector<bool> MeshCorrector::seen_through(const CorrectionInput& input) cons
 bool MeshCorrector::has_many_copies(const MapMesh& map) const {
   const std::size_t faces = map.mesh.faces.size();
   return limits_.voxels > 0.0 && map.voxel_m > 0.0 && !map.ids.empty() &&
-         faces > duplicate_faces_ &&
+         faces > static_cast<std::size_t>(config_.duplicate_faces) &&
          static_cast<double>(faces) > (1.0 + limits_.share) * static_cast<double>(distinct_faces_);
 }
 
-// Replacements of the copies in optimized_, whose vertices are those `kept` of the map.
-std::vector<std::uint32_t> MeshCorrector::copies_in(const MapMesh& map,
+// Replacements of the copies in a corrected mesh, whose vertices are those `kept` of the map.
+std::vector<std::uint32_t> MeshCorrector::copies_in(const LabelledMesh& mesh, const MapMesh& map,
                                                     const std::vector<std::uint32_t>& kept) const {
   constexpr double kLongestEdge_voxels = 2.0;  // sqrt(3), plus the deformation
-  return find_replacements(optimized_,
-                           {elements_of(map.seen_by, kept), elements_of(map.certainty, kept)},
-                           {limits_.voxels * map.voxel_m, kLongestEdge_voxels * map.voxel_m,
-                            max_gap_keyframes_, limits_.copies});
+  return find_replacements(
+      mesh, {elements_of(map.seen_by, kept), elements_of(map.certainty, kept)},
+      {limits_.voxels * map.voxel_m, kLongestEdge_voxels * map.voxel_m,
+       static_cast<KeyframeIndex>(config_.time_window_keyframes), limits_.copies});
 }
 
 // Surface that the mapper may drop: copies, and surface that is gone now and was gone at the last
@@ -127,33 +125,34 @@ SupersededSurface MeshCorrector::droppable(const MapMesh& map,
 
 MeshCorrection MeshCorrector::deform(const CorrectionInput& input, std::vector<SE3> anchors) {
   const MapMesh& map = input.map;
-  DeformedMesh deformed = optimizer_.optimize(map, input.T_odom_kf, input.T_world_kf);
+  DeformedMesh deformed = optimize_mesh(map, input.T_odom_kf, input.T_world_kf, config_);
   map_version_ = input.map_version;
-  origin_.T_world_kf = std::move(anchors);
-  optimized_ = std::move(deformed.mesh);
-  report_ = deformed.report;
-  T_result_optimized_ = SE3::Identity();
-  const std::size_t all = optimized_.faces.size();
-  std::vector<std::uint32_t> kept = remove_seen_through(optimized_, seen_through(input));
-  const std::size_t present = optimized_.faces.size();
-  SupersededSurface dropped;
+  anchors_ = std::move(anchors);
+  MeshCorrection result;
+  result.mesh = std::move(deformed.mesh);
+  result.report = deformed.report;
+  LabelledMesh& mesh = result.mesh;
+  const std::size_t all = mesh.faces.size();
+  std::vector<std::uint32_t> kept = remove_seen_through(mesh, seen_through(input, mesh.vertices));
+  const std::size_t present = mesh.faces.size();
+  result.seen_through = all - present;
   if (has_many_copies(map)) {
-    const std::vector<std::uint32_t> replacements = copies_in(map, kept);
-    dropped = droppable(map, kept, replacements);
+    const std::vector<std::uint32_t> replacements = copies_in(mesh, map, kept);
+    SupersededSurface dropped = droppable(map, kept, replacements);
     distinct_faces_ = faces_after(map, dropped);
     if (has_many_copies(map)) {
-      keep_elements(kept, remaining_vertices(optimized_, replacements));
-      optimized_ = without_superseded(optimized_, replacements);
-    } else {
-      dropped = {};
+      keep_elements(kept, remaining_vertices(mesh, replacements));
+      mesh = without_superseded(mesh, replacements);
+      result.superseded = std::move(dropped);
     }
   }
-  origin_.seen_by = elements_of(map.seen_by, kept);
-  origin_.mapped = elements_of(map.mesh.vertices, kept);
-  origin_.voxel_m = map.voxel_m;
-  origin_.levels = elements_of(map.levels, kept);
-  const std::size_t superseded = present - optimized_.faces.size();
-  return {optimized_, report_, true, std::move(dropped), superseded, all - present, origin_};
+  result.superseded_faces = present - mesh.faces.size();
+  result.origin = {.seen_by = elements_of(map.seen_by, kept),
+                   .T_world_kf = anchors_,
+                   .mapped = elements_of(map.mesh.vertices, kept),
+                   .voxel_m = map.voxel_m,
+                   .levels = elements_of(map.levels, kept)};
+  return result;
 }
 
 }  // namespace km

@@ -12,8 +12,7 @@
 #include "modules/mesh/labelled_mesh.hpp"
 #include "modules/mesh/map_mesh.hpp"
 #include "modules/mesh/mesh_origin.hpp"
-#include "modules/mesh_deformation/keyframe_motion.hpp"
-#include "modules/mesh_deformation/local_mesh_optimizer.hpp"
+#include "modules/mesh_deformation/local_mesh_optimization.hpp"
 #include "modules/mesh_deformation/mesh_deformation_config.hpp"
 #include "modules/mesh_deformation/mesh_node.hpp"
 
@@ -30,10 +29,8 @@ struct CorrectionInput {
 
 struct [[nodiscard]] MeshCorrection {
   LabelledMesh mesh;  ///< In the frame of the optimised poses, without superseded surface.
-  MeshDeformationReport report;  ///< Report of the last optimisation.
-  /// False: the result of the last optimisation, moved as a whole.
-  bool deformed = true;
-  SupersededSurface superseded;      ///< Surface the mapper may drop; empty unless deformed.
+  MeshDeformationReport report;      ///< Report of the last optimisation.
+  SupersededSurface superseded;      ///< Surface the mapper may drop.
   std::size_t superseded_faces = 0;  ///< Faces of the map that another visit saw better.
   std::size_t seen_through = 0;      ///< Faces of the map that later views saw through.
   MeshOrigin origin = {};            ///< Keyframes that saw `mesh`.
@@ -51,10 +48,8 @@ struct CopyLimits {
   double share = 0.5;
 };
 
-/// Keeps a mesh consistent with map and trajectory at the lowest cost. While the map is unchanged,
-/// the mesh is corrected only if a keyframe has moved by more than MotionScale. If all keyframes
-/// have moved equally, as they do when the origin of `world` changes, one rigid motion suffices.
-/// Otherwise, and for a changed map, Local Mesh Optimization deforms the mesh. This removes drift,
+/// Keeps a mesh consistent with map and trajectory. Local Mesh Optimization deforms it when the map
+/// has changed, or when a keyframe has moved by more than 1 cm or 5 mrad. This removes drift,
 /// so that copies of surface from several visits coincide. If a mesh of more than duplicate_faces
 /// has more copies than CopyLimits permit, only the best ones stay (see
 /// find_replacements()).
@@ -71,37 +66,32 @@ class MeshCorrector {
   explicit MeshCorrector(const MeshDeformationConfig& config, const CopyLimits& limits = {});
 
   /// Returns the corrected mesh, or nullopt if the last one is still valid. Throws under the
-  /// conditions of LocalMeshOptimizer::optimize().
+  /// conditions of optimize_mesh().
   [[nodiscard]] std::optional<MeshCorrection> correct(const CorrectionInput& input);
 
   /// Returns the mesh as from a first correction. The mesh depends only on `input`, bit by bit, and
-  /// not on earlier corrections. Throws under the conditions of LocalMeshOptimizer::optimize().
+  /// not on earlier corrections. Throws under the conditions of optimize_mesh().
   [[nodiscard]] MeshCorrection correct_from_scratch(const CorrectionInput& input);
 
  private:
   [[nodiscard]] MeshCorrection deform(const CorrectionInput& input, std::vector<SE3> anchors);
-  [[nodiscard]] std::vector<bool> seen_through(const CorrectionInput& input) const;
+  [[nodiscard]] std::vector<bool> seen_through(const CorrectionInput& input,
+                                               const std::vector<Eigen::Vector3f>& vertices) const;
   [[nodiscard]] bool has_many_copies(const MapMesh& map) const;
-  [[nodiscard]] std::vector<std::uint32_t> copies_in(const MapMesh& map,
+  [[nodiscard]] std::vector<std::uint32_t> copies_in(const LabelledMesh& mesh, const MapMesh& map,
                                                      const std::vector<std::uint32_t>& kept) const;
   [[nodiscard]] SupersededSurface droppable(const MapMesh& map,
                                             const std::vector<std::uint32_t>& kept,
                                             std::span<const std::uint32_t> replacements);
 
+  const MeshDeformationConfig config_;
   const CopyLimits limits_;
-  const std::size_t duplicate_faces_;
-  const KeyframeIndex max_gap_keyframes_;
-  const int seen_through_views_;
-  LocalMeshOptimizer optimizer_;
   // Result of the last search for copies.
   std::size_t distinct_faces_ = 0;   // faces that stayed
   std::vector<std::uint64_t> gone_;  // vertices of the map that had been seen through, ascending
-  // State of the last optimisation.
+  // The last optimisation.
   std::optional<std::uint64_t> map_version_;
-  LabelledMesh optimized_;
-  MeshOrigin origin_;  // that of optimized_; its poses are complete() of the trajectory
-  MeshDeformationReport report_;
-  SE3 T_result_optimized_ = SE3::Identity();  // from `optimized_` to the last result
+  std::vector<SE3> anchors_;  // complete() of the trajectory
 };
 
 /// A robot's mesh, corrected to agree with its optimised trajectory.

@@ -4,7 +4,7 @@
 
 namespace km {
 
-/// Parameters of LocalMeshOptimizer, MeshCorrector and MeshDeformationNode.
+/// Parameters of optimize_mesh(), MeshCorrector and MeshDeformationNode.
 struct MeshDeformationConfig {
   static constexpr const char* kSection = "mesh_deformation";
 
@@ -29,7 +29,8 @@ struct MeshDeformationConfig {
                   "it again, until it is removed; 0: all surface stays. Needs covariances of the "
                   "optimised poses (back-end newton)");
     visitor.field("period_s", period_s, {0.01, 86400.0},
-                  "[s] pause between two corrections, which bounds their share of processor time");
+                  "[s] shortest pause between two corrections; nine times the duration of the last "
+                  "one if that is longer");
   }
 };
 

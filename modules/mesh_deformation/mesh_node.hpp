@@ -2,14 +2,10 @@
 
 #include <Eigen/Core>
 #include <array>
-#include <cstddef>
 #include <cstdint>
 #include <limits>
-#include <unordered_map>
-#include <vector>
 
 #include "modules/core/ids.hpp"
-#include "modules/mesh/grid_cell.hpp"
 
 namespace km {
 
@@ -33,32 +29,6 @@ struct MeshNode {
   /// g_k, position according to the mapper [m].
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
   SeenBy seen_by = {0, 0};
-  /// Index in the map's mesh; kNoIndex after that vertex was removed.
-  std::uint32_t vertex = kNoIndex;
-};
-
-/// Nodes by position, for searches within one radius while nodes are added.
-class NodeGrid {
- public:
-  /// Nodes whose keyframe_gap() exceeds `max_gap_keyframes` are not near.
-  NodeGrid(double radius_m, KeyframeIndex max_gap_keyframes)
-      : radius_m_(radius_m), max_gap_keyframes_(max_gap_keyframes) {}
-
-  void insert(const MeshNode& node, std::uint32_t index);
-
-  /// Index of the nearest node within the radius whose keyframe_gap() to `seen_by` is at most the
-  /// limit of this index. At equal distance the lowest index; kNoIndex if there is no such node.
-  [[nodiscard]] std::uint32_t nearest(const Eigen::Vector3d& point, const SeenBy& seen_by) const;
-
- private:
-  struct Entry {
-    Eigen::Vector3d position;
-    SeenBy seen_by;
-    std::uint32_t index;
-  };
-  double radius_m_;
-  KeyframeIndex max_gap_keyframes_;
-  std::unordered_map<GridCell, std::vector<Entry>, GridCellHash> cells_;
 };
 
 }  // namespace km

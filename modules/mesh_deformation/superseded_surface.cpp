@@ -7,6 +7,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include "modules/mesh/grid_cell.hpp"
 #include "modules/mesh_deformation/mesh_node.hpp"
 
 namespace km {

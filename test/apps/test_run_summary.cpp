@@ -96,7 +96,7 @@ TEST_CASE("summary.json has the keys that others read", "[robot][summary]") {
         "/mapping/skipped_bad_pose "
         "/mapping/skipped_too_late /mapping/without_labels /mapping/label_pixels_outside_palette "
         "/mapping/blocks_refused /mapping/blocks /mapping/vertices /mapping/faces "
-        "/mapping/superseded_faces_dropped /mapping/corrections /mapping/moves_as_a_whole "
+        "/mapping/superseded_faces_dropped /mapping/corrections "
         "/mapping/correction_seconds /mapping/unbound_vertices "
         "/traffic/x /held_back/delayed/messages/x /held_back/delayed/bytes/x "
         "/held_back/superseded/messages/x /held_back/superseded/bytes/x "

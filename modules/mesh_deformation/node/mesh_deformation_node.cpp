@@ -133,7 +133,9 @@ void MeshDeformationNode::correct() {
     return;
   }
   const double end_s = steady_now_s();
-  next_s_ = end_s + config_.period_s;
+  // Corrections take at most a tenth of the time, however large the map is.
+  constexpr double kPauseShare = 9.0;
+  next_s_ = end_s + std::max(config_.period_s, kPauseShare * (end_s - start_s));
   timing_.add(end_s - start_s);
   OptimizedMesh result{*std::move(correction), self_, trajectory_->anchor, trajectory_,
                        end_s - start_s};
@@ -148,15 +150,11 @@ void MeshDeformationNode::correct() {
 
 void MeshDeformationNode::report(const OptimizedMesh& result) const {
   const MeshDeformationReport& report = result.report;
-  if (!result.deformed) {
-    log::debug(name()) << "moved " << report.vertices << " vertices as a whole";
-    return;
-  }
-  log::debug(name()) << report.vertices << " vertices, " << report.nodes << " nodes ("
-                     << report.new_nodes << " new), " << report.keyframes
-                     << " keyframes: " << to_string(report.status) << " after " << report.iterations
-                     << " iterations, " << result.superseded_faces << " faces seen again, "
-                     << result.seen_through << " seen through, " << result.seconds << " s";
+  log::debug(name()) << report.vertices << " vertices, " << report.nodes << " nodes, "
+                     << report.keyframes << " keyframes: " << to_string(report.status) << " after "
+                     << report.iterations << " iterations, " << result.superseded_faces
+                     << " faces seen again, " << result.seen_through << " seen through, "
+                     << result.seconds << " s";
   if (report.status == DeformationStatus::kFailed)
     log::limited(log::Level::kWarn, name(), "failed")
         << "the deformation graph of " << report.nodes

@@ -32,8 +32,8 @@ using MeshDeformationInput =
 
 /// Corrects the robot's mesh when its map or its trajectory has changed: runs a MeshCorrector on a
 /// thread of its own. A correction starts at least mesh_deformation.period_s after the end of the
-/// last one. Messages that arrive meanwhile are only stored, so that this node delays no other
-/// node.
+/// last one, and not before nine times its duration have passed. Messages that arrive meanwhile are
+/// only stored, so that this node delays no other node.
 class MeshDeformationNode final : public WorkerNode<MeshDeformationInput> {
  public:
   /// Throws ConfigError if `config` is out of bounds.
@@ -55,7 +55,7 @@ class MeshDeformationNode final : public WorkerNode<MeshDeformationInput> {
 
   /// Handles one input synchronously at time `now_s`. The thread calls only this function; tests
   /// can call it too. Throws std::invalid_argument for keyframes that are not consecutive and for
-  /// input that LocalMeshOptimizer::optimize() refuses.
+  /// input that optimize_mesh() refuses.
   void step(const Input& input, double now_s);
 
  private:

@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "modules/core/lie.hpp"
-#include "modules/mesh_deformation/keyframe_motion.hpp"
 #include "modules/mesh_deformation/mesh_corrector.hpp"
 #include "modules/mesh_deformation/mesh_node.hpp"
 #include "test/modules/mesh_deformation/corridor.hpp"
@@ -13,8 +12,6 @@
 
 namespace km {
 namespace {
-
-constexpr double kSame_m = 1e-5;  // some roundings of floats below 20 m
 
 struct Corridor {
   MapMesh map = sheet(kSheet);
@@ -24,7 +21,6 @@ struct Corridor {
 
   [[nodiscard]] CorrectionInput input() const { return {map, version, T_odom_kf, T_world_kf}; }
   void bend_to(double radius_m) { T_world_kf = bent(T_odom_kf, radius_m); }
-  void move(const SE3& T) { T_world_kf = moved(T, T_world_kf); }
 };
 
 TEST_CASE("A mesh is corrected once and again only for a reason", "[mesh_deformation]") {
@@ -33,7 +29,6 @@ TEST_CASE("A mesh is corrected once and again only for a reason", "[mesh_deforma
   MeshCorrector corrector(MeshDeformationConfig{});
   const auto first = corrector.correct(corridor.input());
   REQUIRE(first);
-  CHECK(first->deformed);
   CHECK_FALSE(corrector.correct(corridor.input()));
 
   SECTION("a keyframe that moved by less than the threshold is no reason") {
@@ -42,11 +37,11 @@ TEST_CASE("A mesh is corrected once and again only for a reason", "[mesh_deforma
   }
   SECTION("a keyframe that moved by more") {
     corridor.T_world_kf[3].translation().z() += 0.015;
-    CHECK(corrector.correct(corridor.input()).value().deformed);
+    CHECK(corrector.correct(corridor.input()));
   }
   SECTION("a keyframe that turned by more") {
     corridor.T_world_kf[3].linear() *= bend(corridor.T_odom_kf[1], 25.0).linear();
-    CHECK(corrector.correct(corridor.input()).value().deformed);
+    CHECK(corrector.correct(corridor.input()));
   }
   SECTION("small moves that add up") {
     int corrections = 0;
@@ -58,42 +53,10 @@ TEST_CASE("A mesh is corrected once and again only for a reason", "[mesh_deforma
   }
   SECTION("another map") {
     ++corridor.version;
-    CHECK(corrector.correct(corridor.input()).value().deformed);
+    CHECK(corrector.correct(corridor.input()));
   }
   SECTION("a new keyframe that the map does not have yet is no reason") {
     corridor.T_odom_kf.push_back(corridor.T_odom_kf.back());
-    CHECK_FALSE(corrector.correct(corridor.input()));
-  }
-}
-
-TEST_CASE("A mesh whose keyframes all move equally is moved as a whole", "[mesh_deformation]") {
-  const auto seed = GENERATE(range(0U, 3U));
-  CAPTURE(seed);
-  std::mt19937 rng(seed);
-  Corridor corridor;
-  corridor.bend_to(20.0);
-  MeshCorrector corrector(MeshDeformationConfig{});
-  const auto first = corrector.correct(corridor.input());
-  REQUIRE(first);
-  for (int i = 0; i < 3; ++i) {  // repeatedly from the last optimisation, without drift
-    corridor.move(random_pose(rng, 2.0));
-    const auto again = corrector.correct(corridor.input());
-    REQUIRE(again);
-    CHECK_FALSE(again->deformed);
-    CHECK(again->report.nodes == first->report.nodes);
-    CHECK(again->mesh.faces == corridor.map.mesh.faces);
-    CHECK(again->mesh.labels == corridor.map.mesh.labels);
-    LocalMeshOptimizer fresh;
-    const DeformedMesh anew = fresh.optimize(corridor.map, corridor.T_odom_kf, corridor.T_world_kf);
-    CHECK(largest_distance_m(again->mesh, anew.mesh) < kSame_m);
-    CHECK_FALSE(corrector.correct(corridor.input()));
-  }
-  SECTION("then one keyframe moves relative to the last optimisation") {
-    corridor.T_world_kf[5].translation() += Eigen::Vector3d(0.0, 0.0, 0.02);
-    CHECK(corrector.correct(corridor.input()).value().deformed);
-  }
-  SECTION("a small motion of all is no reason") {
-    corridor.move(make_pose(Eigen::Matrix3d::Identity(), {0.0, 0.004, 0.0}));
     CHECK_FALSE(corrector.correct(corridor.input()));
   }
 }
@@ -104,7 +67,6 @@ TEST_CASE("A mesh corrected from scratch does not depend on earlier corrections"
   corridor.bend_to(20.0);
   MeshCorrector fresh(MeshDeformationConfig{});
   const MeshCorrection expected = fresh.correct_from_scratch(corridor.input());
-  CHECK(expected.deformed);
 
   MeshCorrector corrector(MeshDeformationConfig{});
   Corridor half;  // a smaller map first, with other nodes
@@ -112,9 +74,7 @@ TEST_CASE("A mesh corrected from scratch does not depend on earlier corrections"
   half.bend_to(30.0);
   REQUIRE(corrector.correct(half.input()));
   corridor.version = 2;
-  const auto on_the_way = corrector.correct(corridor.input());
-  REQUIRE(on_the_way);
-  CHECK(on_the_way->mesh.vertices != expected.mesh.vertices);  // else the test shows nothing
+  REQUIRE(corrector.correct(corridor.input()));
   CHECK(corrector.correct_from_scratch(corridor.input()).mesh.vertices == expected.mesh.vertices);
   CHECK_FALSE(corrector.correct(corridor.input()));
 }
@@ -188,10 +148,8 @@ TEST_CASE("The newer of two visits that coincide after correction stays", "[mesh
     for (SE3& pose : visits.T_world_kf) pose.translation().y() += 1.0;
     const auto again = corrector.correct(visits.input());
     REQUIRE(again);
-    CHECK_FALSE(again->deformed);
     CHECK(again->mesh.faces == first->mesh.faces);
     CHECK(again->origin.seen_by == first->origin.seen_by);
-    CHECK(again->superseded.vertices.empty());
   }
   SECTION("with uncorrected poses both stay") {
     visits.T_world_kf = visits.T_odom_kf;
@@ -228,42 +186,10 @@ TEST_CASE("Copies stay until a further visit exceeds their share", "[mesh_deform
   CHECK(result->mesh.faces.size() == one);
 }
 
-constexpr MotionScale kMotionScale{.translation_m = 0.01, .rotation_rad = 0.005};
-
 std::vector<SE3> random_poses(std::mt19937& rng, std::size_t count) {
   std::vector<SE3> poses;
   for (std::size_t i = 0; i < count; ++i) poses.push_back(random_pose(rng));
   return poses;
-}
-
-TEST_CASE("One keyframe that moves against many others is found", "[mesh_deformation]") {
-  const auto seed = GENERATE(range(0U, 5U));
-  CAPTURE(seed);
-  std::mt19937 rng(seed);
-  constexpr std::size_t kCount = 1000;
-  const std::vector<SE3> before = random_poses(rng, kCount);
-  std::vector<SE3> after = moved(random_pose(rng), before);
-  // The common motion contains a share of about 1 / kCount of the odd keyframe's motion.
-  SECTION("by three times the scale of translation") {
-    after[7].translation() += Eigen::Vector3d(0.0, 0.03, 0.0);
-    CHECK(keyframe_motion(before, after, kMotionScale).non_rigid == Approx(3.0).epsilon(0.02));
-  }
-  SECTION("by three times the scale of rotation") {
-    after[7].linear() *= so3_exp({0.0, 0.0, 0.015});
-    CHECK(keyframe_motion(before, after, kMotionScale).non_rigid == Approx(3.0).epsilon(0.02));
-  }
-}
-
-TEST_CASE("The difference of two motions is that at the pose where they differ most",
-          "[mesh_deformation]") {
-  const std::vector<SE3> poses = {SE3::Identity(),
-                                  make_pose(Eigen::Matrix3d::Identity(), {20.0, 0.0, 0.0})};
-  const SE3 turn = make_pose(so3_exp({0.0, 0.0, 0.002}), Eigen::Vector3d::Zero());
-  const SE3 shift = make_pose(Eigen::Matrix3d::Identity(), {0.0, 0.02, 0.0});
-  CHECK(largest_difference(poses, SE3::Identity(), turn, kMotionScale) ==
-        Approx(4.0).epsilon(1e-3));
-  CHECK(largest_difference({poses.data(), 1}, turn, SE3::Identity(), kMotionScale) == Approx(0.4));
-  CHECK(largest_difference(poses, shift, SE3::Identity(), kMotionScale) == Approx(2.0));
 }
 
 TEST_CASE("Keyframes without an optimised pose follow odometry from the last that has one",
