@@ -15,30 +15,16 @@ namespace km {
 /// logged (at a limited rate) and kept, and the others are written all the same. Thread-safe.
 class ResultWriter {
  public:
-  /// Results that cannot be written go to the folder `fallback`, unless that is empty.
-  explicit ResultWriter(std::filesystem::path fallback = {}) : fallback_(std::move(fallback)) {}
-
   /// Calls `writer(file)`, which throws if the file cannot be written. If the folder of the file is
-  /// gone, it is made again. A file that still cannot be written gets a place in the fallback
-  /// folder. A file that failed before and is written now is no longer lost.
+  /// gone, it is made again. A file that failed before and is written now is no longer lost.
   void write(const std::filesystem::path& file, const auto& writer) {
-    try {
+    append(file, [&](const auto&) {
       if (file.has_parent_path()) std::filesystem::create_directories(file.parent_path());
       writer(file);
-      return keep(file);
-    } catch (const std::exception& error) {
-      if (fallback_.empty()) return note(file, error.what());
-    }
-    append(file, [&](const auto&) {
-      std::filesystem::create_directories(fallback_);
-      writer(fallback_ / file.filename());
-      log::limited(log::Level::kWarn, "results", "fallback " + file.string())
-          << file.string() << ": cannot be written, and is in " << fallback_.string();
     });
   }
 
-  /// Like write(), for a file whose earlier bytes exist only on the disk: no other place replaces
-  /// it.
+  /// Like write(), for a file that grows in its folder: the folder is not made again.
   void append(const std::filesystem::path& file, const auto& writer) try {
     writer(file);
     keep(file);
@@ -67,7 +53,6 @@ class ResultWriter {
     lost_.erase(file.string());
   }
 
-  const std::filesystem::path fallback_;
   mutable std::mutex mutex_;  // guards lost_
   std::map<std::string, std::string> lost_;
 };

@@ -209,8 +209,6 @@ void add_output(CLI::App& app, RobotOptions& options) {
                    ? ""
                    : folder + ": no such folder; --output " + folder + " starts a run there";
       });
-  app.add_option("--fallback", options.fallback,
-                 "Folder on another disk, for results that cannot be written to --output");
   app.add_option_function<std::vector<std::string>>(
          "--record", [&options](const std::vector<std::string>& file) { options.record = file[0]; },
          "Also write an MCAP file, for Foxglove, Lichtblick, Rerun, PlotJuggler (default: "

@@ -58,7 +58,6 @@ struct RobotOptions {
       security;  ///< Folder of this robot's keys; if given, messages are encrypted and signed.
 
   std::filesystem::path output;
-  std::filesystem::path fallback;               ///< Folder for results that `output` cannot take.
   bool resume = false;                          ///< Continue the run whose results are in `output`.
   std::optional<std::filesystem::path> record;  ///< MCAP file for viewers; empty: in `output`.
   bool record_images = false;                   ///< Record the left images, too.

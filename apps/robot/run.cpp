@@ -139,7 +139,7 @@ int run_robot(const RobotOptions& asked, SignalWatch& signals,
     log::info("robot") << "interrupted before the calibration was complete: no results";
     return 0;
   }
-  ResultWriter results(options.fallback);
+  ResultWriter results;
   change_output(options, results, make_output);
   log::info("robot") << "kimera_multi_robot " << built_version() << ", commit " << built_commit();
   has_urgent_work = options.is_live || !options.pace.waits;

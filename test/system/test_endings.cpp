@@ -93,10 +93,8 @@ struct RobotOnSmallDisk {
 
   ~RobotOnSmallDisk() { close(log); }
 
-  void start(const std::string& options = {}) {
-    std::vector<std::string> command = robot_on_walk(long_walk(folder.path(), 0), output);
-    for (const std::string& word : words_of(options)) command.push_back(word);
-    robot.emplace(command, 0, log);
+  void start() {
+    robot.emplace(robot_on_walk(long_walk(folder.path(), 0), output), 0, log);
     const bool running = wait_for_lines(output / "process.csv", 3);
     INFO(folder.read("log"));
     REQUIRE(running);
@@ -104,14 +102,6 @@ struct RobotOnSmallDisk {
   [[nodiscard]] bool reports(const std::string& file, const std::string& why) const {
     const std::string line = (output / file).string() + ": cannot be written: " + why;
     return folder.read("log").find(line) != std::string::npos;
-  }
-  [[nodiscard]] bool will_report(const std::string& file, const std::string& why) const {
-    const auto end = std::chrono::steady_clock::now() + kPatience;
-    while (!reports(file, why)) {
-      if (std::chrono::steady_clock::now() > end) return false;
-      poll(nullptr, 0, 20);
-    }
-    return true;
   }
 };
 
@@ -152,24 +142,6 @@ TEST_CASE("A robot whose results folder is read-only does not start", "[system][
   CHECK(robot.wait() == 1);
   CHECK_THAT(run.folder.read("log"),
              Catch::Contains("cannot be written to: Read-only file system"));
-}
-
-TEST_CASE("Results that a disk cannot take go to the fallback folder", "[system][endings]") {
-  RobotOnSmallDisk run;
-  if (!run.disk.mounted()) return;
-  const fs::path fallback = run.folder.path() / "fallback";
-  run.start("--fallback " + fallback.string());
-  REQUIRE(run.disk.make_read_only());
-  // On a busy host it takes a while until the journal has anything to write.
-  REQUIRE(run.will_report("run.journal", "Read-only file system"));
-  run.robot->kill(SIGTERM);
-  CHECK(run.robot->wait() == 4);
-  for (const char* file : {"odometry.tum", "optimized.tum", "pose_graph.g2o", "keyframes.csv",
-                           "loop_closures.csv", "timing.csv", "summary.json"})
-    CHECK(fs::exists(fallback / file));
-  const std::string reason = read_summary(fallback / "summary.json").exit_reason;
-  CHECK_THAT(reason, Catch::StartsWith("interrupted; ") && Catch::Contains("run.journal") &&
-                         !Catch::Contains(".tum") && !Catch::Contains("summary"));
 }
 
 TEST_CASE(
