@@ -504,9 +504,9 @@ std::string Robot::name_of(RobotId robot) const {
 
 void Robot::add_view(const RobotConfig& config, const std::optional<Camera>& camera) {
   if (!config.view.on) return;
-  if (seal_ != nullptr && !config.view.in_clear) {
+  if (seal_ != nullptr) {
     log::info(ViewConfig::kSection) << "off: the team has keys, and viewers would receive data "
-                                       "without encryption (view.in_clear)";
+                                       "without encryption";
     return;
   }
   Topics& t = topics_;

@@ -9,7 +9,6 @@ struct ViewConfig {
   static constexpr const char* kSection = "view";
 
   bool on = false;
-  bool in_clear = false;
   double bytes_per_s = 2000.0;
   double images_per_s = 2.0;
 
@@ -24,9 +23,6 @@ struct ViewConfig {
         "on", on,
         "send trajectory, mesh and images of this robot to any viewer in the domain that asks for "
         "them (kimera_multi_viewer), as with --view; costs nothing without viewers");
-    visitor.field("in_clear", in_clear,
-                  "in a team with keys: send unencrypted updates nevertheless, which any computer "
-                  "on the network can read");
     visitor.field(
         "bytes_per_s", bytes_per_s, {20.0, 1e8},
         "[B/s] maximum rate of state, poses and closures; updates beyond it are sent later; ten "
