@@ -46,7 +46,6 @@ Examples
   kimera_multi_viewer --domain 7                     # a team that runs
   kimera_multi_viewer --domain 7 --peers 10.0.0.2,10.0.0.3   # without multicast
   kimera_multi_viewer results/demo                   # a run that has ended
-  kimera_multi_viewer results/demo --rate 2          # replay it, twice as fast
   kimera_multi_viewer results/demo --listen 0.0.0.0  # for other hosts
 
 Exit codes: 0 ended by Ctrl-C; 1 unusable input or an address in use; 2 bad command line.)";
@@ -56,15 +55,11 @@ struct ViewerOptions {
   DdsConfig dds;
   PageServerOptions server;
   double memory_MB = 500.0;
-  std::optional<double> rate;
 };
 
 void define(CLI::App& app, ViewerOptions& options) {
   app.footer(kFooter);
   CLI::Option* const results = app.add_option("RESULTS", options.results, "Results of a run");
-  CLI::Option* const rate =
-      app.add_option("--rate", options.rate, "Play as if live: 1 as it was, 2 twice as fast");
-  rate->check(CLI::Range(1e-3, 1e3))->needs(results);
   CLI::Option* const domain = app.add_option(
       "--domain", options.dds.domain, "DDS domain of the team, whose robots run with --view");
   domain->check(CLI::Range(0, 230))->excludes(results);
@@ -98,22 +93,6 @@ void define(CLI::App& app, ViewerOptions& options) {
   });
 }
 
-// Adds the updates to the store, at `rate` or all at once; false after a signal.
-bool play(const std::vector<ViewUpdate>& updates, std::optional<double> rate, ViewStore& store,
-          SignalWatch& signals) {
-  const double start_s = steady_now_s();
-  for (ViewUpdate update : updates) {
-    if (rate) {
-      const double due_s = start_s + seconds_between(updates.front().sent, update.sent) / *rate;
-      for (double left_s = 0.0; (left_s = due_s - steady_now_s()) > 0.0;)
-        if (signals.wait(std::min(left_s, 0.2))) return false;
-      update.sent = nanoseconds(wall_now_s());
-    }
-    store.add(std::move(update));
-  }
-  return true;
-}
-
 void wait_for_end(SignalWatch& signals) {
   while (!signals.wait(1.0)) {
   }
@@ -132,11 +111,11 @@ void show_run(ViewerOptions options, ViewStore& store, SignalWatch& signals) {
   RunPlayback run = read_run(options.results, nanoseconds(wall_now_s()));
   for (const std::string& note : run.notes) log::warn("viewer") << note;
   const std::string title = std::filesystem::canonical(options.results).filename().string();
-  options.server.hello = hello_message(options.rate ? PageSource::kReplay : PageSource::kRun, title,
+  options.server.hello = hello_message(PageSource::kRun, title,
                                        options.palette.empty() ? run.palette : palette_of(options));
   const PageServer server(store, options.server);
   print_address(server);
-  if (!play(run.updates, options.rate, store, signals)) return;
+  for (ViewUpdate& update : run.updates) store.add(std::move(update));
   run = {};
   wait_for_end(signals);
 }

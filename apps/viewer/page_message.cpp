@@ -189,9 +189,8 @@ PageMessage page_message(const ViewUpdate& update, std::uint64_t number) {
 
 std::string hello_message(PageSource source, const std::string& title,
                           const LabelPalette& palette) {
-  constexpr std::array kNames = {"live", "replay", "run"};  // names in the order of PageSource
   Json json = {{"kind", "hello"},
-               {"source", kNames.at(static_cast<std::size_t>(source))},
+               {"source", source == PageSource::kTeam ? "live" : "run"},
                {"title", title},
                {"labels", Json::array()}};
   for (const LabelClass& one : palette.classes())

@@ -27,9 +27,8 @@ struct PageMessage {
 
 /// Source of the messages that a page shows.
 enum class PageSource {
-  kTeam,    ///< A running team: "live".
-  kReplay,  ///< The journals of a run, played over time: "replay".
-  kRun,     ///< The journals of a run, all at once: "run".
+  kTeam,  ///< A running team: "live".
+  kRun,   ///< The journals of a run: "run".
 };
 
 /// First message to the page: the source (`source`), its name (`title`), and the colours of labels.

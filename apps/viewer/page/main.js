@@ -22,7 +22,7 @@ const timeline = new Timeline(
     });
 
 let changed = true, chartsChanged = true, caughtUp = false;
-let source = 'run';  // live; replay: a finished run in real time; run: a finished run
+let source = 'run';  // live; run: a finished run
 let pointed = null;  // position of the pointer in the scene
 let camera = null;   // robot whose images are shown
 let receivedAt = 0;  // time of the last message [ms since 1970]
@@ -61,7 +61,7 @@ const connection = new Connection({
 function begin({source: shown, title, labels}) {
   source = shown;
   $('title').textContent = title;
-  $('live').textContent = {live: 'Live', replay: 'Newest', run: 'End'}[source];
+  $('live').textContent = {live: 'Live', run: 'End'}[source];
   if (source === 'live') $('empty').textContent = 'Waiting for robots that run with --view (or view.on: true)';
   document.title = `${title} – kimera_multi`;
   scene.meshes.setPalette(labels);
@@ -77,7 +77,6 @@ function showLink() {
   if (!caughtUp) return;
   if (source === 'run') return setLink('finished run', '');
   const over = model.over((Date.now() - receivedAt) / 1000);
-  if (source === 'replay') return setLink(over ? 'replay, at its end' : 'replay', '');
   const at = over && new Date(over.at_ms).toTimeString().slice(0, 8);
   if (!over)
     setLink('live', 'good');

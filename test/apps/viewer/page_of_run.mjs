@@ -97,26 +97,4 @@ try {
   await browser.close();
 }
 
-// As if live: opened in the middle, closed, opened again, and in the end the same.
-const replay = await Viewer.start(program, [results, '--rate', '10']);
-const other = new Browser();
-try {
-  for (let visit = 0; visit < 2; ++visit) {
-    const page = await other.open(replay.url);
-    await page.until('kimera.ready');
-    if (visit === 0) {
-      await page.close();
-      continue;
-    }
-    await page.until(
-        `kimera.faces === ${faces} && kimera.robots.every((r) => r.phase !== 'running')`);
-    assert.equal(sum(Object.values(await page.evaluate('kimera.closures'))), pairs.length);
-    await page.until(
-        `document.getElementById('link').textContent === 'replay, at its end'`);
-    assert.deepEqual(page.errors, []);
-  }
-} finally {
-  await replay.stop();
-  await other.close();
-}
 console.log('as in the files');
