@@ -59,10 +59,9 @@ constexpr const char* kHintForUnknown = R"(Options of the robots come after --:
 )";
 
 struct TeamOptions {
-  fs::path config, dataset, output, truth, security, links, json, robot_binary;
+  fs::path config, dataset, output, security, links, json, robot_binary;
   std::string rate;
   std::optional<std::uint32_t> domain;
-  std::optional<double> time_limit_s;
   std::vector<std::string> arguments;
   std::optional<fs::path> record;  // empty: in the folder of the results
   bool view = false;
@@ -97,10 +96,6 @@ void define(CLI::App& app, TeamOptions& options) {
       "(.up, .down): "
       "each robot gets a network of its own");
   links->check(CLI::ExistingFile);
-  app.add_option("--truth", options.truth, "True poses of all robots, instead of the file's")
-      ->check(CLI::ExistingPath);
-  app.add_option("--time-limit", options.time_limit_s, "Ask the robots to end after this [s]")
-      ->check(CLI::NonNegativeNumber);
   app.add_option("--json", options.json, "Also write the results to this file, as JSON");
   app.add_option("--robot-binary", options.robot_binary, "Program of a robot")
       ->capture_default_str();
@@ -125,19 +120,15 @@ km::TeamPlan make_plan(const TeamOptions& options) {
   if (!options.rate.empty()) plan.rate = options.rate;
   if (!options.output.empty()) plan.output = options.output;
   if (options.domain) plan.domain = options.domain;
-  if (options.time_limit_s) plan.time_limit_s = options.time_limit_s;
   // Teams on one host must not meet. The lower half remains for domains chosen by people.
   if (!plan.domain && !options.report)
     plan.domain = km::draw_domain(km::kLastQuietDomain / 2 + 1, km::kLastQuietDomain);
   plan.record = options.record.has_value();
   plan.view = options.view;
   if (!options.security.empty()) plan.security = options.security;
-  if (!options.truth.empty()) plan.notes.clear();  // the notes concern the truths of the team file
-  for (km::RobotPlan& robot : plan.robots) {
-    if (!options.truth.empty()) robot.truth = options.truth;
+  for (km::RobotPlan& robot : plan.robots)
     robot.arguments.insert(robot.arguments.end(), options.arguments.begin(),
                            options.arguments.end());
-  }
   return plan;
 }
 

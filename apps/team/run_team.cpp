@@ -14,7 +14,6 @@
 
 #include "apps/result_files.hpp"
 #include "modules/core/text_table.hpp"
-#include "runtime/clock.hpp"
 #include "runtime/unblocked_output.hpp"
 
 namespace km {
@@ -65,7 +64,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kTeamPoll_ms = 100;
-constexpr double kTeamGrace_s = 30.0;
 constexpr std::size_t kLastLines = 10;  // lines of a log
 
 // Removes results of an earlier run, which --report would show. Robots on other hosts may have left
@@ -86,7 +84,7 @@ class RunningTeam {
  public:
   RunningTeam(const fs::path& binary, const TeamPlan& plan, SignalWatch& signals,
               TeamDisplay& display, EmulatedLinks* links)
-      : plan_(plan), signals_(signals), display_(display), links_(links) {
+      : signals_(signals), display_(display), links_(links) {
     remove_earlier_run(plan);
     for (const RobotPlan& robot : plan.robots) {
       std::function<bool()> enter_network;
@@ -108,12 +106,10 @@ class RunningTeam {
   RunningTeam& operator=(const RunningTeam&) = delete;
 
   void wait() {
-    const double start_s = steady_now_s();
     while (is_running()) {
       poll_output();
       for (std::size_t i = 0; i < robots_.size(); ++i) read(i);
       if (const auto signal = signals_.wait(0.0)) send_to_all(*signal);
-      if (plan_.time_limit_s) enforce_limit(steady_now_s() - start_s);
     }
   }
 
@@ -163,20 +159,10 @@ class RunningTeam {
     for (const auto& robot : robots_) robot->send(signal);
   }
 
-  void enforce_limit(double elapsed_s) {
-    if (!asked_to_end_ && elapsed_s > *plan_.time_limit_s) {
-      asked_to_end_ = true;
-      send_to_all(SIGINT);
-    }
-    if (elapsed_s > *plan_.time_limit_s + kTeamGrace_s) send_to_all(SIGKILL);
-  }
-
-  const TeamPlan& plan_;
   SignalWatch& signals_;
   TeamDisplay& display_;
   EmulatedLinks* const links_;  // may be null
   std::vector<std::unique_ptr<RobotProcess>> robots_;
-  bool asked_to_end_ = false;
 };
 
 // A file without a number counts as absent, because it may be half written.

@@ -59,10 +59,9 @@ struct RobotRun {
 
 /// Starts one process per robot and waits for all of them. Returns their ends in the order of
 /// `plan`, whose domain must be set. With `links`, each robot runs in the network that has its
-/// index in the plan. Signals are passed to the robots: the first asks them to end in order, as the
-/// time limit does; the second ends them at once. Robots are killed 30 s after the time limit.
-/// Makes the output folders and removes earlier results from them. Throws std::runtime_error if a
-/// process cannot be started; no process is left then.
+/// index in the plan. Signals are passed to the robots: the first asks them to end in order, the
+/// second ends them at once. Makes the output folders and removes earlier results from them. Throws
+/// std::runtime_error if a process cannot be started; no process is left then.
 [[nodiscard]] std::vector<RobotRun> run_team(const std::filesystem::path& binary,
                                              const TeamPlan& plan, SignalWatch& signals,
                                              TeamDisplay& display, EmulatedLinks* links = nullptr);

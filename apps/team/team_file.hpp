@@ -56,7 +56,6 @@ struct TeamPlan {
   std::string rate = "auto";
   std::optional<std::uint32_t> domain;
   std::filesystem::path output;
-  std::optional<double> time_limit_s;
   std::filesystem::path security;
   std::filesystem::path truth;
   std::filesystem::path truth_mesh;
@@ -74,8 +73,6 @@ struct TeamPlan {
     visitor.field("output", output,
                   "folder of the results, relative to the working directory; default: results/ "
                   "and this file's name");
-    visitor.field("time_limit_s", time_limit_s, {0.0, 1e9},
-                  "[s] after this time the team is asked to end");
     visitor.field("security", security, Input{},
                   "team folder of kimera_multi_keys: each robot uses the keys in its folder there");
     visitor.field("truth", truth, Input{.must_exist = false},

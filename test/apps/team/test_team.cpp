@@ -237,11 +237,6 @@ TEST_CASE("If networks are not allowed, a team with bad links does not start", "
   CHECK_THAT(result.output, !Catch::Contains("started"));
 }
 
-TEST_CASE("A time limit asks the robots to end", "[team]") {
-  const ScriptedTeam team("trap 'exit 0' INT; while :; do sleep 0.05; done");
-  CHECK(run_command(team.command + " --time-limit 2").exit_code == 0);
-}
-
 TEST_CASE("How a robot ended elsewhere is read from its folder", "[team]") {
   const TemporaryFolder folder;
   const std::string summary = json_text(finished_summary());

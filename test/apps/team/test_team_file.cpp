@@ -39,7 +39,7 @@ std::string problems_of(const fs::path& file, const fs::path& dataset) {
 TEST_CASE("A corrupted team file is refused by name, or plans robots", "[team]") {
   const Inputs inputs;
   check_corrupted<ConfigError>(
-      "config: common.yaml\ntruth: truth.csv\nrate: max\ndomain: 7\ntime_limit_s: 12.5\nrobots:\n"
+      "config: common.yaml\ntruth: truth.csv\nrate: max\ndomain: 7\nrobots:\n"
       "  - {id: 3, name: a, dataset: \"${DATASET}\", from: 0, to: 7.5}\n"
       "  - {id: 300, graph: \"${DATASET}/g.csv\", arguments: --verbose}\n",
       "team.yaml", [&](const std::string& text) {
@@ -57,7 +57,6 @@ TEST_CASE("A team file gives the robots their inputs", "[team]") {
       "rate: max\n"
       "domain: 7\n"
       "output: out/here\n"
-      "time_limit_s: 12.5\n"
       "closure_truth: {max_translation_m: 1.5}\n"
       "arguments: [--link, wifi]\n"
       "robots:\n"
@@ -68,7 +67,6 @@ TEST_CASE("A team file gives the robots their inputs", "[team]") {
   CHECK(plan.rate == "max");
   CHECK(plan.domain == 7U);
   CHECK(plan.output == "out/here");
-  CHECK(plan.time_limit_s == 12.5);
   CHECK(plan.closure_truth.max_translation_m == 1.5);
   REQUIRE(plan.robots.size() == 2);
   const RobotPlan& a = plan.robots[0];
