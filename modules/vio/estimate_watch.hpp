@@ -5,9 +5,8 @@ namespace km {
 /// How well the newest image fits the estimate: errors of the image points of located landmarks
 /// after the optimisation, before outliers are dropped.
 struct ImageFit {
-  int points = 0;              ///< Points in the left and the right image.
-  int contradicting = 0;       ///< Points farther than VioConfig::outlier_px from their projection.
-  double median_square = 0.0;  ///< Median of the squared errors, in variances of a point.
+  int points = 0;         ///< Points in the left and the right image.
+  int contradicting = 0;  ///< Points farther than VioConfig::outlier_px from their projection.
 };
 
 /// Decides whether the images contradict the estimate. The smoother drops the points that
@@ -42,19 +41,8 @@ class EstimateWatch {
   [[nodiscard]] bool is_contradicted() const { return evidence_ >= kAlarm; }
   [[nodiscard]] double evidence() const { return evidence_; }
 
-  /// Ratio of the errors in the images since start_keyframe() to the assumed variance. It is the
-  /// mean over the images of the median squared error, divided by the median of the chi-squared
-  /// distribution of a point. Outliers among the points do not change the factor. 1 if no image was
-  /// judged, and at least 1 if some were not judged.
-  [[nodiscard]] double variance_factor() const;
-
-  void start_keyframe();
-
  private:
   double evidence_ = 0.0;  // the cumulative sum
-  double factors_ = 0.0;   // sum over the judged images since start_keyframe()
-  int images_ = 0;
-  bool judges_all_ = true;  // all images since start_keyframe() were judged
 };
 
 }  // namespace km

@@ -373,7 +373,7 @@ void FixedLagSmoother::locate_landmarks() {
 ImageFit FixedLagSmoother::fit_of_newest() const {
   const double limit = config_.outlier_px / config_.noise_px;
   const SE3 T_odom_body = image_poses(window_).back();
-  std::vector<double> squares;
+  ImageFit fit;
   Eigen::Vector2d r;
   for (const WindowLandmark& landmark : window_.landmarks) {
     if (!landmark.located || !tracked_now(window_, landmark)) continue;
@@ -382,16 +382,10 @@ ImageFit FixedLagSmoother::fit_of_newest() const {
       if (!bearing) continue;
       const bool in_front =
           reprojection_error(window_.views[c], *bearing, T_odom_body, landmark.p_odom, r);
-      squares.push_back(in_front ? r.squaredNorm() : limit * limit + 1.0);
+      ++fit.points;
+      fit.contradicting += !in_front || r.squaredNorm() > limit * limit;
     }
   }
-  if (squares.empty()) return {};
-  ImageFit fit{.points = static_cast<int>(squares.size())};
-  fit.contradicting = static_cast<int>(
-      std::ranges::count_if(squares, [&](double square) { return square > limit * limit; }));
-  const auto middle = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2);
-  std::ranges::nth_element(squares, middle);
-  fit.median_square = *middle;
   return fit;
 }
 
@@ -431,19 +425,25 @@ const WindowFrame* FixedLagSmoother::frame_at(Stamp stamp) const {
   return it == window_.frames.end() ? nullptr : &*it;
 }
 
-std::optional<UncertainPose> FixedLagSmoother::relative_pose(Stamp from, Stamp to) const {
+std::optional<RelativeMotion> FixedLagSmoother::relative_pose(Stamp from, Stamp to) const {
   const WindowFrame* a = frame_at(from);
   const WindowFrame* b = frame_at(to);
   if (a == nullptr || b == nullptr) return std::nullopt;
-  UncertainPose result;
+  RelativeMotion result;
   result.T = a->state.T_odom_body.inverse() * b->state.T_odom_body;
   // xi = -Ad(T_to_from) xi_from + xi_to
   Eigen::MatrixXd D_T = Eigen::MatrixXd::Zero(variables(), 6);
   D_T.middleRows<6>(15 * (a - window_.frames.data())) = -adjoint(result.T.inverse()).transpose();
   D_T.middleRows<6>(15 * (b - window_.frames.data())) += Matrix6::Identity();
-  const auto Sigma = covariance_of(std::move(D_T));
-  if (!Sigma) return std::nullopt;
-  result.Sigma = *Sigma;
+  WindowEquations equations(window_, 0.0);
+  equations.add_all();
+  const Eigen::MatrixXd H = equations.H().selfadjointView<Eigen::Lower>();
+  const Eigen::LLT<Eigen::MatrixXd> llt(H);
+  if (llt.info() != Eigen::Success) return std::nullopt;
+  const Eigen::MatrixXd X = llt.solve(D_T);
+  result.Sigma = D_T.transpose() * X;
+  result.Sigma = 0.5 * (result.Sigma + result.Sigma.transpose()).eval();
+  result.error_ratio = equations.error_ratio(X);
   return result;
 }
 

@@ -34,6 +34,13 @@ struct SmootherUpdate {
   WindowSolution solution;
 };
 
+/// A relative pose of two images.
+struct RelativeMotion {
+  SE3 T = SE3::Identity();
+  Matrix6 Sigma = Matrix6::Zero();  ///< Marginal covariance by the assumed errors.
+  double error_ratio = 1.0;         ///< See WindowEquations::error_ratio().
+};
+
 /// Fixed-lag smoother over the poses, velocities, biases and landmarks of a few keyframes and the
 /// most recent images.
 ///
@@ -88,7 +95,7 @@ class FixedLagSmoother {
 
   /// The current estimate of the relative pose of two images in the window with its marginal
   /// covariance; nullopt if an image has left the window or the information is singular.
-  [[nodiscard]] std::optional<UncertainPose> relative_pose(Stamp from, Stamp to) const;
+  [[nodiscard]] std::optional<RelativeMotion> relative_pose(Stamp from, Stamp to) const;
 
   /// Covariance of the state at an image in the window; nullopt if the image has left the window or
   /// the information is singular.

@@ -74,7 +74,7 @@ class ShownMotion {
 
 /// Covariance that a motion by images alone gets in addition to that of the window, for errors of
 /// the calibration: they scale distances and angles.
-[[nodiscard]] Matrix6 scale_covariance(const SE3& T_previous_kf);
+[[nodiscard]] Matrix6 scale_covariance(const SE3& T_previous_kf, DepthSource depth);
 
 /// Attitude R_odom_body at a start without gravity: x of odom is the viewing direction of the left
 /// camera, z its upward direction.

@@ -69,11 +69,11 @@ double longest_step_s(const std::vector<ImuSample>& samples) {
 // do not. After it odometry starts again from the last pose.
 constexpr double kLongestCoast_s = 1.0;
 
-// Ratio of the variance of a motion to that under independent errors of the points: errors of a
-// track in successive images are correlated. Images were rendered at 376x240 and 20 Hz along 30 s
-// of the flights V1_02 and V2_03. With this ratio, the mean normalised squared error over five
-// keyframes is 0.84 and 0.73.
-constexpr double kCommonErrors = 8.0;
+// Ratio of the variance of a motion to that of WindowEquations::error_ratio(), for errors that all
+// landmarks share. Images were rendered at 376x240 and 20 Hz along 30 s of the flights V1_02 and
+// V2_03. With this ratio, the mean normalised squared error over 1, 5 and 20 keyframes is 0.6, 1.5,
+// 0.8 and 0.9, 1.7, 2.2.
+constexpr double kCommonErrors = 2.0;
 
 constexpr double kLeastTiltSigma = 1e-4;  // [rad]; no inertial sensor is more accurate
 constexpr double kMostTiltSigma = 1.5;    // a larger uncertainty means that the vertical is unknown
@@ -487,7 +487,7 @@ void Vio::add_keyframe(const OdometryState& state, VioResult& result) {
   const auto relative = smoother_.relative_pose(last_keyframe_->stamp, state.stamp);
   // Without an inertial sensor the window understates the error of the rotation on KITTI.
   const double factor =
-      std::max(kCommonErrors * estimate_watch_.variance_factor(), rig_.has_imu ? 0.0 : 1.0);
+      relative ? kCommonErrors * std::max(relative->error_ratio, rig_.has_imu ? 0.0 : 1.0) : 1.0;
   KeyframeOdometry keyframe;
   keyframe.id = {robot_, last_keyframe_->id.index + 1};
   keyframe.T_previous_kf =
@@ -496,7 +496,8 @@ void Vio::add_keyframe(const OdometryState& state, VioResult& result) {
   keyframe.covariance =
       relative ? keyframe_covariance(config_, moved_s(state.stamp), factor * relative->Sigma)
                : restart_covariance();
-  if (!rig_.has_imu) keyframe.covariance += scale_covariance(keyframe.T_previous_kf);
+  if (!rig_.has_imu)
+    keyframe.covariance += scale_covariance(keyframe.T_previous_kf, rig_.stereo.depth_source);
   keyframe.T_odom_kf = last_keyframe_->T_odom_kf * keyframe.T_previous_kf;
   publish(keyframe, state, result);
 }
@@ -509,7 +510,6 @@ void Vio::publish(KeyframeOdometry keyframe, const OdometryState& state, VioResu
   keyframe.calibration = known_calibration();
   last_keyframe_ = keyframe;
   rested_s_ = 0.0;
-  estimate_watch_.start_keyframe();
   result.keyframes.push_back(std::move(keyframe));
 }
 

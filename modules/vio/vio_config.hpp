@@ -24,8 +24,8 @@ struct VioConfig {
   double output_interval_s = 0.3;
   double output_distance_m = 0.1;
   double output_rest_interval_s = 2.0;
-  double drift_rotation = 7e-4;
-  double drift_translation = 4e-3;
+  double drift_rotation = 4e-4;
+  double drift_translation = 3e-3;
   double tilt_sigma = 1e-2;
   double max_imu_gap_s = 0.1;
   double motion_accel = 10.0;

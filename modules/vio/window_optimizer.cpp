@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 #include <vector>
 
 #include "modules/core/lie.hpp"
@@ -25,6 +26,9 @@ std::vector<const OdometryState*> prior_states(const Window& window) {
     states.push_back(&window.frames[frame_index(window, id)].state);
   return states;
 }
+
+// Number of landmarks below which their scatter does not measure the errors: 4 for each unknown.
+constexpr double kLeastLandmarks = 24.0;
 
 constexpr double kInitialDamping = 1e-6;
 constexpr double kMaxDamping = 1e3;
@@ -214,6 +218,7 @@ void WindowEquations::add_observation(const WindowObservation& o, const Eigen::V
   }
   images_H_.block<6, 6>(at, at) += A;
   images_g_.segment<6>(at) += a;
+  coupling.g = a;
   couplings_.push_back(coupling);
 }
 
@@ -236,7 +241,9 @@ void WindowEquations::eliminate(PointTerms& point, Eliminated& landmark) {
     Coupling& row = couplings_[k];
     row.Y = llt.solve(row.W.transpose()).transpose();
     const auto at = 6 * static_cast<Eigen::Index>(row.frame);
-    images_g_.segment<6>(at).noalias() -= row.W * landmark.step;
+    const Vector6 by_landmark = row.W * landmark.step;
+    row.g -= by_landmark;
+    images_g_.segment<6>(at) -= by_landmark;
     if (window_.calibrates)
       images_H_.block<1, 6>(last, at).noalias() -= (row.W * landmark.by_readout).transpose();
     for (std::size_t m = landmark.first; m <= k; ++m)
@@ -276,6 +283,25 @@ void WindowEquations::add_images() {
     for (Eigen::Index m = 0; m <= k; ++m)
       H_.block<6, 6>(15 * k, 15 * m) += H.block<6, 6>(6 * k, 6 * m);
   }
+}
+
+double WindowEquations::error_ratio(const Eigen::Matrix<double, Eigen::Dynamic, 6>& X) const {
+  Eigen::Matrix<double, Eigen::Dynamic, 6> x = decltype(x)::Zero(images_H_.rows(), 6);
+  for (std::size_t k = 0; k < window_.frames.size(); ++k)
+    for (Eigen::Index column = 0; column < 6; ++column)
+      x.block<6, 1>(6 * static_cast<Eigen::Index>(k), column) = image_step(X.col(column), k);
+  Matrix6 scatter = Matrix6::Zero();
+  for (const Eliminated& e : eliminated_) {
+    Vector6 change = Vector6::Zero();
+    for (const Coupling& c : std::span(couplings_).subspan(e.first, e.count))
+      change += x.middleRows<6>(6 * static_cast<Eigen::Index>(c.frame)).transpose() * c.g;
+    scatter += change * change.transpose();
+  }
+  const Eigen::MatrixXd H = images_H_.selfadjointView<Eigen::Lower>();
+  const Matrix6 assumed = x.transpose() * H * x;
+  const auto landmarks = static_cast<double>(eliminated_.size());
+  const double ratio = landmarks / (landmarks - 6.0) * assumed.ldlt().solve(scatter).trace() / 6.0;
+  return landmarks >= kLeastLandmarks && ratio > 0.0 ? ratio : std::max(1.0, ratio);
 }
 
 Vector6 WindowEquations::image_step(const Eigen::VectorXd& dx, std::size_t frame) const {

@@ -41,6 +41,14 @@ class WindowEquations {
   /// Solution for the frames; empty if H is not positive definite.
   [[nodiscard]] Eigen::VectorXd solve() const;
 
+  /// Ratio of the measured variance of D dx to that by the assumed errors of the image points.
+  /// Here X = H^-1 D^T. The measured variance is the scatter of the changes by single landmarks. It
+  /// includes errors that the observations of a landmark share. It excludes errors that all
+  /// landmarks share. The ratio is the mean over six directions. At least 1 if there are too few
+  /// landmarks to measure it. (White, "A heteroskedasticity-consistent covariance matrix
+  /// estimator", Econometrica 1980.)
+  [[nodiscard]] double error_ratio(const Eigen::Matrix<double, Eigen::Dynamic, 6>& X) const;
+
   /// Moves the states and the calibration of `target` by `dx`, and its landmarks by the steps that
   /// follow from `dx`. `target` is a window of the same structure.
   void apply(const Eigen::VectorXd& dx, Window& target) const;
@@ -59,6 +67,7 @@ class WindowEquations {
     std::size_t frame = 0;
     Eigen::Matrix<double, 6, 3> W;
     Eigen::Matrix<double, 6, 3> Y;  // W V_inverse
+    Vector6 g = Vector6::Zero();    // gradient by the pose, landmark eliminated
   };
 
   // The terms of a landmark that is to be eliminated.

@@ -377,7 +377,7 @@ class Simulation {
       text +=
           "# Simulated sensors are as their calibration states: odometry drifts less than the "
           "default.\n";
-      settings.insert(settings.end(), {"vio.drift_rotation=2e-4", "vio.drift_translation=0.002"});
+      settings.insert(settings.end(), {"vio.drift_rotation=2e-4", "vio.drift_translation=0.001"});
     }
     for (std::size_t i = 0; i < settings.size(); ++i)
       text += (i == 0 ? "arguments: [--set, " : ", --set, ") + settings[i];
