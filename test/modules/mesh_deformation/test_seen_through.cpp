@@ -155,6 +155,7 @@ TEST_CASE("The mapper may drop a box that two searches for copies find gone",
     map.mesh.labels.push_back(1);
     map.seen_by.push_back(map.seen_by.back());
     map.certainty.push_back(map.certainty.back());
+    map.levels.push_back(map.levels.back());
     map.ids.push_back(map.ids.back() + 1);
   }
   const auto second = corrector.correct(recording.input(2));
