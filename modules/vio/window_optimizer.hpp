@@ -46,8 +46,8 @@ class WindowEquations {
   /// includes errors that the observations of a landmark share. It excludes errors that all
   /// landmarks share. The ratio is the mean over six directions. At least 1 if there are too few
   /// landmarks to measure it.
-  /// White proposes this estimator in "A heteroskedasticity-consistent covariance matrix estimator",
-  /// Econometrica 1980.
+  /// White proposes this estimator in "A heteroskedasticity-consistent covariance matrix
+  /// estimator", Econometrica 1980.
   [[nodiscard]] double error_ratio(const Eigen::Matrix<double, Eigen::Dynamic, 6>& X) const;
 
   /// Moves the states and the calibration of `target` by `dx`, and its landmarks by the steps that
