@@ -171,8 +171,13 @@ TEST_CASE("The demo builds and draws a map of a recording with --map only", "[de
                               Catch::EndsWith("demo: the team built no mesh: the notes above and "
                                               "robot0/robot.log have the reason\n"));
 
-  demo.add("team",
-           "echo \"$*\"; : >\"" + (demo.folder.path() / "out/team_mesh.ply").string() + '"');
+  demo.folder.write(
+      "recording/mav0/cam0/sensor.yaml",
+      "T_BS:\n  data: [0, 0, 1, 0.1,\n  -1, 0, 0, 0,\n  0, -1, 0, 0,\n  0, 0, 0, 1]\n");
+  const std::string out = (demo.folder.path() / "out/").string();
+  demo.add("team", "echo \"$*\"; cd '" + out +
+                       "' && mkdir -p robot0 && : >team_mesh.ply && echo 5 1 2 3 0 0 0 1 "
+                       ">robot0/optimized.tum");
   const CommandResult with = demo.run("--map");
   CAPTURE(with.output);
   CHECK(with.exit_code == 0);
@@ -180,8 +185,9 @@ TEST_CASE("The demo builds and draws a map of a recording with --map only", "[de
                               Catch::Contains("team_mesh.png ") &&
                               Catch::Contains("team_mesh.ply "));
   const std::string render = demo.folder.read("out/render.log");
-  CHECK_THAT(render,
-             Catch::Contains("/out/team_mesh.ply --output ") && !Catch::Contains("--palette"));
+  CHECK_THAT(render, Catch::Contains("/out/team_mesh.ply --output ") &&
+                         !Catch::Contains("--palette") &&
+                         Catch::Contains("--view=0.60,2.00,3.00,0.0,0.0 "));
 
   std::filesystem::remove(demo.folder.path() / "bin/kimera_multi_evaluate");
   CHECK(demo.run("").exit_code == 0);
