@@ -36,15 +36,11 @@ Corroboration::Corroboration(std::span<const PoseEdge> closures, const PoseOf& p
       dimension_(dimension),
       later_runs_(std::move(later_runs)),
       edges_(closures) {
-  for (std::size_t k = 0; k < closures.size(); ++k) {
+  for (const auto& [id, k] : order_of(closures)) {
     const PoseEdge& e = closures[k];
-    const bool up = e.from < e.to;
-    closures_.push_back({k, up ? e.from : e.to, up ? e.to : e.from,
-                         up ? e.T_from_to : e.T_from_to.inverse(), e.precision});
+    closures_.push_back(
+        {k, id.from, id.to, e.from == id.from ? e.T_from_to : e.T_from_to.inverse(), e.precision});
   }
-  std::stable_sort(closures_.begin(), closures_.end(), [](const Upward& a, const Upward& b) {
-    return std::pair(a.lower, a.upper) < std::pair(b.lower, b.upper);
-  });
 }
 
 // False if a step between the lower or between the upper ends is unknown.
@@ -86,6 +82,20 @@ double Corroboration::cycle_length(const Upward& one, const Upward& other) const
   return std::sqrt(mahalanobis_length(se3_log(T), cycle.covariance(), dimension_).squared);
 }
 
+// Without the even choice, all cycles may be at one end of the trajectories.
+std::vector<Corroboration::Near> Corroboration::nearest(std::vector<Near> cycles,
+                                                        std::size_t most) {
+  std::ranges::stable_sort(cycles, {}, &Near::steps);
+  if (cycles.size() <= most) return cycles;
+  const auto equal = std::ranges::equal_range(cycles, cycles[most - 1].steps, {}, &Near::steps);
+  const auto before = static_cast<std::size_t>(equal.begin() - cycles.begin());
+  const std::size_t wanted = most - before;
+  for (std::size_t k = 0; k < wanted; ++k)
+    cycles[before + k] = cycles[before + (2 * k + 1) * equal.size() / (2 * wanted)];
+  cycles.resize(most);
+  return cycles;
+}
+
 void Corroboration::count_lengths(NoiseHistogram& histogram, std::size_t most) const {
   std::vector<Near> cycles;
   for (std::size_t a = 0; a < closures_.size(); ++a)
@@ -95,9 +105,7 @@ void Corroboration::count_lengths(NoiseHistogram& histogram, std::size_t most) c
                                   steps_between(closures_[a].upper, closures_[b].upper);
       if (steps <= kSteps && same_runs(closures_[a], closures_[b])) cycles.push_back({steps, a, b});
     }
-  std::ranges::stable_sort(cycles, {}, &Near::steps);
-  if (cycles.size() > most) cycles.resize(most);
-  for (const Near& c : cycles)
+  for (const Near& c : nearest(std::move(cycles), most))
     count_length(histogram, cycle_length(closures_[c.a], closures_[c.b]));
 }
 
@@ -134,11 +142,11 @@ double Corroboration::turn_rad(const Upward& one, const Upward& other) const {
 
 void Corroboration::count_cycles(PairCycles& cycles) const {
   if (closures_.size() < 2) return;
-  const ClosurePlaces places = find_places(edges_);
+  const ClosureGroups places = find_places(edges_);
   std::vector<bool> is_first;  // the closure is the first one of its place
   std::vector<bool> seen(places.sizes.size(), false);
   for (const Upward& c : closures_) {
-    const std::size_t place = places.place_of[c.index];
+    const std::size_t place = places.group_of[c.index];
     is_first.push_back(!seen[place]);
     seen[place] = true;
   }
@@ -151,22 +159,17 @@ void Corroboration::count_cycles(PairCycles& cycles) const {
       const std::uint32_t steps = lower + steps_between(closures_[a].upper, closures_[b].upper);
       if (steps == 0) continue;  // no odometry between them
       if (!same_runs(closures_[a], closures_[b])) continue;
-      const bool same = places.place_of[closures_[a].index] == places.place_of[closures_[b].index];
+      const bool same = places.group_of[closures_[a].index] == places.group_of[closures_[b].index];
       if (same && steps <= kSteps) inside.push_back({steps, a, b});
       if (!same && is_first[a] && is_first[b] && steps <= kStepsBetweenPlaces &&
           turn_rad(closures_[a], closures_[b]) <= kLargestTurnSigma_rad)
         between.push_back({steps, a, b});
     }
   const double room = volume();
-  const auto count = [&](std::vector<Near>& pairs, std::vector<NoiseCycle>& counted) {
-    std::ranges::stable_sort(pairs, {}, &Near::steps);
-    for (const Near& pair : pairs) {
-      if (counted.size() >= kMostNoiseCycles) break;
-      counted.push_back(noise_cycle(closures_[pair.a], closures_[pair.b], room));
-    }
-  };
-  count(inside, cycles.inside);
-  count(between, cycles.between);
+  for (const Near& pair : nearest(std::move(inside), kMostNoiseCycles))
+    cycles.inside.push_back(noise_cycle(closures_[pair.a], closures_[pair.b], room));
+  for (const Near& pair : nearest(std::move(between), kMostNoiseCycles))
+    cycles.between.push_back(noise_cycle(closures_[pair.a], closures_[pair.b], room));
   cycles.places += static_cast<double>(places.sizes.size());
 }
 

@@ -30,17 +30,16 @@ class Corroboration {
                 const std::map<RobotId, Precision>& step, int dimension, LaterRuns later_runs = {});
 
   /// Counts the Mahalanobis lengths of cycles through two closures whose ends are a few keyframes
-  /// apart on both robots, and the odometry between them. It counts at most `most` cycles, those
-  /// with the fewest steps of odometry first. Cycles whose rotation error exceeds 45 degrees are
-  /// left out, because most of them contain a false closure. An error that both closures share
-  /// cancels in the cycle.
+  /// apart on both robots, and the odometry between them. It counts at most `most` cycles: those
+  /// with the fewest steps of odometry, chosen evenly among equals. Cycles whose rotation error
+  /// exceeds 45 degrees are left out, because most of them contain a false closure. An error that
+  /// both closures share cancels in the cycle.
   void count_lengths(NoiseHistogram& histogram, std::size_t most) const;
 
   /// Adds the cycles that estimate_closure_noise() needs: at most kMostNoiseCycles through two
   /// closures of one place, and as many through the first closures of two places (see
-  /// find_places()). Cycles with the fewest steps of odometry come first. The translation variance
-  /// of n steps over a distance L includes the lever arm of their rotation noise: n (sigma_t^2 +
-  /// sigma_R^2 L^2 / 3).
+  /// find_places()), chosen as above. The translation variance of n steps over a distance L
+  /// includes the lever arm of their rotation noise: n (sigma_t^2 + sigma_R^2 L^2 / 3).
   void count_cycles(PairCycles& cycles) const;
   static constexpr std::size_t kMostNoiseCycles = 150;
 
@@ -49,7 +48,8 @@ class Corroboration {
   [[nodiscard]] std::vector<bool> isolated(double barc) const;
 
  private:
-  // A closure, directed from its lower end to its upper one.
+  // A closure, directed from its end on the first robot of the pair (see first_robot()) to the
+  // other one; inside a robot from the earlier keyframe to the later one.
   struct Upward {
     std::size_t index = 0;  // index in edges_
     KeyframeId lower;
@@ -65,6 +65,7 @@ class Corroboration {
     std::size_t b = 0;
   };
 
+  [[nodiscard]] static std::vector<Near> nearest(std::vector<Near> cycles, std::size_t most);
   [[nodiscard]] Precision step_of(RobotId robot, const Precision& otherwise = {}) const;
   // `levers`: the covariance of odometry contains the lever arms of its rotations.
   [[nodiscard]] TwoClosureCycle cycle_of(const Upward& one, const Upward& other, bool levers) const;

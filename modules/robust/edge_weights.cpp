@@ -1,9 +1,7 @@
 #include "modules/robust/edge_weights.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <map>
-#include <set>
 
 #include "modules/robust/robust_schedule.hpp"
 
@@ -15,41 +13,6 @@ using Weighing = TreeVerdict::Weighing;
 // Weight of a rejected closure in the equations. Small enough not to bias the solution, positive so
 // that the system stays regular.
 constexpr double kFloor = 1e-10;
-// The closures of a pair pull it if their mean error exceeds kPullOfMean standard deviations of
-// this mean, and kPullOfOne standard deviations of a single closure.
-constexpr double kPullOfMean = 6.0;
-constexpr double kPullOfOne = 1.0;
-
-// The limited pairs whose closures all pull in one direction at the present poses, with a mean that
-// noise does not explain.
-std::set<RobotId> contradicted_pairs(std::span<const EdgeWeight> edges, const FrontEdges& front,
-                                     std::span<const SE3> present, double noise_scale) {
-  struct Pull {
-    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    double weight = 0.0;
-    double closures = 0.0;  // sum of the weights of the closures
-  };
-  std::map<RobotId, Pull> pulls;
-  for (std::size_t k = 0; k < edges.size(); ++k) {
-    if (edges[k].pair_limit == 1.0) continue;
-    const PoseEdge& edge = front.graph().edges[k];
-    const EdgeSlot& slot = front.slots()[k];
-    const Eigen::Vector3d off =
-        present[at(slot.j)].translation() - present[at(slot.i)] * edge.T_from_to.translation();
-    Pull& pull = pulls[edges[k].peer];
-    const double counts = edges[k].candidate * edges[k].pair_limit;
-    const double weight = counts * edge.precision.tau;
-    pull.sum += (edge.from.robot == front.graph().self ? weight : -weight) * off;
-    pull.weight += weight;
-    pull.closures += counts;
-  }
-  std::set<RobotId> contradicted;
-  for (const auto& [robot, pull] : pulls) {
-    const double most = std::max(kPullOfMean, kPullOfOne * std::sqrt(pull.closures));
-    if (pull.sum.norm() > most * noise_scale * std::sqrt(pull.weight)) contradicted.insert(robot);
-  }
-  return contradicted;
-}
 
 }  // namespace
 
@@ -74,7 +37,7 @@ void EdgeWeights::weigh(const TreeVerdict& verdict, const FrontEdges& front,
       sums.kept += edge.is_odometry ? 0 : 1;
     }
   }
-  limit_pairs(verdict, front, present);
+  limit_pairs(verdict, front, present, sums);
 }
 
 // Decided weights do not change; a weight that would be decided differently at the present poses
@@ -101,16 +64,29 @@ void EdgeWeights::weigh_open(EdgeWeight& edge, const TreeVerdict& verdict, doubl
   sums.rejected += edge.is_between && edge.candidate <= 0.5 ? 1 : 0;
 }
 
-// Once all weights are decided, the limit of a pair ends in the first round in which its closures
-// no longer all pull in one direction. In earlier rounds even consistent pairs show such a pull,
-// because the poses have not converged.
+// Once all weights are decided, the root releases pairs from their limits.
 void EdgeWeights::limit_pairs(const TreeVerdict& verdict, const FrontEdges& front,
-                              std::span<const SE3> present) {
-  std::set<RobotId> contradicted;
+                              std::span<const SE3> present, TreeSums& sums) {
   const bool decided = verdict.weighing == Weighing::kDecided;
-  if (decided) contradicted = contradicted_pairs(edges_, front, present, verdict.noise_scale);
-  for (EdgeWeight& edge : edges_)
-    edge.may_be_limited = !decided || (edge.is_limited && contradicted.contains(edge.peer));
+  std::map<std::pair<RobotId, RobotId>, PairPull> pulls;
+  for (std::size_t k = 0; k < edges_.size(); ++k) {
+    EdgeWeight& weighed = edges_[k];
+    const PoseEdge& edge = front.graph().edges[k];
+    const std::pair<RobotId, RobotId> pair = std::minmax(edge.from.robot, edge.to.robot);
+    const bool released = std::ranges::binary_search(verdict.released, pair);
+    weighed.may_be_limited = !decided || (weighed.is_limited && !released);
+    if (!decided || !weighed.may_be_limited || weighed.pair_limit == 1.0) continue;
+    const EdgeSlot& slot = front.slots()[k];
+    const Eigen::Vector3d off =
+        present[at(slot.j)].translation() - present[at(slot.i)] * edge.T_from_to.translation();
+    PairPull& pull = pulls.try_emplace(pair, PairPull{pair.first, pair.second}).first->second;
+    const double counts = weighed.candidate * weighed.pair_limit;
+    const double weight = counts * edge.precision.tau;
+    pull.sum += (edge.from.robot == pair.first ? weight : -weight) * off;
+    pull.weight += weight;
+    pull.closures += counts;
+  }
+  for (const auto& [pair, pull] : pulls) sums.pulls.push_back(pull);
 }
 
 void EdgeWeights::accept() {

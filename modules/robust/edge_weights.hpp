@@ -35,7 +35,7 @@ class EdgeWeights {
   /// All open closures are weighed from now on.
   void unsettle();
   /// Computes the weights at the present poses of the nodes of `front`. The root may still reject
-  /// these poses. Adds the counts of closures to `sums`.
+  /// these poses. Adds the counts of closures and the pulls of limited pairs to `sums`.
   void weigh(const TreeVerdict& verdict, const FrontEdges& front, std::span<const SE3> present,
              TreeSums& sums);
   /// The weights at the present poses become the accepted ones.
@@ -48,7 +48,7 @@ class EdgeWeights {
  private:
   void weigh_open(EdgeWeight& edge, const TreeVerdict& verdict, double residual, TreeSums& sums);
   void limit_pairs(const TreeVerdict& verdict, const FrontEdges& front,
-                   std::span<const SE3> present);
+                   std::span<const SE3> present, TreeSums& sums);
 
   std::vector<EdgeWeight> edges_;
 };

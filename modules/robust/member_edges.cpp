@@ -19,7 +19,7 @@ constexpr std::size_t kEnoughLengths = 300;
 constexpr std::size_t kShareOfLengths = 60;
 // Largest strength of a pair while closures are weighed, relative to the usual pair, so that no
 // pair overrules the others. At the end, kept closures have their own weight, except for pairs that
-// the other edges contradict.
+// the other edges contradict, see TreeRoot.
 constexpr double kStrongest = 1.25;
 // Number of isolated closures of a pair up to which they do no harm and are weighed from the start.
 constexpr std::ptrdiff_t kFewIsolated = 16;
@@ -132,12 +132,17 @@ TreeSums MemberEdges::count() {
   for (const Known& k : known_) {
     if (!reports(k)) continue;
     if (k.deferred) ++sums.isolated;
-    if (k.deferred || k.trust != Trust::kOpen || k.settled) continue;
+    if (k.trust != Trust::kOpen) continue;
+    const auto r =
+        static_cast<float>(residual_of(k.edge, start_of(k.edge.from), start_of(k.edge.to)));
+    sums.largest_of_all = std::max(sums.largest_of_all, r);
+    if (k.deferred || k.settled) continue;
     ++sums.open;
-    const double r = residual_of(k.edge, start_of(k.edge.from), start_of(k.edge.to));
-    sums.largest = std::max(sums.largest, static_cast<float>(r));
+    sums.largest = std::max(sums.largest, r);
   }
-  for (const auto& [peer, closures] : by_peer()) {
+  auto of_peer = by_peer();
+  for (const PoseEdge& tie : graph_.datum_ties) (void)of_peer[tie.to.robot];
+  for (const auto& [peer, closures] : of_peer) {
     if (peer <= graph_.self) continue;
     if (PairVote vote = vote_on(peer, closures, first); vote.used > 0)
       sums.votes.push_back(std::move(vote));
@@ -158,6 +163,12 @@ PairVote MemberEdges::vote_on(RobotId peer, const Indices& indices, bool first) 
   const std::vector<PoseEdge> closures = select(indices, takes_part);
   PairVote vote{graph_.self, peer, static_cast<std::uint32_t>(closures.size())};
   if (const auto motion = motion_of_pair(closures, graph_.self, pose)) vote.motion = *motion;
+  const auto tie = std::ranges::find_if(graph_.datum_ties,
+                                        [&](const PoseEdge& e) { return e.to.robot == peer; });
+  if (tie != graph_.datum_ties.end()) {
+    ++vote.used;
+    vote.motion = tied(vote.motion, *tie, pose);
+  }
   const auto has_runs = [this](RobotId robot) {  // their unknown steps are no noise
     const auto runs = graph_.later_runs.find(robot);
     return runs != graph_.later_runs.end() && !runs->second.empty();

@@ -69,35 +69,31 @@ class PublicChain {
 };
 
 struct PlaceClosure {
-  KeyframeId lower;
+  KeyframeId lower;  // on the first robot
   KeyframeId upper;
   UncertainPose T;  // from the lower to the upper end
 };
 
 struct PairCycle {
   Vector6 error;
-  std::array<Matrix6, 3> Sigma;  // odometry of a, odometry of b, closures
+  std::array<Matrix6, 3> Sigma;  // odometry of the first robot, of the other one, closures
   double log_if_false = 0.0;
 };
 
 // The first closure of each place.
 std::vector<PlaceClosure> representatives(std::span<const PoseEdge> closures, int dimension) {
-  std::vector<PoseEdge> sorted(closures.begin(), closures.end());
-  std::ranges::sort(sorted, {}, &PoseEdge::id);
-  const ClosurePlaces places = find_places(sorted);
-  std::vector<PlaceClosure> first;
+  std::vector<PlaceClosure> all, kept;
+  const ClosureGroups places = find_places(closures);
   std::vector<bool> seen(places.sizes.size(), false);
-  for (std::size_t k = 0; k < sorted.size(); ++k) {
-    if (seen[places.place_of[k]]) continue;
-    seen[places.place_of[k]] = true;
-    const PoseEdge& e = sorted[k];
+  for (const auto& [id, k] : order_of(closures)) {
+    if (seen[places.group_of[k]]) continue;
+    seen[places.group_of[k]] = true;
+    const PoseEdge& e = closures[k];
     const UncertainPose measured{e.T_from_to, covariance_in(e.precision, dimension)};
-    const bool up = e.from < e.to;
-    first.push_back({up ? e.from : e.to, up ? e.to : e.from, up ? measured : inverse(measured)});
+    all.push_back({id.from, id.to, e.from == id.from ? measured : inverse(measured)});
   }
-  std::vector<PlaceClosure> kept;
-  const std::size_t stride = (first.size() + kMostPlaces - 1) / kMostPlaces;
-  for (std::size_t k = 0; k < first.size(); k += stride) kept.push_back(first[k]);
+  const std::size_t stride = (all.size() + kMostPlaces - 1) / kMostPlaces;
+  for (std::size_t k = 0; k < all.size(); k += stride) kept.push_back(all[k]);
   return kept;
 }
 
@@ -187,15 +183,15 @@ Levels with(Levels levels, RobotId robot, std::size_t level) {
   return levels;
 }
 
-// Improves the levels robot by robot. Those in `honest` have level 0.
+// Improves the levels, the level first that gains most. Those in `honest` have level 0.
 Levels best_levels(std::span<const PairVote> votes, const std::set<RobotId>& honest,
                    Levels levels) {
   for (const RobotId robot : honest) levels[robot] = 0;
   double most = log_posterior_of(votes, levels);
   for (bool better = true; std::exchange(better, false);)
-    for (const auto& [robot, before] : Levels(levels))
+    for (const Levels before = levels; const auto& [robot, any] : before)
       for (std::size_t level = 0; level < kNoiseLevels && !honest.contains(robot); ++level) {
-        const Levels next = with(levels, robot, level);
+        const Levels next = with(before, robot, level);
         const double found = log_posterior_of(votes, next);
         if (!(found > most)) continue;
         most = found;
@@ -264,16 +260,18 @@ std::vector<float> odometry_evidence(std::span<const PoseEdge> closures,
   const double weight =
       std::min(1.0, static_cast<double>(places.size() - 1) / static_cast<double>(cycles.size()));
   const std::vector<double> weights(cycles.size(), weight);
+  const bool a_is_first = places.front().lower.robot < places.front().upper.robot;
   std::vector<float> evidence;
   double most = -std::numeric_limits<double>::infinity(), share = 0.0;
-  for (std::size_t i = 0; i < kNoiseLevels; ++i)
-    for (std::size_t j = 0; j < kNoiseLevels; ++j) {
+  constexpr int kLevels = kNoiseLevels;
+  for (int i = 0; i < kLevels; ++i)
+    for (int j = 0; j < kLevels; ++j) {
       double best = -std::numeric_limits<double>::infinity();
       for (std::size_t c = 0; c < kClosureLevels; ++c) {
         std::vector<double> ratios;
         for (const PairCycle& cycle : cycles)
-          ratios.push_back(log_ratio_with(cycle, std::ldexp(1.0, static_cast<int>(i)),
-                                          std::ldexp(1.0, static_cast<int>(j)),
+          ratios.push_back(log_ratio_with(cycle, std::ldexp(1.0, a_is_first ? i : j),
+                                          std::ldexp(1.0, a_is_first ? j : i),
                                           std::ldexp(1.0, static_cast<int>(c)), dimension));
         const CycleMixture mixture = fit_cycle_mixture(ratios, weights);
         const double found = mixture.log_likelihood + log_prior(static_cast<double>(c));

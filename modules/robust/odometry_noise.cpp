@@ -44,7 +44,7 @@ std::vector<Cycle> cycles_of(const OdometryChain& chain, std::span<const PoseEdg
                              std::size_t& places) {
   std::vector<PoseEdge> sorted = in_order(closures, chain.T_first_kf.size());
   std::erase_if(sorted, [&](const PoseEdge& e) { return !chain.joins(e.from.index, e.to.index); });
-  const ClosurePlaces found = find_places(sorted);
+  const ClosureGroups found = find_places(sorted);
   const std::vector<double> weights = found.weights();
   places = found.sizes.size();
   std::vector<Cycle> cycles;

@@ -1,7 +1,9 @@
 #include "modules/robust/pair_consensus.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <numeric>
 #include <set>
 #include <tuple>
 #include <vector>
@@ -16,23 +18,28 @@ namespace {
 constexpr std::size_t kEnoughCandidates = 200;
 // Lower limit of the spread of a pair [m].
 constexpr double kLeastSpread_m = 1e-3;
-// Misfit from which on a pair does not fit [spreads].
-constexpr double kMisfit_spreads = 4.0;
-// Least gain in the number of fitting pairs for which robots are moved.
-constexpr double kLeastGain = 0.5;
 // Least support of a confirmed pair: the loop through a third robot closes within twice the sum of
 // the spreads of its three pairs.
 constexpr double kConfirming = 0.2;
-// Largest spread of consistent closures of a pair, relative to the radius.
+// Largest spread of consistent closures of a pair, relative to the radius and to the mean standard
+// deviation of a closure. The distance of one true closure exceeds the second one in 3 of 100.
 constexpr double kLargestSpreadRatio = 0.25;
-// Number of places of a pair that agree on its motion, from which on only those places count.
-constexpr std::size_t kAgreeingPlaces = 3;
+constexpr double kLargestSpreadSigmas = 3.0;
+// Difference of the votes of two motions from which on votes decide: two places.
+constexpr double kCertainVotes = 2.0 * kVotesOfPlace;
+// Ratio of the errors of two loops below which the first motion is right.
+constexpr double kClearly = 0.25;
+constexpr double kVotesOfDatum = 1e9;  // more than all closures have
+// Number of rows of a pair that agree on its motion, from which on only those rows count.
+constexpr std::size_t kAgreeingRows = 3;
+
+bool has_vote(const PairMotion& pair) {
+  return pair.spread_m <= pair.consistent_m;
+}
 
 // The pairs with a vote.
 PairMotions agreeing(PairMotions pairs) {
-  std::erase_if(pairs, [](const auto& entry) {
-    return entry.second.spread_m > kLargestSpreadRatio * entry.second.radius_m;
-  });
+  std::erase_if(pairs, [](const auto& entry) { return !has_vote(entry.second); });
   return pairs;
 }
 
@@ -53,6 +60,23 @@ SE3 motion_between(const PairMotions& pairs, RobotId a, RobotId b) {
   return a < b ? T : T.inverse();
 }
 
+// Mean and variance of positions.
+struct Extent {
+  double count = 0.0;
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  double squares = 0.0;
+
+  void add(const Eigen::Vector3d& p) {
+    count += 1.0;
+    sum += p;
+    squares += p.squaredNorm();
+  }
+  [[nodiscard]] Eigen::Vector3d mean() const { return sum / count; }
+  [[nodiscard]] double variance() const {
+    return std::max(0.0, squares / count - mean().squaredNorm());
+  }
+};
+
 double length_m(const SE3& T, const PairMotion& pair) {
   return (T * pair.centre - pair.centre).norm() + pair.radius_m * angle_of(T.linear());
 }
@@ -61,72 +85,57 @@ double spread_m(const PairMotion& pair) {
   return std::max(kLeastSpread_m, pair.spread_m);
 }
 
+// Errors of the loops of a pair through third robots [sums of the three spreads].
+std::map<RobotId, double> loop_errors(const PairMotions& pairs, const std::set<RobotId>& robots,
+                                      const std::pair<RobotId, RobotId>& ends,
+                                      const PairMotion& pair) {
+  std::map<RobotId, double> errors;
+  for (const RobotId k : robots) {
+    if (k == ends.first || k == ends.second) continue;
+    const PairMotion* ak = find(pairs, ends.first, k);
+    const PairMotion* bk = find(pairs, ends.second, k);
+    if (ak == nullptr || bk == nullptr) continue;
+    const SE3 round = motion_between(pairs, ends.first, k) * motion_between(pairs, k, ends.second) *
+                      pair.T.pose().inverse();
+    errors[k] = length_m(round, pair) / (spread_m(pair) + spread_m(*ak) + spread_m(*bk));
+  }
+  return errors;
+}
+
 // Support of a pair, in [0, number of robots]: the number of third robots through which the loop
 // closes.
-double support(const PairMotions& pairs, const std::set<RobotId>& robots, RobotId a, RobotId b) {
-  const PairMotion& pair = pairs.at({a, b});
+double support(const PairMotions& pairs, const std::set<RobotId>& robots,
+               const std::pair<RobotId, RobotId>& ends) {
   double sum = 0.0;
-  for (const RobotId k : robots) {
-    if (k == a || k == b) continue;
-    const PairMotion* ak = find(pairs, a, k);
-    const PairMotion* bk = find(pairs, b, k);
-    if (ak == nullptr || bk == nullptr) continue;
-    const SE3 round =
-        motion_between(pairs, a, k) * motion_between(pairs, k, b) * pair.T.pose().inverse();
-    const double ratio = length_m(round, pair) / (spread_m(pair) + spread_m(*ak) + spread_m(*bk));
-    sum += 1.0 / (1.0 + ratio * ratio);
-  }
+  for (const auto& [third, error] : loop_errors(pairs, robots, ends, pairs.at(ends)))
+    sum += 1.0 / (1.0 + error * error);
   return sum;
 }
 
-std::map<RobotId, SE3> placed_by_tree(const PairMotions& pairs, const std::set<RobotId>& robots) {
-  std::vector<std::tuple<double, RobotId, RobotId>> order;
-  for (const auto& [pair, motion] : pairs)
-    order.emplace_back(-support(pairs, robots, pair.first, pair.second), pair.first, pair.second);
-  std::sort(order.begin(), order.end());
-  std::map<RobotId, SE3> placed{{*robots.begin(), SE3::Identity()}};
-  for (bool grown = true; grown;) {  // Prim: the best pair that reaches another robot
-    grown = false;
-    for (const auto& [less, a, b] : order) {
-      if (placed.contains(a) == placed.contains(b)) continue;
-      const auto [from, to] = placed.contains(a) ? std::pair(a, b) : std::pair(b, a);
-      placed[to] = placed.at(from) * motion_between(pairs, from, to);
-      grown = true;
-      break;
-    }
-  }
-  return placed;
+// The pair with its rival as its motion.
+PairMotion exchanged(PairMotion pair) {
+  std::swap(pair.T, pair.rival);
+  std::swap(pair.centre, pair.rival_centre);
+  std::swap(pair.votes, pair.rival_votes);
+  return pair;
 }
 
-// Sum of the misfits of all pairs after the motions `placed`, each limited to 1.
-double misfit(const PairMotions& pairs, const std::map<RobotId, SE3>& placed) {
-  double sum = 0.0;
-  for (const auto& [robots, pair] : pairs) {
-    const SE3 left = placed.at(robots.second).inverse() * placed.at(robots.first) * pair.T.pose();
-    const double ratio = length_m(left, pair) / (kMisfit_spreads * spread_m(pair));
-    sum += std::min(1.0, ratio * ratio);
-  }
-  return sum;
-}
-
-// Shifts all motions together so that as many robots as possible do not move.
-void keep_most_still(const PairMotions& pairs, std::map<RobotId, SE3>& placed) {
-  const auto staying = [&](const SE3& T) {
-    std::set<RobotId> moving;
-    for (const auto& [robots, pair] : pairs)
-      for (const RobotId robot : {robots.first, robots.second})
-        if (length_m(T * placed.at(robot), pair) > kMisfit_spreads * spread_m(pair))
-          moving.insert(robot);
-    return placed.size() - moving.size();
-  };
-  SE3 best = SE3::Identity();
-  std::size_t most = 0;
-  for (const auto& [robot, T] : placed)
-    if (const std::size_t stay = staying(T.inverse()); stay > most) {
-      most = stay;
-      best = T.inverse();
+// If the two motions of a pair have nearly equal votes, third robots decide. Odometry between rows
+// drifts, so that loops need not close. A loop decides if its errors differ clearly.
+PairMotions with_confirmed_motions(const PairMotions& given, const std::set<RobotId>& robots) {
+  const PairMotions voting = agreeing(given);
+  PairMotions decided = given;
+  for (auto& [ends, pair] : decided) {
+    if (pair.rival_votes == 0.0 || pair.votes - pair.rival_votes >= kCertainVotes) continue;
+    const auto by_pair = loop_errors(voting, robots, ends, pair);
+    int for_rival = 0;
+    for (const auto& [third, error] : loop_errors(voting, robots, ends, exchanged(pair))) {
+      for_rival += error < kClearly * by_pair.at(third) ? 1 : 0;
+      for_rival -= by_pair.at(third) < kClearly * error ? 1 : 0;
     }
-  for (auto& [robot, T] : placed) T = best * T;
+    if (for_rival > 0) pair = exchanged(pair);
+  }
+  return decided;
 }
 
 // Largest weights, relative to a step of the lower median robot. A closure may have half the sigma
@@ -141,62 +150,118 @@ constexpr std::size_t kMajority = 3;
 std::optional<PairMotion> motion_of_pair(std::span<const PoseEdge> closures, RobotId a,
                                          const std::function<SE3(const KeyframeId&)>& pose) {
   if (closures.empty()) return std::nullopt;
-  const ClosurePlaces found = find_places(closures);
-  const std::vector<double> weight_of = found.weights();
+  const RobotId first = first_robot(closures);
+  const std::vector<std::size_t> row_of = find_rows(closures).group_of;
+  const std::vector<double> votes_of = find_places(closures).votes();
   const std::size_t stride = (closures.size() + kEnoughCandidates - 1) / kEnoughCandidates;
-  PairMotion result;
-  std::vector<std::pair<SE3, SE3>> ends;  // ends on b: present pose, pose by the closure
-  std::vector<double> weights;
-  std::vector<std::size_t> places;
-  for (std::size_t k = 0; k < closures.size(); k += stride) {
+  std::vector<SE3> placed, measured;  // ends on the second robot: present poses, by the closures
+  std::vector<double> votes;
+  std::vector<std::size_t> rows;
+  Extent on_first, on_second;
+  const ClosureOrder order = order_of(closures);
+  for (std::size_t i = 0; i < order.size(); i += stride) {
+    const std::size_t k = order[i].second;
     const PoseEdge& e = closures[k];
-    weights.push_back(weight_of[k]);
-    places.push_back(found.place_of[k]);
-    const SE3 T_a_b = e.from.robot == a ? e.T_from_to : e.T_from_to.inverse();
-    ends.emplace_back(pose(e.other(a)), pose(e.end_on(a)) * T_a_b);
-    result.centre += ends.back().first.translation();
+    votes.push_back(votes_of[k]);
+    rows.push_back(row_of[k]);
+    const SE3 T_first_second = e.from.robot == first ? e.T_from_to : e.T_from_to.inverse();
+    const SE3 T_first = pose(e.end_on(first));
+    placed.push_back(pose(e.other(first)));
+    measured.push_back(T_first * T_first_second);
+    on_first.add(T_first.translation());
+    on_second.add(placed.back().translation());
   }
-  result.centre /= static_cast<double>(ends.size());
-  const SE3 to_centre = make_pose(Eigen::Matrix3d::Identity(), result.centre);
+  const SE3 to_centre = make_pose(Eigen::Matrix3d::Identity(), on_second.mean());
   std::vector<SE3> candidates;
-  for (const auto& [placed, measured] : ends) {
-    candidates.push_back(measured * placed.inverse() * to_centre);
-    result.radius_m += (placed.translation() - result.centre).squaredNorm();
-  }
-  result.radius_m = std::sqrt(result.radius_m / static_cast<double>(ends.size()));
-  const auto alignment = align_frames(candidates, weights);
+  for (std::size_t k = 0; k < placed.size(); ++k)
+    candidates.push_back(measured[k] * placed[k].inverse() * to_centre);
+  const auto alignment = align_frames(candidates, votes);
   const SE3 T = alignment->T * to_centre.inverse();
-  result.T = SinglePose::of(T);
+  const auto of_b = [&](const SE3& motion) {
+    return SinglePose::of(a == first ? motion : motion.inverse());
+  };
+  const auto centre_after = [&](const FrameAlignment& aligned) -> Eigen::Vector3d {
+    return a == first ? aligned.T.translation() : on_second.mean();
+  };
+  PairMotion result{.T = of_b(T), .centre = centre_after(*alignment)};
+  std::vector<std::size_t> others;  // closures that do not agree on T
+  std::vector<SE3> other_candidates;
+  std::vector<double> other_votes;
+  for (std::size_t k = 0; k < placed.size(); ++k)
+    if (!std::ranges::binary_search(alignment->inliers, k)) {
+      others.push_back(k);
+      other_candidates.push_back(candidates[k]);
+      other_votes.push_back(votes[k]);
+    }
+  std::set<std::size_t> of_rival;
+  if (const auto rival = align_frames(other_candidates, other_votes)) {
+    result.rival = of_b(rival->T * to_centre.inverse());
+    result.rival_centre = centre_after(*rival);
+    for (const std::size_t k : rival->inliers) {
+      of_rival.insert(others[k]);
+      result.rival_votes += other_votes[k];
+    }
+  }
+  result.radius_m = std::sqrt(0.5 * (on_first.variance() + on_second.variance()));
   for (const PoseEdge& e : closures) {
     result.strength.kappa += e.precision.kappa;
     result.strength.tau += e.precision.tau;
   }
-  // Several places do not agree by chance, however many other places disagree.
-  std::set<std::size_t> agreeing_places;
-  for (const std::size_t k : alignment->inliers) agreeing_places.insert(places[k]);
-  const bool by_places = agreeing_places.size() >= kAgreeingPlaces;
-  std::vector<double> distances;
-  for (std::size_t k = 0; k < ends.size(); ++k) {
-    const auto& [placed, measured] = ends[k];
-    if (!by_places || std::ranges::binary_search(alignment->inliers, k))
-      distances.push_back((T * placed.translation() - measured.translation()).norm());
+  // Several rows do not agree by chance, however many other rows disagree.
+  std::set<std::size_t> agreeing_rows;
+  for (const std::size_t k : alignment->inliers) {
+    agreeing_rows.insert(rows[k]);
+    result.votes += votes[k];
   }
+  const bool by_rows = agreeing_rows.size() >= kAgreeingRows;
+  std::vector<double> distances;
+  for (std::size_t k = 0; k < placed.size(); ++k)
+    if (std::ranges::binary_search(alignment->inliers, k) || !(by_rows || of_rival.contains(k)))
+      distances.push_back((T * placed[k].translation() - measured[k].translation()).norm());
   const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
   std::nth_element(distances.begin(), middle, distances.end());
   result.spread_m = *middle;
+  result.consistent_m = std::max(
+      kLargestSpreadRatio * result.radius_m,
+      kLargestSpreadSigmas * std::sqrt(static_cast<double>(closures.size()) / result.strength.tau));
   return result;
 }
 
-std::map<RobotId, SE3> better_placement(const PairMotions& all) {
-  const PairMotions pairs = agreeing(all);
-  const std::set<RobotId> robots = robots_of(pairs);
+PairMotion tied(const PairMotion& by_closures, const PoseEdge& tie,
+                const std::function<SE3(const KeyframeId&)>& pose) {
+  PairMotion motion = *motion_of_pair(std::array{tie}, tie.from.robot, pose);
+  motion.votes = kVotesOfDatum;
+  motion.strength = by_closures.strength;
+  return motion;
+}
+
+std::map<RobotId, SE3> common_placement(const PairMotions& given) {
+  const std::set<RobotId> robots = robots_of(given);
   if (robots.empty()) return {};
-  std::map<RobotId, SE3> still;
-  for (const RobotId robot : robots) still[robot] = SE3::Identity();
-  std::map<RobotId, SE3> placed = placed_by_tree(pairs, robots);
-  if (placed.size() < robots.size() || misfit(pairs, placed) > misfit(pairs, still) - kLeastGain)
-    return {};
-  keep_most_still(pairs, placed);
+  const PairMotions pairs = with_confirmed_motions(given, robots);
+  using Rank = std::tuple<bool, double, double, double>;
+  std::vector<std::tuple<Rank, RobotId, RobotId>> order;
+  const PairMotions voting = agreeing(pairs);
+  for (const auto& [pair, motion] : pairs) {
+    const double confirmed = motion.votes >= kVotesOfDatum ? static_cast<double>(robots.size())
+                             : has_vote(motion)            ? support(voting, robots, pair)
+                                                           : 0.0;
+    order.emplace_back(Rank{!has_vote(motion), confirmed < kConfirming ? 0.0 : -confirmed,
+                            -motion.votes, motion.spread_m},
+                       pair.first, pair.second);
+  }
+  std::ranges::sort(order);
+  std::map<RobotId, SE3> placed{{*robots.begin(), SE3::Identity()}};
+  for (bool grown = true; grown;) {  // Prim: the best pair that reaches another robot
+    grown = false;
+    for (const auto& [rank, a, b] : order) {
+      if (placed.contains(a) == placed.contains(b)) continue;
+      const auto [from, to] = placed.contains(a) ? std::pair(a, b) : std::pair(b, a);
+      placed[to] = placed.at(from) * motion_between(pairs, from, to);
+      grown = true;
+      break;
+    }
+  }
   return placed;
 }
 
@@ -217,7 +282,7 @@ Precision usual_strength(const PairMotions& all) {
   if (robots.size() < kEnoughToOutvote) return kUnlimited;
   std::map<RobotId, std::vector<Precision>> of_robot;
   for (const auto& [ends, pair] : pairs) {
-    if (support(pairs, robots, ends.first, ends.second) < kConfirming) continue;
+    if (pair.strength.tau == 0.0 || support(pairs, robots, ends) < kConfirming) continue;
     for (const RobotId robot : {ends.first, ends.second}) of_robot[robot].push_back(pair.strength);
   }
   if (of_robot.empty()) return kUnlimited;

@@ -19,14 +19,20 @@ namespace km {
 
 /// A rigid motion of all poses of robot b after which most closures of a pair a < b would fit,
 /// while robot a does not move. Motions multiply from the left: T_world_kf becomes T * T_world_kf.
-/// Positions are in the frame of the present poses.
+/// Positions are in the frame of the present poses. All but T is the same for both robots.
 struct PairMotion {
   SinglePose T = {};
-  Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< Mean position of the ends on b [m].
-  double radius_m = 0.0;  ///< RMS distance of the ends on b from `centre`.
-  /// Median distance of the ends on b, moved by T, from their positions by the closures.
-  /// If closures at three places or more agree on T, only those closures count.
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< Mean end on the second robot, after T [m].
+  SinglePose rival = {};  ///< The motion on which most of the other closures agree.
+  Eigen::Vector3d rival_centre = Eigen::Vector3d::Zero();  ///< As `centre`, after `rival` [m].
+  double radius_m = 0.0;  ///< RMS distance of the ends on both robots from their mean.
+  /// Median distance of the ends on the second robot, moved by T, from their positions by the
+  /// closures. Closures that agree on `rival` do not count. If closures of three rows or more agree
+  /// on T, only those closures count.
   double spread_m = 0.0;
+  double consistent_m = 0.0;  ///< Largest spread with which the closures are consistent.
+  double votes = 0.0;        ///< Sum over the closures that agree on T, see ClosureGroups::votes().
+  double rival_votes = 0.0;  ///< Sum over those that agree on `rival`; 0: there are none.
   Precision strength = {.kappa = 0.0, .tau = 0.0};  ///< Sum of the weights of the closures.
 };
 
@@ -45,25 +51,28 @@ inline constexpr Precision kUnlimited{.kappa = std::numeric_limits<double>::max(
     std::span<const PoseEdge> closures, RobotId a,
     const std::function<SE3(const KeyframeId&)>& pose);
 
-/// Motions of robots after which more pairs fit. Robots enter the frame one after the other, each
-/// by its closures to earlier robots, which may be false. Here each pair with consistent closures
-/// has one vote, however many closures it has. Closures of a pair are consistent if their spread is
-/// at most a quarter of the radius. If odometry between the closures drifts too far, no single
-/// motion fits them. False closures do not agree on one motion, either.
+/// The motion of a pair whose robots a datum ties, see datum_ties(). Closures do not change it.
+[[nodiscard]] PairMotion tied(const PairMotion& by_closures, const PoseEdge& tie,
+                              const std::function<SE3(const KeyframeId&)>& pose);
+
+/// Motions of robots after which most pairs fit. Each pair with consistent closures has one vote,
+/// however many closures it has. Closures of a pair are consistent if their spread is at most a
+/// quarter of the radius, or three standard deviations of a closure. If odometry between the
+/// closures drifts too far, no single motion fits them. False closures do not agree on one motion,
+/// either.
 ///
-/// A pair is confirmed if the loop through some third robot closes. Motions are chained along the
-/// maximum spanning tree over the number of such robots per pair. All motions together are then
-/// shifted so that as many robots as possible do not move. The result is empty if the gain in
-/// fitting pairs, each counted in [0, 1], is below 0.5. It is also empty if the pairs with a vote
-/// do not connect all of their robots. If these pairs form no loop, only robots that entered the
-/// frame by pairs without a vote move. O(pairs * robots).
-[[nodiscard]] std::map<RobotId, SE3> better_placement(const PairMotions& pairs);
+/// A pair is confirmed if the loop through some third robot closes. If the votes of the two motions
+/// of a pair differ by less than two rows of closures, the one that is confirmed by more robots
+/// counts. Motions are chained along the
+/// maximum spanning tree. Pairs with a vote come first, then those with more such robots, then
+/// those with more votes of closures. The lowest robot does not move. O(pairs * robots).
+[[nodiscard]] std::map<RobotId, SE3> common_placement(const PairMotions& pairs);
 
 /// Lower medians of kappa and of tau, independently. Precondition: `values` is not empty.
 [[nodiscard]] Precision lower_median(std::span<const Precision> values);
 
 /// The strength of the usual pair of robots: the lower median over all robots of the lower median
-/// over the confirmed pairs of each robot. Pairs are confirmed as in better_placement(). One robot
+/// over the confirmed pairs of each robot. Pairs are confirmed as in common_placement(). One robot
 /// of four takes part in half of all pairs, but only in a third of the pairs of each other robot.
 /// Its claims about its own pairs can therefore make the result neither larger nor smaller than the
 /// claims of the other robots. kUnlimited with fewer than kEnoughToOutvote robots, and if no pair

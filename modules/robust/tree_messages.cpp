@@ -17,8 +17,22 @@ constexpr std::uint8_t kUp = 1;
 constexpr std::uint8_t kDown = 2;
 constexpr std::size_t kMaxElements = 1U << 24U;
 
-bool below(const PairVote& x, const PairVote& y) {
+constexpr auto below = [](const auto& x, const auto& y) {
   return std::pair(x.a, x.b) < std::pair(y.a, y.b);
+};
+
+// Merges two ascending lists. An entry of a pair that has one is added to it.
+template <typename T, typename Add>
+void merge_pairs(std::vector<T>& into, const std::vector<T>& other, const Add& add) {
+  std::vector<T> all;
+  std::merge(into.begin(), into.end(), other.begin(), other.end(), std::back_inserter(all), below);
+  into.clear();
+  for (const T& entry : all) {
+    if (into.empty() || below(into.back(), entry))
+      into.push_back(entry);
+    else
+      add(into.back(), entry);
+  }
 }
 
 // A whole number of units of a coupling; small numbers of either sign take one byte.
@@ -52,6 +66,7 @@ void TreeSums::add(const TreeSums& other) {
   cost += other.cost;
   decrement += other.decrement;
   largest = std::max(largest, other.largest);
+  largest_of_all = std::max(largest_of_all, other.largest_of_all);
   open += other.open;
   changed += other.changed;
   fractional += other.fractional;
@@ -61,32 +76,35 @@ void TreeSums::add(const TreeSums& other) {
   fixed += other.fixed;
   poses += other.poses;
   for (const auto& [bin, n] : other.lengths) lengths[bin] += n;
-  std::vector<PairVote> all;
-  std::merge(votes.begin(), votes.end(), other.votes.begin(), other.votes.end(),
-             std::back_inserter(all), below);
-  votes.clear();
-  for (const PairVote& v : all) {
-    if (votes.empty() || below(votes.back(), v))
-      votes.push_back(v);
-    else
-      votes.back().used += v.used;
-  }
+  merge_pairs(votes, other.votes, [](PairVote& x, const PairVote& y) { x.used += y.used; });
+  merge_pairs(pulls, other.pulls, [](PairPull& x, const PairPull& y) {
+    x.sum += y.sum;
+    x.weight += y.weight;
+    x.closures += y.closures;
+  });
 }
 
 // Archives find these functions by argument-dependent lookup, which sees no unnamed namespace.
 
+void describe(auto& archive, As<PairMotion> auto& m) {
+  archive(m.T, m.centre, m.rival, m.rival_centre);
+  for (auto* x : {&m.radius_m, &m.spread_m, &m.consistent_m, &m.votes, &m.rival_votes,
+                  &m.strength.kappa, &m.strength.tau}) {
+    archive(*x);
+    archive.require(*x >= 0.0);
+  }
+}
+
 void describe(auto& archive, As<PairVote> auto& v) {
-  archive(v.a, v.b, v.used, v.motion.T, v.motion.centre, v.motion.radius_m, v.motion.spread_m,
-          v.motion.strength.kappa, v.motion.strength.tau, v.noise);
+  archive(v.a, v.b, v.used, v.motion, v.noise);
   archive.list(v.odometry, kMaxElements, sizeof(float));
   archive.require(v.odometry.empty() || v.odometry.size() == kNoiseLevels * kNoiseLevels);
-  archive.require(v.noise >= 0.0F && v.motion.radius_m >= 0.0 && v.motion.spread_m >= 0.0 &&
-                  v.motion.strength.kappa >= 0.0 && v.motion.strength.tau >= 0.0);
+  archive.require(v.noise >= 0.0F);
 }
 
 void describe(auto& archive, As<TreeSums> auto& s) {
-  archive(s.base_cost, s.cost, s.decrement, s.largest, s.open, s.changed, s.fractional, s.kept,
-          s.rejected, s.isolated, s.fixed, s.poses);
+  archive(s.base_cost, s.cost, s.decrement, s.largest, s.largest_of_all, s.open, s.changed,
+          s.fractional, s.kept, s.rejected, s.isolated, s.fixed, s.poses);
   using Length = std::pair<std::uint16_t, std::uint32_t>;
   std::vector<Length> lengths(s.lengths.begin(), s.lengths.end());
   archive.list(lengths, kMaxElements, 2,
@@ -94,8 +112,11 @@ void describe(auto& archive, As<TreeSums> auto& s) {
   archive.require(std::ranges::adjacent_find(lengths, std::ranges::greater_equal(),
                                              &Length::first) == lengths.end());
   if constexpr (kReads<decltype(archive)>) s.lengths = {lengths.begin(), lengths.end()};
-  archive.list(s.votes, kMaxElements, 92);
+  archive.list(s.votes, kMaxElements, 168);
   archive.require(std::ranges::adjacent_find(s.votes, std::not_fn(below)) == s.votes.end());
+  archive.list(s.pulls, kMaxElements, 42,
+               [&](auto& pull) { archive(pull.a, pull.b, pull.sum, pull.weight, pull.closures); });
+  archive.require(std::ranges::adjacent_find(s.pulls, std::not_fn(below)) == s.pulls.end());
 }
 
 void describe(auto& archive, As<TreeVariable> auto& v) {
@@ -216,6 +237,7 @@ void describe(auto& archive, As<TreeVerdict> auto& v) {
     archive(noise.first, noise.second);
     archive.require(noise.second >= 1.0);
   });
+  archive.list(v.released, kMaxElements, 2, [&](auto& pair) { archive(pair.first, pair.second); });
 }
 
 void describe(auto& archive, As<DownMessage> auto& m) {

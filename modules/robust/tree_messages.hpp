@@ -25,14 +25,24 @@ struct PairVote {
   std::vector<float> odometry = {};
 };
 
+/// The pull of the closures of a limited pair a < b in one direction, see TreeRoot.
+struct PairPull {
+  RobotId a = 0;
+  RobotId b = 0;
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();  ///< Weighed errors of their positions.
+  double weight = 0.0;                            ///< Sum of the weights.
+  double closures = 0.0;                          ///< Number of closures, limited as the pair is.
+};
+
 /// Sums over a subtree.
 struct TreeSums {
   double base_cost = 0.0;  ///< Cost before the step, with the weights of the step.
   double cost = 0.0;       ///< Cost after the step, with the weights of the step.
   double decrement = 0.0;  ///< Squared norm of the forward-substituted eliminated right-hand side.
   float largest = 0.0F;    ///< Largest residual of an open closure [sigma].
-  std::uint32_t open = 0;  ///< Number of closures that may be rejected.
-  std::uint32_t changed = 0;     ///< Open closures whose weight has changed.
+  float largest_of_all = 0.0F;  ///< The same with settled and deferred closures; at the start only.
+  std::uint32_t open = 0;       ///< Number of closures that may be rejected.
+  std::uint32_t changed = 0;    ///< Open closures whose weight has changed.
   std::uint32_t fractional = 0;  ///< Open closures with a weight between 0 and 1.
   std::uint32_t kept = 0;        ///< Closures with a weight above one half.
   std::uint32_t rejected = 0;    ///< Open closures between robots with a lower weight.
@@ -41,6 +51,8 @@ struct TreeSums {
   std::uint32_t poses = 0;
   std::map<std::uint16_t, std::uint32_t> lengths = {};  ///< See NoiseHistogram; at the start only.
   std::vector<PairVote> votes = {};                     ///< Ascending by (a, b).
+  std::vector<PairPull> pulls =
+      {};  ///< Those of limited pairs, once weights are decided. Ascending.
 
   void add(const TreeSums& other);
 };
@@ -86,7 +98,7 @@ struct TreeVerdict {
   double barc = 0.0;         ///< Largest residual of an inlier [sigma].
   double noise_scale = 1.0;  ///< kDone: at most what the cost of the solution allows.
   double usual_noise = 1.0;  ///< kStart: see usual_pair_noise().
-  /// kCount, kStart: first these robots are moved as a whole, see better_placement(). Ascending.
+  /// kCount, kStart: first these robots are moved as a whole, see common_placement(). Ascending.
   std::vector<std::pair<RobotId, SinglePose>> moves = {};
   /// kCount: the odometry of these robots is this many times noisier than it claims. The robots
   /// then only count again. Ascending.
@@ -95,6 +107,8 @@ struct TreeVerdict {
   /// weighed, no pair is more than 1.25 times as strong. A pair that the other edges contradict
   /// remains limited afterwards.
   Precision usual_pair = kUnlimited;
+  /// kRefresh: these pairs, which their pulls do not contradict, are no longer limited. Ascending.
+  std::vector<std::pair<RobotId, RobotId>> released = {};
   double cost = 0.0;  ///< Team cost at the accepted poses.
   double gradient = 0.0;
   /// kStep: a rigid motion of all poses that each robot adds to its step, to first order: rotation

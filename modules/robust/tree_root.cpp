@@ -47,6 +47,13 @@ constexpr double kWorthDeciding = 0.1;
 constexpr std::uint32_t kLeastRejected = 2;
 constexpr double kMostRejected = 0.03;
 
+// The other edges contradict a pair if its closures all pull in one direction. Their mean error
+// then exceeds kPullOfMean standard deviations of this mean, and kPullOfOne of a single closure.
+constexpr double kPullOfMean = 6.0;
+constexpr double kPullOfOne = 1.0;
+
+constexpr double kNearlyConverged = 1e-8;  // predicted decrease of a step, relative to the cost
+
 constexpr std::size_t kEnoughPairs = 3;  // for the noise of the usual pair
 
 // True if pairs with closures in use connect all robots.
@@ -100,7 +107,7 @@ double noise_allowed(double scale, double cost, std::uint32_t kept, std::size_t 
 
 std::vector<std::pair<RobotId, SinglePose>> moves_of(const std::vector<PairVote>& votes) {
   std::vector<std::pair<RobotId, SinglePose>> moves;
-  for (const auto& [robot, T] : better_placement(motions_of(votes)))
+  for (const auto& [robot, T] : common_placement(motions_of(votes)))
     moves.emplace_back(robot, SinglePose::of(T));
   return moves;
 }
@@ -154,6 +161,7 @@ DownMessage TreeRoot::retreat(std::uint32_t round) {
 DownMessage TreeRoot::decide_start(const TreeSums& sums, std::uint32_t round) {
   round_ = round;
   if (first_) {
+    first_->largest = sums.largest_of_all;  // after the robots have moved
     const double all = first_->open, left = all - sums.isolated;
     alone_ = alone_ && left - sums.open >= kWorthDeciding * all;
     if (!may_defer_) return start(false, alone_ ? sums : *first_);
@@ -240,13 +248,25 @@ DownMessage TreeRoot::step(const TreeSums& sums, const TreeFront& front,
   const bool contradicts = alone_ && !again_ && sums.rejected >= kLeastRejected &&
                            sums.rejected > kMostRejected * static_cast<double>(sums.open);
   if (schedule_.decided() && contradicts) return weigh_all();
-  if (schedule_.decided() && small && sums.changed > 0 && schedule_.reopen())
+  if (schedule_.decided() && small && sums.changed > 0 && schedule_.reopen()) {
     last_decrement_.reset();
-  // If the weights were decided before this pass up, its equations are the final ones, unless pairs
-  // were still limited.
+    released_ = false;
+  }
+  // Pairs are released from their limits only once the poses have nearly converged, because before
+  // even consistent pairs show a pull.
+  const bool nearly = 0.5 * decrement_ <= kNearlyConverged * cost_ + options_.absolute_tolerance;
   const bool decided = schedule_.decided();
-  const bool unlimited = weighing_ == Weighing::kDecided || usual_pair_.tau >= kUnlimited.tau;
+  const bool shows_pulls = weighing_ == Weighing::kDecided;
   weighing_ = decided ? Weighing::kDecided : Weighing::kWeigh;
+  if (decided && nearly && shows_pulls && !std::exchange(released_, true)) {
+    if (auto pairs = consistent_pairs(sums.pulls); !pairs.empty()) {
+      full_ = false;  // the poses are no longer near the minimum
+      DownMessage message = refresh(true, weighing_);
+      message.verdict.released = std::move(pairs);
+      return message;
+    }
+  }
+  const bool unlimited = released_ || usual_pair_.tau >= kUnlimited.tau;
   if ((decided && small && unlimited) || round_ + 1 >= options_.max_rounds) {
     noise_scale_ =
         noise_allowed(noise_scale_, cost_, sums.kept, members_.size(), options_.dimension);
@@ -272,12 +292,23 @@ DownMessage TreeRoot::step(const TreeSums& sums, const TreeFront& front,
 // Closures between robots cannot bend a robot as far if those inside it have their full weight from
 // the start. If some are rejected, this may be why. All are then weighed together, from the start.
 DownMessage TreeRoot::weigh_all() {
-  alone_ = false;
+  alone_ = released_ = false;
   schedule_.start(first_->largest, first_->open, barc_);
   rises_ = backtracks_ = 0;
   DownMessage message = refresh(false, Weighing::kWeigh);
   message.verdict.weigh_all = true;
   return message;
+}
+
+std::vector<std::pair<RobotId, RobotId>> TreeRoot::consistent_pairs(
+    std::span<const PairPull> pulls) const {
+  std::vector<std::pair<RobotId, RobotId>> pairs;
+  for (const PairPull& pull : pulls) {
+    const double most = std::max(kPullOfMean, kPullOfOne * std::sqrt(pull.closures));
+    if (!(pull.sum.norm() > most * noise_scale_ * std::sqrt(pull.weight)))
+      pairs.emplace_back(pull.a, pull.b);
+  }
+  return pairs;
 }
 
 DownMessage TreeRoot::go_back() {

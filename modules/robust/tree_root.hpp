@@ -56,6 +56,8 @@ class TreeRoot {
   [[nodiscard]] DownMessage refresh(bool accept, TreeVerdict::Weighing weighing);
   [[nodiscard]] bool worth_refreshing(double decrement);
   [[nodiscard]] DownMessage weigh_all();
+  [[nodiscard]] std::vector<std::pair<RobotId, RobotId>> consistent_pairs(
+      std::span<const PairPull> pulls) const;
 
   std::vector<RobotId> members_;
   TreeNewtonOptions options_;
@@ -75,14 +77,15 @@ class TreeRoot {
   double decrement_ = 0.0;
   bool free_ = true;
   TreeVerdict::Weighing weighing_ = TreeVerdict::Weighing::kDecided;  // in this round
-  bool at_base_ = true;   // the present poses are the accepted ones
-  bool full_ = false;     // the second derivatives are full, where possible
-  bool convex_ = false;   // full ones were indefinite: no retry until convergence is slow
-  bool stale_ = false;    // a step was accepted since the last second derivatives
-  bool retried_ = false;  // new second derivatives were tried at these poses
-  int backtracks_ = 0;    // in a row
-  int rises_ = 0;         // accepted increases of the cost, in a row
-  double length_ = 1.0;   // scale of the next Newton step; 1 once all is decided
+  bool at_base_ = true;    // the present poses are the accepted ones
+  bool full_ = false;      // the second derivatives are full, where possible
+  bool convex_ = false;    // full ones were indefinite: no retry until convergence is slow
+  bool stale_ = false;     // a step was accepted since the last second derivatives
+  bool retried_ = false;   // new second derivatives were tried at these poses
+  bool released_ = false;  // pairs that are not contradicted are no longer limited
+  int backtracks_ = 0;     // in a row
+  int rises_ = 0;          // accepted increases of the cost, in a row
+  double length_ = 1.0;    // scale of the next Newton step; 1 once all is decided
   std::optional<double> last_decrement_;  // with the present second derivatives
 };
 

@@ -61,13 +61,15 @@ void ClosureDecisions::count_places(EdgeSetOffer& offer, std::span<const PoseEdg
         accepted.push_back(closure);
     }
     std::ranges::transform(accepted, std::back_inserter(kept), &PoseEdge::id);
-    const std::vector<std::size_t> rivals = find_places(rejected).sizes;
-    const std::size_t places = find_places(accepted).sizes.size();
-    const bool single =
-        places == 1 && !rivals.empty() && *std::ranges::max_element(rivals) >= accepted.size();
+    const std::vector<std::size_t> rivals = find_rows(rejected).sizes;
+    const std::size_t places = find_rows(accepted).sizes.size();
+    const std::size_t largest_rival = rivals.empty() ? 0 : std::ranges::max(rivals);
+    const bool single = places == 1 && largest_rival > 0 && largest_rival >= accepted.size();
     EdgeSetOffer& counted = entry->second;
     counted.places = static_cast<std::uint32_t>(places);
-    counted.contradicted = single || (places > 1 && count_rival_places(all, kept) >= places);
+    counted.contradicted = single || (places > 1 && count_rival_rows(all, kept) >= places);
+    // Two placements that differ by less than two rows.
+    if (places > 1 && static_cast<double>(largest_rival) >= kVotesOfPlace) --counted.places;
   }
   offer = entry->second;
 }

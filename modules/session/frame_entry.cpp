@@ -29,7 +29,7 @@ std::optional<std::vector<SE3>> moved_into_frame(const std::vector<SE3>& poses, 
     const SE3& T_own_kf = poses[e.end_on(self).index];
     candidates.push_back(T_frame_other * T_other_kf * T_own_kf.inverse() * T_own_centre);
   }
-  const auto alignment = align_frames(candidates, find_places(usable).weights());
+  const auto alignment = align_frames(candidates, find_places(usable).votes());
   const SE3 T_frame_own = alignment->T * T_own_centre.inverse();
   std::vector<SE3> moved;
   moved.reserve(poses.size());

@@ -11,8 +11,8 @@
 namespace km {
 
 /// A tie of two robots: closures between them that are not rejected, or one datum in which both are
-/// located. `places` is the number of places of these closures, see find_places(). A datum counts
-/// as two places.
+/// located. `places` is the number of rows of these closures, see find_rows(). A datum counts as
+/// two rows.
 struct RobotTie {
   RobotId a = 0;  ///< a < b.
   RobotId b = 0;
@@ -22,7 +22,7 @@ struct RobotTie {
 };
 
 /// The ties between all robots of `statuses` (by robot), ascending. Both robots of a pair report
-/// the number of places of their closures in their statuses. While the two numbers differ, the
+/// the number of rows of their closures in their statuses. While the two numbers differ, the
 /// lower one counts. With `solved`, the plan of the last session with a solution: a pair of its
 /// members that has found its first closures since is not tied. The solution lacks these closures
 /// and may place the two robots anywhere, until the next session.
@@ -31,7 +31,7 @@ struct RobotTie {
 
 /// Robots whose pose relative to one robot is not certain.
 struct FrameTies {
-  /// Only a tie of a single place connects these robots to the one robot. All closures of a place
+  /// Only a tie of a single row connects these robots to the one robot. All closures of a row
   /// may be false together; then the relative pose is wrong.
   std::vector<RobotId> tentative = {};
   /// No tie connects these robots to the one robot, or only a contradicted tie. Their pose relative
@@ -40,11 +40,11 @@ struct FrameTies {
   bool operator==(const FrameTies&) const = default;
 };
 
-/// Classifies `members` (ascending) relative to the robot `self`. A tie of one place is certain if
+/// Classifies `members` (ascending) relative to the robot `self`. A tie of one row is certain if
 /// other ties connect its two robots, too, because closures that contradict each other along a loop
-/// of robots are rejected. A contradicted tie of several places ties nothing: in a hall of equal
-/// aisles, false closures may agree along such a loop, too. O(ties^2) for robots with one place
-/// each.
+/// of robots are rejected. A contradicted tie of several rows ties nothing: in a hall of equal
+/// aisles, false closures may agree along such a loop, too. The cost is O(ties^2) if each robot has
+/// one row.
 [[nodiscard]] FrameTies frame_ties(RobotId self, std::span<const RobotId> members,
                                    std::span<const RobotTie> ties);
 

@@ -24,20 +24,20 @@ namespace {
 // chordal start.
 constexpr std::size_t kEnoughForChordal = 20;
 
-// True if more than half of the places of `closures` agree with the poses. O(n log n), unlike the
+// True if more than half of the votes of `closures` agree with the poses. O(n log n), unlike the
 // search for the transform on which most of them agree.
 bool fits(std::span<const PoseEdge> closures, const std::vector<SE3>& poses) {
-  const ClosurePlaces places = find_places(closures);
-  const std::vector<double> weights = places.weights();
-  double agreeing = 0.0;
+  const std::vector<double> votes = find_places(closures).votes();
+  double agreeing = 0.0, all = 0.0;
   for (std::size_t k = 0; k < closures.size(); ++k) {
     const PoseEdge& e = closures[k];
     const SE3 error = poses[e.to.index].inverse() * poses[e.from.index] * e.T_from_to;
     if (angle_of(error.linear()) <= kAlignedRotation_rad &&
         error.translation().norm() <= kAlignedTranslation_m)
-      agreeing += weights[k];
+      agreeing += votes[k];
+    all += votes[k];
   }
-  return 2.0 * agreeing > static_cast<double>(places.sizes.size());
+  return 2.0 * agreeing > all;
 }
 
 // The cost of `edges`, of which the first `steps` are odometry and the others closures. The cost of

@@ -33,11 +33,11 @@ struct EdgeSetOffer {
   RobotId peer = 0;
   std::uint32_t edges = 0;  ///< Number of closures, at least 1.
   EdgeSetId id;
-  /// Number of places (see find_places()) of the closures that the sender keeps; of all of them if
-  /// none has been weighed.
+  /// Number of rows (see find_rows()) of the closures that the sender keeps; of all of them if none
+  /// has been weighed. One less, but at least 1, if a row of three closures is rejected.
   std::uint32_t places = 0;
-  /// There is one such place, and a place with as many closures or more is rejected. Or there are
-  /// more places, and as many others or more agree with each other: count_rival_places().
+  /// There is one such row, and a row with as many closures or more is rejected. Or there are more
+  /// rows, and as many others or more agree with each other: count_rival_rows().
   bool contradicted = false;
   bool operator==(const EdgeSetOffer&) const = default;
 };

@@ -115,8 +115,17 @@ void plan_tree(SessionPlan& plan, const std::map<RobotId, TeamStatus>& statuses,
                const TeamLinks& links) {
   std::set<RobotId> members;
   for (const SessionMember& member : plan.members) members.insert(member.peer.robot);
-  const RobotTree tree = choose_tree(members, closures_of(plan, statuses), links);
-  const auto parents = parents_below(centre_of(members, tree), tree);
+  const PairClosures closures = closures_of(plan, statuses);
+  const RobotTree tree = choose_tree(members, closures, links);
+  // The rounding of steps depends on the root, so measured quantities choose it.
+  const auto rank = [&](RobotId robot) {
+    std::uint64_t count = 0;
+    for (const auto& [pair, edges] : closures)
+      if (pair.first == robot || pair.second == robot) count += edges;
+    return std::pair(count, statuses.at(robot).keyframes);
+  };
+  const auto [lower, upper] = centre_of(members, tree);
+  const auto parents = parents_below(rank(upper) > rank(lower) ? upper : lower, tree);
   const std::map<RobotId, RobotId> parent_of(parents.begin(), parents.end());
   for (SessionMember& member : plan.members) {
     const auto parent = parent_of.find(member.peer.robot);

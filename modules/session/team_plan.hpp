@@ -27,7 +27,8 @@ namespace km {
 [[nodiscard]] SessionPlan plan_session(const std::map<RobotId, TeamStatus>& statuses, RobotId self);
 
 /// Sets the parents in `plan`, made from `statuses`: the tree of choose_tree(), weighted by agreed
-/// edges, with the root centre_of() it.
+/// edges, with the root centre_of() it. If there are two, the one with more closures to others is
+/// the root, or with as many the one with more keyframes. Ids decide if these are equal, too.
 void plan_tree(SessionPlan& plan, const std::map<RobotId, TeamStatus>& statuses,
                const TeamLinks& links);
 

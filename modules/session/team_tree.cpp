@@ -117,7 +117,7 @@ double messages_of(const RobotTree& tree, const std::set<RobotId>& robots,
   // With 6 unknowns per closure: second derivatives are 6 x 6 / 2 x 4 bytes times the square, sent
   // once or twice. A gradient and a step have 6 x (8 + 4) bytes, in about 25 rounds.
   constexpr double kGradients = 25.0;
-  const auto parents = parents_below(centre_of(robots, tree), tree);
+  const auto parents = parents_below(centre_of(robots, tree).first, tree);
   const std::map<RobotId, RobotId> parent_of(parents.begin(), parents.end());
   std::map<RobotId, std::uint64_t> cut;  // on the edge to the parent
   for (const auto& [pair, count] : closures) {
@@ -202,14 +202,14 @@ std::vector<std::pair<RobotId, RobotId>> parents_below(RobotId root, const Robot
 }
 
 // The middle of a longest path. From any robot, the farthest one is an end of such a path.
-RobotId centre_of(const std::set<RobotId>& robots, const RobotTree& tree) {
+std::pair<RobotId, RobotId> centre_of(const std::set<RobotId>& robots, const RobotTree& tree) {
   const auto path_to_farthest = [&](RobotId from) {
     const auto parents = parents_below(from, tree);
     const std::map<RobotId, RobotId> parent_of(parents.begin(), parents.end());
     return path_up(parents.empty() ? from : parents.back().first, parent_of);
   };
   const std::vector<RobotId> longest = path_to_farthest(path_to_farthest(*robots.begin()).front());
-  return std::min(longest[(longest.size() - 1) / 2], longest[longest.size() / 2]);
+  return std::minmax(longest[(longest.size() - 1) / 2], longest[longest.size() / 2]);
 }
 
 }  // namespace km

@@ -40,7 +40,9 @@ using RobotTree = std::map<RobotId, std::vector<RobotId>>;
 [[nodiscard]] std::vector<std::pair<RobotId, RobotId>> parents_below(RobotId root,
                                                                      const RobotTree& tree);
 
-/// The robot from which the farthest robot is nearest; the lowest id of several.
-[[nodiscard]] RobotId centre_of(const std::set<RobotId>& robots, const RobotTree& tree);
+/// The robot from which the farthest robot is nearest, twice; or the two such robots, the lower id
+/// first.
+[[nodiscard]] std::pair<RobotId, RobotId> centre_of(const std::set<RobotId>& robots,
+                                                    const RobotTree& tree);
 
 }  // namespace km

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <vector>
 
@@ -36,28 +37,47 @@ AlignedOdometry aligned(KeyframeIndex a, KeyframeIndex b, const SE3& T_a_b) {
   return align_odometry(closure_for(a, b, T_a_b));
 }
 
-TEST_CASE("Closures within ten keyframes at both ends form one place", "[closure_places]") {
-  const std::vector<PoseEdge> closures{closure({0, 100}, {1, 200}), closure({0, 110}, {1, 190}),
-                                       closure({0, 111}, {1, 200}), closure({0, 100}, {1, 211}),
-                                       closure({0, 105}, {2, 200}), closure({0, 100}, {0, 200})};
-  const ClosurePlaces places = find_places(closures);
-  CHECK(places.place_of[0] == places.place_of[1]);
-  CHECK(places.sizes.size() == 5);
-  for (std::size_t k = 2; k < closures.size(); ++k) CHECK(places.sizes[places.place_of[k]] == 1);
-  CHECK(places.weights() == std::vector<double>{0.5, 0.5, 1.0, 1.0, 1.0, 1.0});
-}
-
-TEST_CASE("Places do not depend on the order or the direction of closures", "[closure_places]") {
+TEST_CASE("A place extends ten keyframes from its first closure, and a row to its last neighbour",
+          "[closure_places]") {
   std::vector<PoseEdge> closures;
-  for (KeyframeIndex k = 0; k < 30; ++k)  // a run: three places of 11, 11 and 8 keyframes
+  for (KeyframeIndex k = 0; k < 30; ++k)
     closures.push_back(k % 2 == 0 ? closure({0, 50 + k}, {1, 80 - k})
                                   : closure({1, 80 - k}, {0, 50 + k}));
-  const ClosurePlaces upwards = find_places(closures);
-  CHECK(upwards.sizes == std::vector<std::size_t>{11, 11, 8});
-  const std::vector<PoseEdge> reversed(closures.rbegin(), closures.rend());
-  const ClosurePlaces downwards = find_places(reversed);
-  for (std::size_t k = 0; k < closures.size(); ++k)
-    CHECK(upwards.place_of[k] == downwards.place_of[closures.size() - 1 - k]);
+  CHECK(find_rows(closures).sizes == std::vector<std::size_t>{30});
+  CHECK(find_places(closures).sizes == std::vector<std::size_t>{11, 11, 8});
+  closures.erase(closures.begin() + 10, closures.begin() + 20);
+  CHECK(find_rows(closures).sizes == std::vector<std::size_t>{10, 10});
+}
+
+TEST_CASE("Rows join closures that are near each other on both robots", "[closure_places]") {
+  const std::vector<PoseEdge> closures{closure({0, 100}, {1, 200}), closure({0, 110}, {1, 190}),
+                                       closure({0, 121}, {1, 190}), closure({0, 100}, {1, 211}),
+                                       closure({0, 105}, {2, 200}), closure({0, 100}, {0, 200})};
+  const ClosureGroups rows = find_rows(closures);
+  CHECK(rows.group_of[0] == rows.group_of[1]);
+  CHECK(rows.sizes.size() == 5);
+  CHECK(rows.weights() == std::vector<double>{0.5, 0.5, 1.0, 1.0, 1.0, 1.0});
+  CHECK(rows.votes() == std::vector<double>(6, 1.0));
+}
+
+TEST_CASE("Rows and places depend on neither order, direction nor ids of robots",
+          "[closure_places]") {
+  std::vector<PoseEdge> closures, renamed;
+  for (KeyframeIndex k = 0; k < 40; ++k) {
+    if (k / 5 % 3 == 2) continue;
+    closures.push_back(closure({0, 20 + 2 * k}, {1, 90 - k}));
+    renamed.push_back(closure({0, 90 - k}, {1, 20 + 2 * k}));
+  }
+  std::ranges::reverse(renamed);
+  CHECK(first_robot(closures) == 0);
+  CHECK(first_robot(renamed) == 1);
+  for (const auto find : {find_rows, find_places}) {
+    const ClosureGroups groups = find(closures), others = find(renamed);
+    REQUIRE(groups.sizes.size() == others.sizes.size());
+    for (std::size_t k = 0; k < closures.size(); ++k)
+      CHECK(groups.sizes[groups.group_of[k]] ==
+            others.sizes[others.group_of[closures.size() - 1 - k]]);
+  }
 }
 
 TEST_CASE("A closure aligns the odometry of two robots, in either direction", "[closure_places]") {
@@ -82,30 +102,30 @@ TEST_CASE("Closures of several places that agree on another relative pose are ri
                                    aligned(1, 7, aisle),           aligned(20, 22, aisle),
                                    aligned(50, 20, turned),        aligned(70, 1, turned)};
   const std::vector<ClosureId> kept{all.front().closure};
-  CHECK(count_rival_places(all, kept) == 4);
+  CHECK(count_rival_rows(all, kept) == 4);
   all.pop_back();
-  CHECK(count_rival_places(all, kept) == 2);
+  CHECK(count_rival_rows(all, kept) == 2);
   all.erase(all.begin() + 3);
-  CHECK(count_rival_places(all, kept) == 0);  // one place
+  CHECK(count_rival_rows(all, kept) == 0);  // one row
   const std::vector<ClosureId> everything{all[0].closure, all[1].closure, all[2].closure,
                                           all[3].closure};
-  CHECK(count_rival_places(all, everything) == 0);
+  CHECK(count_rival_rows(all, everything) == 0);
 }
 
 TEST_CASE("Closures that err a little, or all differently, are no rivals", "[closure_places]") {
-  CHECK(count_rival_places({}, {}) == 0);
+  CHECK(count_rival_rows({}, {}) == 0);
   const SE3 little = translation({0.9, 0.0, 0.0}), more = translation({1.9, 0.0, 0.0});
   std::vector<AlignedOdometry> all{aligned(20, 20, SE3::Identity()), aligned(15, 20, little),
                                    aligned(25, 25, little)};
   const std::vector<ClosureId> kept{all.front().closure};
-  CHECK(count_rival_places(all, kept) == 0);
+  CHECK(count_rival_rows(all, kept) == 0);
   all.push_back(aligned(0, 20, more));
   all.push_back(aligned(35, 25, more));
-  CHECK(count_rival_places(all, kept) == 2);
+  CHECK(count_rival_rows(all, kept) == 2);
   std::vector<AlignedOdometry> different;
   for (KeyframeIndex k = 0; k < 80; k += 2)
     different.push_back(aligned(k, k, translation({3.0 + 2.0 * k, 0.0, 0.0})));
-  CHECK(count_rival_places(different, {}) == 0);
+  CHECK(count_rival_rows(different, {}) == 0);
 }
 
 }  // namespace

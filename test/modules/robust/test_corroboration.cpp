@@ -160,6 +160,15 @@ TEST_CASE("The noise of closures is estimated from pairs of closures", "[pose_gr
   CHECK(all->consistent >= share - 0.08);  // measured: 0.072
 }
 
+TEST_CASE("Cycles that count are spread over all closures", "[pose_graph]") {
+  Lanes lanes(3, 1.0, 1);
+  for (int k = 0; k < kKeyframes; ++k) k < 40 ? lanes.add_false(k, k, false) : lanes.add_true(k, k);
+  const auto noise = lanes.noise_scale(60);
+  REQUIRE(noise);
+  CHECK(noise->lengths == 60);
+  CHECK(noise->consistent == Approx(260.0 / 300.0).margin(0.1));
+}
+
 TEST_CASE("Too few closures give no estimate of their noise", "[pose_graph]") {
   Lanes lanes(GENERATE(2, 3), 1.0, 3);
   CHECK_FALSE(lanes.noise_scale());

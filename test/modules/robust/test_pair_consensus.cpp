@@ -1,5 +1,6 @@
+#include <algorithm>
+#include <array>
 #include <catch2/catch.hpp>
-#include <set>
 
 #include "modules/core/lie.hpp"
 #include "modules/robust/pair_consensus.hpp"
@@ -20,7 +21,8 @@ PairMotions pairs_of(const std::map<RobotId, SE3>& moved) {
         pairs[{a, b}] = {.T = SinglePose::of(T_a * T_b.inverse()),
                          .centre = {1.0 * a, 2.0 * b, 0.0},
                          .radius_m = 5.0,
-                         .spread_m = 0.1};
+                         .spread_m = 0.1,
+                         .consistent_m = 1.0};
   return pairs;
 }
 
@@ -47,7 +49,7 @@ TEST_CASE("pairs of the other robots move robots that one of four has misplaced"
   PairMotions pairs = pairs_of(moved);
   for (auto& [robots, pair] : pairs)  // closures of the misbehaving robot fit the present places
     if (robots.first == liar || robots.second == liar) pair.T = {};
-  const std::map<RobotId, SE3> moves = better_placement(pairs);
+  const std::map<RobotId, SE3> moves = common_placement(pairs);
   REQUIRE(moves.size() == 4);
   for (const auto& [robots, pair] : pairs) {
     if (robots.first == liar || robots.second == liar) continue;
@@ -59,20 +61,19 @@ TEST_CASE("pairs of the other robots move robots that one of four has misplaced"
 TEST_CASE("pairs with inconsistent closures have no vote", "[pose_graph][pair_consensus]") {
   PairMotions pairs = pairs_of(
       {{1, SE3::Identity()}, {2, shifted(50.0)}, {3, shifted(-50.0)}, {4, SE3::Identity()}});
+  for (auto& [robots, pair] : pairs) pair.strength = {1.0, 1.0};
+  CHECK(usual_strength(pairs).tau < kUnlimited.tau);
   for (auto& [robots, pair] : pairs)
-    if (robots.first == 1) pair.T = {};
-  CHECK_FALSE(better_placement(pairs).empty());
-  for (auto& [robots, pair] : pairs)
-    if (robots.first != 1) pair.spread_m = 0.3 * pair.radius_m;
-  CHECK(better_placement(pairs).empty());
+    if (robots.first != 1) pair.spread_m = 1.1 * pair.consistent_m;
   CHECK(usual_strength(pairs).tau == kUnlimited.tau);
 }
 
 TEST_CASE("robots placed by a pair without a vote move to the place given by other pairs",
           "[pose_graph][pair_consensus]") {
   PairMotions pairs = pairs_of({{1, SE3::Identity()}, {2, shifted(50.0)}, {3, SE3::Identity()}});
-  pairs[{1, 3}].spread_m = pairs[{1, 3}].radius_m;
-  const std::map<RobotId, SE3> moves = better_placement(pairs);
+  pairs[{1, 3}].T = SinglePose::of(shifted(20.0));
+  pairs[{1, 3}].spread_m = 2.0 * pairs[{1, 3}].consistent_m;
+  const std::map<RobotId, SE3> moves = common_placement(pairs);
   REQUIRE(moves.size() == 3);
   CHECK(moves.at(1).isApprox(SE3::Identity()));
   CHECK(moves.at(2).isApprox(shifted(-50.0)));
@@ -110,7 +111,10 @@ TEST_CASE("pairs are not limited if no robot can be outvoted", "[pose_graph][pai
   }
   SECTION("all pairs contradict each other") {
     std::erase_if(pairs, [](const auto& entry) { return entry.first.first != 1; });
-    pairs[{2, 3}] = {.T = SinglePose::of(shifted(50.0)), .spread_m = 0.1, .strength = {1.0, 1.0}};
+    pairs[{2, 3}] = {.T = SinglePose::of(shifted(50.0)),
+                     .spread_m = 0.1,
+                     .consistent_m = 1.0,
+                     .strength = {1.0, 1.0}};
   }
   SECTION("no team") {
     pairs.clear();
@@ -143,7 +147,50 @@ TEST_CASE("the motion of a pair is the one on which most closures agree",
   CHECK_FALSE(motion_of_pair({}, 2, [](const KeyframeId&) { return SE3::Identity(); }));
 }
 
-TEST_CASE("three places that agree give a pair a vote among many closures that do not",
+TEST_CASE("third robots decide between two motions of a pair with nearly equal votes",
+          "[pose_graph][pair_consensus]") {
+  const SE3 still = SE3::Identity();
+  PairMotions pairs = pairs_of({{1, still}, {2, still}, {3, still}});
+  pairs[{1, 3}].rival = pairs[{1, 3}].T;
+  pairs[{1, 3}].rival_centre = pairs[{1, 3}].centre;
+  pairs[{1, 3}].T = SinglePose::of(shifted(20.0));
+  pairs[{1, 3}].votes = 8.0;
+  pairs[{1, 3}].rival_votes = GENERATE(1.5, 3.0);
+  const bool certain = pairs[{1, 3}].rival_votes < 2.0;
+  pairs[{1, 2}].votes = pairs[{2, 3}].votes = 3.0;
+  const std::map<RobotId, SE3> moves = common_placement(pairs);
+  CHECK(moves.at(3).isApprox(certain ? shifted(20.0) : still));
+}
+
+TEST_CASE("the motion of a pair is the same with exchanged ids", "[pose_graph][pair_consensus]") {
+  std::mt19937 rng(5);
+  const SE3 T = random_pose(rng, 30.0);
+  const std::array<KeyframeIndex, 2> first{100, 0};
+  std::map<KeyframeId, SE3> poses, renamed;
+  std::vector<PoseEdge> closures, others;
+  for (KeyframeIndex k = 0; k < 300; ++k) {
+    const SE3 a = random_pose(rng), b = random_pose(rng);
+    const SE3 T_a_b = a.inverse() * (k % 3 == 0 ? random_pose(rng, 30.0) : T) * b;
+    poses[{2, first[0] + k}] = renamed[{5, first[0] + k}] = a;
+    poses[{5, first[1] + 2 * k}] = renamed[{2, first[1] + 2 * k}] = b;
+    closures.push_back({{2, first[0] + k}, {5, first[1] + 2 * k}, T_a_b, {2.0, 3.0}});
+    others.push_back({{5, first[0] + k}, {2, first[1] + 2 * k}, T_a_b, {2.0, 3.0}});
+  }
+  std::ranges::reverse(others);
+  const auto one = motion_of_pair(closures, 2, [&](const KeyframeId& id) { return poses.at(id); });
+  const auto other =
+      motion_of_pair(others, 2, [&](const KeyframeId& id) { return renamed.at(id); });
+  REQUIRE((one && other));
+  CHECK(one->T.pose().isApprox(other->T.pose().inverse(), kTolerance));
+  CHECK(one->centre.isApprox(one->T.pose() * other->centre, kTolerance));
+  CHECK(one->radius_m == Approx(other->radius_m));
+  CHECK(one->spread_m == Approx(other->spread_m));
+  CHECK(one->votes == Approx(other->votes));
+  CHECK(one->rival.pose().isApprox(other->rival.pose().inverse(), kTolerance));
+  CHECK(one->rival_centre.isApprox(one->rival.pose() * other->rival_centre, kTolerance));
+}
+
+TEST_CASE("three rows that agree give a pair a vote among many closures that do not",
           "[pose_graph][pair_consensus]") {
   std::mt19937 rng(4);
   const SE3 T = random_pose(rng, 30.0);

@@ -22,6 +22,7 @@ TreeSums some_sums() {
                 .cost = 17.25,
                 .decrement = 1e-300,
                 .largest = 4.5F,
+                .largest_of_all = 5.5F,
                 .open = 300,
                 .changed = 7,
                 .fractional = 1,
@@ -36,12 +37,19 @@ TreeSums some_sums() {
                  .used = 12,
                  .motion = {.T = {.t = {1.0F, 2.0F, 3.0F}},
                             .centre = {4.0, 5.0, 1.0 / 3.0},
+                            .rival = {.t = {-1.0F, 2.0F, 3.0F}},
+                            .rival_centre = {-4.0, 0.0, 1e-3},
                             .radius_m = 6.0,
                             .spread_m = 0.7,
+                            .consistent_m = 1.5,
+                            .votes = 4.25,
+                            .rival_votes = 3.5,
                             .strength = {.kappa = 8.5, .tau = 1e-3}},
                  .noise = 1.75F},
                 {.a = 1, .b = 60000, .used = 0},
                 {.a = 3, .b = 9, .used = 70000}};
+  sums.pulls = {{.a = 1, .b = 2, .sum = {0.5, -3.0, 1.0 / 3.0}, .weight = 9.5, .closures = 3.0},
+                {.a = 1, .b = 3}};
   return sums;
 }
 
@@ -110,6 +118,7 @@ DownMessage some_down_message(TreeVerdict::Next next, TreeVerdict::Weighing weig
                      .moves = {{7, {.t = {1.0F, 2.0F, 3.0F}}}, {9, {}}},
                      .odometry = {{1, 2.5}, {4, 1.0}},
                      .usual_pair = {.kappa = 12.5, .tau = 1e-7},
+                     .released = {{1, 2}, {1, 300}},
                      .cost = 1687.0,
                      .gradient = 1e-9,
                      .drift = {1.0, -2.0, 3.0, 0.0, 1e-200, 6.0}};
@@ -211,6 +220,7 @@ std::vector<Bytes> one_of_each() {
 std::size_t held_by(const UpMessage& message) {
   std::size_t bytes = sizeof(message) + 64 * message.sums.lengths.size() +
                       sizeof(PairVote) * message.sums.votes.capacity() +
+                      sizeof(PairPull) * message.sums.pulls.capacity() +
                       sizeof(NewWeight) * message.weights.capacity() +
                       sizeof(double) * static_cast<std::size_t>(message.reduced.size());
   if (!message.system) return bytes;
@@ -223,6 +233,7 @@ std::size_t held_by(const UpMessage& message) {
 
 std::size_t held_by(const DownMessage& message) {
   return sizeof(message) + sizeof(message.verdict.moves[0]) * message.verdict.moves.capacity() +
+         sizeof(message.verdict.released[0]) * message.verdict.released.capacity() +
          sizeof(double) * static_cast<std::size_t>(message.step.size());
 }
 

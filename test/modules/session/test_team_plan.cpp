@@ -125,6 +125,21 @@ TEST_CASE("ties join the members of each datum to the lowest one", "[pose_graph]
   CHECK(datum_ties(without_7, 7).empty());
 }
 
+TEST_CASE("closures and keyframes decide which of two robots in the middle is the root",
+          "[pose_graph][session]") {
+  const TeamLinks links = links_of({{1, 2}, {2, 3}, {3, 4}});
+  const auto root_of = [&](const std::vector<std::uint32_t>& edges, std::uint32_t keyframes_of_3) {
+    auto statuses = chain_of({1, 2, 3, 4}, edges);
+    statuses.at(3).keyframes = statuses.at(2).keyframes + keyframes_of_3;
+    const auto parents = parents_of(planned(statuses, links, 1));
+    return parents.contains(2) ? 3 : 2;
+  };
+  CHECK(root_of({3, 5, 4}, 0) == 3);
+  CHECK(root_of({4, 5, 3}, 1) == 2);
+  CHECK(root_of({3, 5, 3}, 1) == 3);
+  CHECK(root_of({3, 5, 3}, 0) == 2);
+}
+
 TEST_CASE("the tree follows links with the most agreed edges, its root in the middle",
           "[pose_graph][session]") {
   const auto statuses = chain_of({1, 2, 3, 4, 5}, {5, 5, 5, 5});
