@@ -24,7 +24,7 @@ bool is_tied_to_earlier_runs(const AgentState& s) {
   });
   // Places of the present run: a short run before it may have a single place.
   for (PoseEdge& e : across) (e.from.index < e.to.index ? e.from : e.to).index = 0;
-  return find_rows(across).sizes.size() >= kLeastPlaces;
+  return find_places(across).sizes.size() >= kLeastPlaces;
 }
 
 // This robot if it is located in a datum. Otherwise the lowest robot with this property that

@@ -170,7 +170,7 @@ TEST_CASE("The laboratory links only libraries that are installed", "[layers]") 
       text.append(std::istreambuf_iterator<char>(stream), {});
     }
   for (const std::string& name : internal_targets(text)) FAIL_CHECK(name);
-  CHECK(matches(text, "(kimera_multi::[a-z_]+)").size() > 10);
+  CHECK_FALSE(matches(text, "(kimera_multi::[a-z_]+)").empty());
   // CMake refuses kimera_multi::<name> unless modules/install.cmake exports it.
   CHECK(internal_targets("km_module(a LINK km_b kimera_multi::c)\nkm_app(d LINK km_a)") ==
         std::set<std::string>{"km_b"});
