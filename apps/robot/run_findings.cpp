@@ -141,14 +141,15 @@ void add_tentative(std::span<const RunFacts> runs, const Names& names,
     for (const RobotId other : run.summary.pgo.tentative) {
       const auto pair = std::minmax(run.summary.robot, other);
       if (!reported.insert(pair).second) continue;
-      findings.push_back({.id = "team.tentative",
-                          .severity = Severity::kWarning,
-                          .what = name_of(names, pair.first) + " and " +
-                                  name_of(names, pair.second) +
-                                  " are joined tentatively: all their closures are at one place",
-                          .means = "if this place only looks like another one, their relative pose "
-                                   "is wrong",
-                          .to_do = "let them meet at a second place"});
+      findings.push_back(
+          {.id = "team.tentative",
+           .severity = Severity::kWarning,
+           .what =
+               name_of(names, pair.first) + " and " + name_of(names, pair.second) +
+               " are joined tentatively: all their closures are along one stretch of their paths",
+           .means = "if this place only looks like another one, their relative pose "
+                    "is wrong",
+           .to_do = "let them meet at another place, too"});
     }
 }
 

@@ -118,8 +118,9 @@ RosDiagnosticStatus team_status(const OptimizerProgress& progress) {
   status.message = is_certain                            ? "ok"
                    : progress.fixes && !progress.located ? "not yet located by its fixes"
                    : !progress.located                   ? "not yet localised in the finished map"
-                   : progress.not_joined.empty()         ? "a single place ties robots to this one"
-                                                 : "no accepted closure ties robots to this one";
+                   : progress.not_joined.empty()
+                       ? "a single stretch of their paths ties robots to this one"
+                       : "no accepted closure ties robots to this one";
   return status;
 }
 
