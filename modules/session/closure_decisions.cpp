@@ -62,7 +62,9 @@ void ClosureDecisions::count_places(EdgeSetOffer& offer, std::span<const PoseEdg
     }
     std::ranges::transform(accepted, std::back_inserter(kept), &PoseEdge::id);
     const std::vector<std::size_t> rivals = find_rows(rejected).sizes;
-    const std::size_t places = find_rows(accepted).sizes.size();
+    // Robots that share one way have one row. It counts by its places while nothing contradicts it.
+    const ClosureGroups groups = rejected.empty() ? find_places(accepted) : find_rows(accepted);
+    const std::size_t places = groups.sizes.size();
     const std::size_t largest_rival = rivals.empty() ? 0 : std::ranges::max(rivals);
     const bool single = places == 1 && largest_rival > 0 && largest_rival >= accepted.size();
     EdgeSetOffer& counted = entry->second;

@@ -102,6 +102,19 @@ TEST_CASE("Robots that closures at one place join are tentative, and report it",
   }
 }
 
+TEST_CASE("Robots that share one way are certain unless a closure between them is rejected",
+          "[pose_graph][tentative]") {
+  const bool contradicted = GENERATE(false, true);
+  std::set<std::uint32_t> at;
+  for (std::uint32_t k = 5; k < 30; k += 2) at.insert(k);
+  TeamProblem problem = team_of_three(1, at);
+  if (contradicted) (void)add_false(problem, 38, 1);
+  TeamNetwork network;
+  add_robots(network, problem);
+  REQUIRE(settle_and_report(network));
+  CHECK(progress_of(network, 2).tentative == (contradicted ? Robots{4, 6} : Robots{}));
+}
+
 TEST_CASE(
     "A place that is mistaken for another joins robots tentatively until two others correct it",
     "[pose_graph][tentative]") {
