@@ -437,8 +437,8 @@ std::optional<RelativeMotion> FixedLagSmoother::relative_pose(Stamp from, Stamp 
   D_T.middleRows<6>(15 * (b - window_.frames.data())) += Matrix6::Identity();
   WindowEquations equations(window_, 0.0);
   equations.add_all();
-  const Eigen::MatrixXd H = equations.H().selfadjointView<Eigen::Lower>();
-  const Eigen::LLT<Eigen::MatrixXd> llt(H);
+  Eigen::MatrixXd H = equations.H();
+  const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> llt(H);
   if (llt.info() != Eigen::Success) return std::nullopt;
   const Eigen::MatrixXd X = llt.solve(D_T);
   result.Sigma = D_T.transpose() * X;

@@ -300,7 +300,10 @@ double WindowEquations::error_ratio(const Eigen::Matrix<double, Eigen::Dynamic, 
   const Eigen::MatrixXd H = images_H_.selfadjointView<Eigen::Lower>();
   const Matrix6 assumed = x.transpose() * H * x;
   const auto landmarks = static_cast<double>(eliminated_.size());
-  const double ratio = landmarks / (landmarks - 6.0) * assumed.ldlt().solve(scatter).trace() / 6.0;
+  // Six unknowns are fitted. With less than twelve landmarks this correction ends, before it is
+  // infinite.
+  const double unbiased = landmarks / std::max(landmarks - 6.0, 0.5 * landmarks);
+  const double ratio = unbiased * assumed.ldlt().solve(scatter).trace() / 6.0;
   return landmarks >= kLeastLandmarks && ratio > 0.0 ? ratio : std::max(1.0, ratio);
 }
 

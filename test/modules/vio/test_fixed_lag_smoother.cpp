@@ -178,13 +178,13 @@ struct ModelledRun {
 };
 
 // Noise in images and samples, and errors of the guessed biases, all as modelled.
-ModelledRun run_as_modelled(unsigned seed, const VioConfig& config) {
+ModelledRun run_as_modelled(unsigned seed, const VioConfig& config, std::size_t landmarks = 40) {
   constexpr double kGyroBiasSigma = 0.02;  // around the guess of a start
   std::mt19937 rng(seed + 300);
   SyntheticMotion motion;
   motion.gyro_bias = kGyroBiasSigma * random_vector<3>(rng);
   motion.accel_bias = config.accel_bias_sigma * random_vector<3>(rng);
-  SyntheticWorld world(motion, seed + 200, 40);
+  SyntheticWorld world(motion, seed + 200, landmarks);
   std::vector<InertialFrame> frames = world.frames(50, 0.5);
   add_inertial_noise(frames, config, rng);
   std::vector<OdometryState> guess = world.states(kStartImages);
@@ -235,6 +235,18 @@ TEST_CASE("Image points twice as noisy as assumed multiply the error ratio by fo
     ratio += relative->error_ratio / kRuns;
   }
   CHECK(ratio == Approx(4.0).epsilon(0.15));
+}
+
+TEST_CASE("Too few landmarks to measure the errors never make a covariance smaller", "[vio]") {
+  const auto landmarks = static_cast<std::size_t>(GENERATE(range(4, 24)));
+  CAPTURE(landmarks);
+  const ModelledRun run = run_as_modelled(1, gaussian_config(), landmarks);
+  const auto& frames = run.smoother.window().frames;
+  const auto relative =
+      run.smoother.relative_pose(frames.front().state.stamp, frames.back().state.stamp);
+  REQUIRE(relative);
+  CHECK(relative->error_ratio >= 1.0);
+  CHECK(relative->error_ratio < 10.0);
 }
 
 TEST_CASE("A gyroscope that is noisier than assumed has less weight", "[vio]") {
