@@ -172,10 +172,9 @@ double log_odds_of_two(std::span<const NoiseCycle> cycles, std::span<const doubl
                        double usual, double s, double odometry) {
   std::vector<double> wide, shorter;
   for (const NoiseCycle& cycle : cycles) wide.push_back(log_ratio_of(cycle, s, odometry));
-  const double share = fit_cycle_mixture(wide, weights).share;
+  const CycleMixture one = fit_cycle_mixture(wide, weights);
   for (std::size_t k = 0; k < cycles.size(); ++k)
-    shorter.push_back(log_ratio_of(cycles[k], usual, odometry) -
-                      std::log(share * std::exp(wide[k]) + 1.0 - share));
+    shorter.push_back(log_ratio_of(cycles[k], usual, odometry) - one.log_density(wide[k]));
   return fit_cycle_mixture(shorter, weights).log_likelihood;
 }
 

@@ -24,6 +24,10 @@ double CycleMixture::true_probability(double log_ratio) const {
   return share * ratio / (share * ratio + 1.0 - share);
 }
 
+double CycleMixture::log_density(double log_ratio) const {
+  return std::log(share * ratio_of(log_ratio) + 1.0 - share);
+}
+
 CycleMixture fit_cycle_mixture(std::span<const double> log_ratio, std::span<const double> weight) {
   CycleMixture mixture;
   double total = 0.0;
@@ -36,8 +40,7 @@ CycleMixture fit_cycle_mixture(std::span<const double> log_ratio, std::span<cons
     mixture.share = std::clamp(sum / total, kLeastShare, 1.0 - kLeastShare);
   }
   for (std::size_t k = 0; k < log_ratio.size(); ++k)
-    mixture.log_likelihood +=
-        weight[k] * std::log(mixture.share * ratio_of(log_ratio[k]) + 1.0 - mixture.share);
+    mixture.log_likelihood += weight[k] * mixture.log_density(log_ratio[k]);
   return mixture;
 }
 

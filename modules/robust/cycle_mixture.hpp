@@ -15,6 +15,8 @@ struct CycleMixture {
 
   /// Probability that a cycle is true, from its log density ratio (true over false).
   [[nodiscard]] double true_probability(double log_ratio) const;
+  /// Log density of a cycle, relative to the cycle being false.
+  [[nodiscard]] double log_density(double log_ratio) const;
 };
 
 /// Fits the share of true cycles by expectation maximisation. `log_ratio[k]` is the log density of
