@@ -248,10 +248,11 @@ int conclude(const StoppedRun& run, std::optional<Watch>& watch, FinalRoom& room
     const auto fault = std::ranges::find(summary.noticed, Severity::kError, &Finding::severity);
     if (fault != summary.noticed.end()) end.odometry_fault = fault->what;
   }
-  for (Finding& path : path_findings(run)) {
-    log::warn("peers") << path.what;
-    summary.noticed.push_back(std::move(path));
-  }
+  if (!result.interrupted)  // a signal ends the robot at once
+    for (Finding& path : path_findings(run)) {
+      log::warn("peers") << path.what;
+      summary.noticed.push_back(std::move(path));
+    }
   end.lost_results = results.lost();
   summary.exit_reason = verdict_of(end).reason;
   summary.findings =
