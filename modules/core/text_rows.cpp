@@ -67,7 +67,7 @@ std::optional<TextRow> RowReader::next() {
     text_.remove_prefix(text_.substr(end).starts_with("\r\n") ? end + 2
                                                               : std::min(end + 1, text_.size()));
     line = trimmed(line.substr(0, line.find('#')));
-    if (line.empty() || line == "\"") continue;
+    if (line.empty() || line == "\"") continue;  // a quoted comment leaves its first quote
     return TextRow{line_, line.find(',') == line.npos ? split_at_blanks(line, max_fields_)
                                                       : split_at_commas(line, max_fields_)};
   }

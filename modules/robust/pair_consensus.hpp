@@ -62,10 +62,10 @@ inline constexpr Precision kUnlimited{.kappa = std::numeric_limits<double>::max(
 /// either.
 ///
 /// A pair is confirmed if the loop through some third robot closes. If the votes of the two motions
-/// of a pair differ by less than two rows of closures, the one that is confirmed by more robots
-/// counts. Motions are chained along the
-/// maximum spanning tree. Pairs with a vote come first, then those with more such robots, then
-/// those with more votes of closures. The lowest robot does not move. O(pairs * robots).
+/// of a pair differ by less than two places, the one that is confirmed by more robots counts.
+/// Motions are chained along the maximum spanning tree. Pairs with a vote come first, then those
+/// with more such robots, then those with more votes of closures. The lowest robot does not move.
+/// O(pairs * robots).
 [[nodiscard]] std::map<RobotId, SE3> common_placement(const PairMotions& pairs);
 
 /// Lower medians of kappa and of tau, independently. Precondition: `values` is not empty.

@@ -11,8 +11,8 @@
 namespace km {
 
 /// A tie of two robots: closures between them that are not rejected, or one datum in which both are
-/// located. `places` is the number of rows of these closures, see find_rows(). A datum counts as
-/// two rows.
+/// located. `places` is the number of rows of these closures, see find_rows(), or of their places
+/// if no closure between the robots is rejected. A datum counts as two.
 struct RobotTie {
   RobotId a = 0;  ///< a < b.
   RobotId b = 0;
@@ -22,7 +22,7 @@ struct RobotTie {
 };
 
 /// The ties between all robots of `statuses` (by robot), ascending. Both robots of a pair report
-/// the number of rows of their closures in their statuses. While the two numbers differ, the
+/// these numbers in their statuses. While the two numbers differ, the
 /// lower one counts. With `solved`, the plan of the last session with a solution: a pair of its
 /// members that has found its first closures since is not tied. The solution lacks these closures
 /// and may place the two robots anywhere, until the next session.

@@ -98,8 +98,7 @@ void TeamNotices::ties(const FrameTies& ties) {
   if (const std::string robots = added(ties.tentative, ties_.tentative); !robots.empty())
     add("joined tentatively with " + robots +
         ", by closures along a single stretch of their paths; closures at another place will "
-        "confirm or "
-        "correct it");
+        "confirm or correct it");
   if (const std::string robots = added(ties.not_joined, ties_.not_joined); !robots.empty())
     add("no accepted closure ties " + robots +
         " to this robot without a contradiction: their frames differ");
