@@ -116,11 +116,11 @@ struct ClosuresCommand {
     app.add_option("--dataset", dataset, "EuRoC/ASL folder: its left camera is the robots'")
         ->required();
     app.add_option("--max-translation", options.max_translation_m,
-                   "Error of a true pose, at most [m]")
+                   "A larger error is false unless the covariance explains it [m]")
         ->check(CLI::PositiveNumber)
         ->capture_default_str();
     app.add_option("--max-rotation", options.max_rotation_deg,
-                   "Error of a true pose, at most [deg]")
+                   "A larger error is false unless the covariance explains it [deg]")
         ->check(CLI::PositiveNumber)
         ->capture_default_str();
     app.add_option("--min-overlap", options.min_overlap, "Share of the image that is seen by both")
@@ -160,7 +160,8 @@ of true ones (precision), and the share of the possible ones that was found (rec
 
 A candidate is true if both keyframes see the same place: --min-overlap of either's image, at
 the median depth that the keyframe sees, lies in the other's. A verified closure and an inlier
-are true if the pose measured is off by at most --max-translation and --max-rotation.
+are false if the measured pose errs by more than --max-translation or --max-rotation and by more
+than its covariance explains (99.9 %).
 Recall counts pairs of keyframes of two robots that see the same place, and, as a system needs
 only one match per keyframe, keyframes that are part of such a pair.
 

@@ -32,13 +32,12 @@ void write_keyframes(std::ostream& out, const RunRecord& record) {
 }
 
 // The pose of `to` in the frame of `from`; nullopt without a measurement.
-std::optional<SE3> measured_pose(const RunRecord& record, const ClosureOutcome& outcome) {
+std::optional<UncertainPose> measured_pose(const RunRecord& record, const ClosureOutcome& outcome) {
   const auto closure = record.closures().find(outcome.id);
   if (outcome.stage < ClosureStage::kVerified || closure == record.closures().end())
     return std::nullopt;
-  const RelativePose& measured = closure->second;
-  const bool same_way = measured.from == outcome.id.from;
-  return same_way ? measured.T_from_to : measured.T_from_to.inverse();
+  const UncertainPose measured{closure->second.T_from_to, closure->second.covariance};
+  return closure->second.from == outcome.id.from ? measured : inverse(measured);
 }
 
 ClosureStatus status_of(const ClosureOutcome& outcome) {
@@ -47,20 +46,23 @@ ClosureStatus status_of(const ClosureOutcome& outcome) {
   return outcome.reason.empty() ? ClosureStatus::kVerified : ClosureStatus::kRejected;
 }
 
-// tx,ty,tz,qx,qy,qz,qw, all empty without a pose.
-std::string pose_fields(const std::optional<SE3>& T_from_to) {
-  if (!T_from_to) return ",,,,,,";
-  const Eigen::Vector3d& t = T_from_to->translation();
-  const Eigen::Quaterniond q(T_from_to->linear());
-  char text[192];
-  std::snprintf(text, sizeof text, "%.6f,%.6f,%.6f,%.8f,%.8f,%.8f,%.8f", t.x(), t.y(), t.z(), q.x(),
-                q.y(), q.z(), q.w());
+// tx,ty,tz,qx,qy,qz,qw and six standard deviations, all empty without a pose.
+std::string pose_fields(const std::optional<UncertainPose>& T_from_to) {
+  if (!T_from_to) return ",,,,,,,,,,,,";
+  const Eigen::Vector3d t = T_from_to->T.translation();
+  const Eigen::Quaterniond q(T_from_to->T.linear());
+  const Vector6 sigma = T_from_to->Sigma.diagonal().cwiseAbs().cwiseSqrt();
+  char text[320];
+  std::snprintf(text, sizeof text,
+                "%.6f,%.6f,%.6f,%.8f,%.8f,%.8f,%.8f,%.3g,%.3g,%.3g,%.3g,%.3g,%.3g", t.x(), t.y(),
+                t.z(), q.x(), q.y(), q.z(), q.w(), sigma[0], sigma[1], sigma[2], sigma[3], sigma[4],
+                sigma[5]);
   return text;
 }
 
 void write_closures(std::ostream& out, const RunRecord& record) {
   out << "from_robot,from_keyframe,to_robot,to_keyframe,similarity,stage,matches,inliers,"
-         "tx,ty,tz,qx,qy,qz,qw,reason\n";
+         "tx,ty,tz,qx,qy,qz,qw,sigma_rx,sigma_ry,sigma_rz,sigma_tx,sigma_ty,sigma_tz,reason\n";
   for (const ClosureOutcome& row : record.outcomes())
     out << row.id.from.robot << ',' << row.id.from.index << ',' << row.id.to.robot << ','
         << row.id.to.index << ',' << row.similarity << ','
@@ -224,10 +226,12 @@ std::optional<CorrectionSummary> correction_of(const RunRecord& record) {
 
 std::vector<PublishedClosure> published_closures(const RunRecord& record) {
   std::vector<PublishedClosure> published;
-  for (const ClosureOutcome& outcome : record.outcomes())
+  for (const ClosureOutcome& outcome : record.outcomes()) {
+    const auto measured = measured_pose(record, outcome);
     published.push_back({.id = outcome.id,
                          .status = status_of(outcome),
-                         .T_from_to = measured_pose(record, outcome)});
+                         .T_from_to = measured ? std::optional(measured->T) : std::nullopt});
+  }
   return published;
 }
 

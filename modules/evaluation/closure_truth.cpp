@@ -9,6 +9,7 @@
 
 #include "modules/core/config.hpp"
 #include "modules/core/input_file.hpp"
+#include "modules/core/lie.hpp"
 #include "modules/core/text_table.hpp"
 #include "modules/evaluation/association.hpp"
 #include "modules/evaluation/input_row.hpp"
@@ -19,6 +20,7 @@ namespace {
 constexpr int kGridColumns = 8;
 constexpr int kGridRows = 6;
 constexpr double kMaxDepthRatio = 2.0;
+constexpr double k999Of6 = 22.4577;  // quantile of chi-squared, 6 degrees of freedom
 
 // Number of keyframes in the pairs.
 std::size_t frames_in(const std::set<ClosureId>& pairs) {
@@ -127,7 +129,8 @@ class StageCounter {
     if (true_pairs_.contains(pair)) found_.insert(pair);
   }
 
-  void add_error(double translation_m, double rotation_deg) {
+  void add_error(double translation_m, double rotation_deg, bool beyond_limits) {
+    score_.beyond_limits += beyond_limits;
     translations_m_.push_back(translation_m);
     rotations_deg_.push_back(rotation_deg);
   }
@@ -189,15 +192,17 @@ ClosureScores score_closures(std::span<const TrueKeyframe> keyframes,
     candidates.count(closure.id, places.see_the_same(*from, *to));
     if (!measured) continue;
     const SE3 T_from_to = from->T_world_body.inverse() * to->T_world_body;
-    const SE3 error = T_from_to.inverse() * *closure.T_from_to;
+    const SE3 error = closure.T_from_to->inverse() * T_from_to;
     const double error_m = error.translation().norm();
     const double error_deg = kDegrees * angle_of(error.linear());
+    const bool beyond_limits =
+        error_m > options.max_translation_m || error_deg > options.max_rotation_deg;
     const bool is_true =
-        error_m <= options.max_translation_m && error_deg <= options.max_rotation_deg;
+        !beyond_limits || se3_log(error).cwiseQuotient(closure.sigma).squaredNorm() <= k999Of6;
     for (StageCounter* const stage : {&verified, &inliers}) {
       if (stage == &inliers && closure.stage != ClosureStage::kInlier) continue;
       stage->count(closure.id, is_true);
-      stage->add_error(error_m, error_deg);
+      stage->add_error(error_m, error_deg, beyond_limits);
     }
   }
   scores.true_pairs = true_pairs.size();
@@ -217,7 +222,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kPoseColumn = 8;
+constexpr std::size_t kPoseColumn = 8, kSigmaColumn = kPoseColumn + 7;
+constexpr std::size_t kReasonColumn = kSigmaColumn + 6;
 // Largest stamp for which differences of stamps cannot overflow.
 constexpr Stamp kMaxKeyframeStamp = std::numeric_limits<Stamp>::max() / 2;
 
@@ -281,17 +287,20 @@ std::vector<KeyframeRecord> parse_keyframes(std::string_view text, const std::st
 
 std::vector<ClosureRecord> parse_closures(std::string_view text, const std::string& name) {
   std::vector<ClosureRecord> closures;
-  for_each_row(text, name, kPoseColumn + 7, [&](const InputRow& row) {
+  for_each_row(text, name, kReasonColumn, [&](const InputRow& row) {
     ClosureRecord closure;
     closure.id = {keyframe_of(row, 0), keyframe_of(row, 2)};
     closure.stage = stage_of(row, 5);
     closure.matches = static_cast<int>(row.integer(6, std::numeric_limits<int>::max()));
     closure.inliers = static_cast<int>(row.integer(7, std::numeric_limits<int>::max()));
-    closure.reason = rest_of(row, kPoseColumn + 7);
-    if (!row.text(kPoseColumn).empty())
+    closure.reason = rest_of(row, kReasonColumn);
+    if (!row.text(kPoseColumn).empty()) {
       closure.T_from_to = row.pose(kPoseColumn, false);
-    else if (closure.stage >= ClosureStage::kVerified)
+      for (std::size_t i = 0; i < 6; ++i)
+        closure.sigma[static_cast<Eigen::Index>(i)] = row.number(kSigmaColumn + i);
+    } else if (closure.stage >= ClosureStage::kVerified) {
       row.fail("a verified closure without a pose");
+    }
     closures.push_back(std::move(closure));
   });
   return closures;
@@ -328,6 +337,7 @@ std::vector<std::string> table_row(const char* name, const ClosureScores& scores
   return {name,
           std::to_string(stage.judged),
           std::to_string(stage.correct),
+          stage.translation_error_m.count > 0 ? std::to_string(stage.beyond_limits) : "-",
           percent(stage.precision()),
           percent(scores.pair_recall(stage)),
           percent(scores.frame_recall(stage)),
@@ -344,6 +354,7 @@ Json error_of(const Statistics& statistics) {
 Json to_json(const ClosureScores& scores, const StageScore& stage) {
   Json json = {{"judged", stage.judged},
                {"correct", stage.correct},
+               {"beyond_limits", stage.beyond_limits},
                {"precision", stage.precision()},
                {"pairs_found", stage.pairs_found},
                {"pair_recall", scores.pair_recall(stage)},
@@ -360,7 +371,7 @@ Json to_json(const ClosureScores& scores, const StageScore& stage) {
 
 std::string to_table(const ClosureScores& scores) {
   std::string text =
-      align_columns({{"closures", "judged", "true", "precision", "recall, pairs",
+      align_columns({{"closures", "judged", "true", "beyond limits", "precision", "recall, pairs",
                       "recall, keyframes", "median [m]", "max [m]", "median [deg]", "max [deg]"},
                      table_row("candidates", scores, scores.candidates),
                      table_row("verified", scores, scores.verified),

@@ -32,6 +32,8 @@ struct ClosureRecord {
   int matches = 0;               ///< Descriptor matches.
   int inliers = 0;               ///< Correspondences that support the pose.
   std::string reason = {};       ///< Reason for its rejection; empty if it was not rejected.
+  /// Standard deviations of the pose, see core/covariance.hpp [rad, m]; 0: unknown.
+  Vector6 sigma = Vector6::Zero();
 };
 
 /// Conditions under which a closure counts as true.
@@ -45,9 +47,9 @@ struct ClosureTruthOptions {
 
   void visit_fields(auto& visitor) {
     visitor.field("max_translation_m", max_translation_m, {1e-6, 1000.0},
-                  "[m] largest error of a measured pose that counts as true");
+                  "[m] a larger error is false unless the covariance of the pose explains it");
     visitor.field("max_rotation_deg", max_rotation_deg, {1e-6, 180.0},
-                  "[deg] largest error of a measured pose that counts as true");
+                  "[deg] a larger error is false unless the covariance of the pose explains it");
     visitor.field("min_overlap", min_overlap, {1e-6, 1.0},
                   "two keyframes see the same place if at least this share of the image of each is "
                   "in the other's view, see view_overlap()");
@@ -66,6 +68,7 @@ struct ClosureTruthOptions {
 struct StageScore {
   std::size_t judged = 0;          ///< Closures whose keyframes both have a true pose.
   std::size_t correct = 0;         ///< True closures among them.
+  std::size_t beyond_limits = 0;   ///< Poses with a larger error than the limits, false or not.
   std::size_t pairs_found = 0;     ///< Pairs of ClosureScores::true_pairs with a true closure.
   std::size_t frames_found = 0;    ///< Keyframes of these pairs.
   Statistics translation_error_m;  ///< Errors of measured poses; empty for candidates.
@@ -107,8 +110,9 @@ struct ClosureScores {
 ///
 /// A candidate is true if its two keyframes see the same place: the smaller of both overlaps of
 /// their left cameras' views is at least min_overlap. Its limits on distance and angle therefore
-/// scale with the depth of the scene. A verified closure and an inlier are true if E =
-/// (T_world_from^-1 T_world_to)^-1 T_from_to is within the limits.
+/// scale with the depth of the scene. The error of a verified closure and of an inlier is
+/// T_from_to^-1 T_world_from^-1 T_world_to. They are false if it is beyond the limits, and if its
+/// squares over the six variances sum to more than the 99.9 % quantile of chi-squared.
 ///
 /// Precision includes closures within a robot. Recall counts only pairs of keyframes of two robots,
 /// each pair once. A stage has found a pair if the keyframes see the same place and it has a true
@@ -134,9 +138,9 @@ struct KeyframeRecord {
 [[nodiscard]] std::vector<KeyframeRecord> read_keyframes(const std::filesystem::path& file);
 
 /// Reads a robot's loop_closures.csv: `from_robot, from_keyframe, to_robot, to_keyframe,
-/// similarity, stage, matches, inliers, tx, ty, tz, qx, qy, qz, qw, reason` below a header. The
-/// pose [m] is empty if there is none, and the reason may be empty. Throws InputFileError, also
-/// for a verified closure without a pose.
+/// similarity, stage, matches, inliers, tx, ty, tz, qx, qy, qz, qw`, six standard deviations, and
+/// `reason` below a header. The pose [m] and its deviations [rad, m] are empty if there is none,
+/// and the reason may be empty. Throws InputFileError, also for a verified closure without a pose.
 [[nodiscard]] std::vector<ClosureRecord> read_closures(const std::filesystem::path& file);
 
 /// Parse the text of a file; `name` replaces the file name in messages.
@@ -149,15 +153,15 @@ struct KeyframeRecord {
 [[nodiscard]] std::vector<TrueKeyframe> place_keyframes(std::span<const KeyframeRecord> keyframes,
                                                         std::span<const StampedPose> truth);
 
-/// A table for people. It has a line per stage with the number of true closures, precision, recall
-/// over pairs and over keyframes, and the errors of the measured poses. Below are the totals for
-/// recall.
+/// A table for people. It has a line per stage with the numbers of true closures and of poses
+/// beyond the limits. Precision, recall over pairs and over keyframes, and the errors of the
+/// measured poses follow. Below are the totals for recall.
 [[nodiscard]] std::string to_table(const ClosureScores& scores);
 
 /// The scores as one JSON object: {true_pairs, true_frames, unjudged, candidates:
-/// {judged, correct, precision, pairs_found, pair_recall, frames_found, frame_recall,
-/// translation_error_m: {...}, rotation_error_deg: {...}}, verified: {...}, inliers: {...},
-/// by_angle: [{from_deg, to_deg, true_pairs, pairs_found}, ...]}.
+/// {judged, correct, beyond_limits, precision, pairs_found, pair_recall, frames_found,
+/// frame_recall, translation_error_m: {...}, rotation_error_deg: {...}}, verified: {...}, inliers:
+/// {...}, by_angle: [{from_deg, to_deg, true_pairs, pairs_found}, ...]}.
 void to_json(Json& json, const ClosureScores& scores);
 
 }  // namespace km

@@ -282,7 +282,8 @@ TEST_CASE("a closure is the same from whichever end it was found", "[robot]") {
   write_results(folder.path(), record, results);
   CHECK(results.lost().empty());
   CHECK_THAT(folder.read("loop_closures.csv"),
-             Catch::Contains("\n1,4,2,3,0,inlier,0,0,-1.000000,-2.000000,-3.000000,"));
+             Catch::Contains("\n1,4,2,3,0,inlier,0,0,-1.000000,-2.000000,-3.000000,"
+                             "0.00000000,0.00000000,0.00000000,1.00000000,1,1,1,3.74,3.32,2.45,"));
 }
 
 }  // namespace km

@@ -69,7 +69,7 @@ namespace {
 
 constexpr const char* kHeader =
     "from_robot,from_keyframe,to_robot,to_keyframe,similarity,stage,matches,inliers,tx,ty,tz,qx,qy,"
-    "qz,qw,reason\n";
+    "qz,qw,sigma_rx,sigma_ry,sigma_rz,sigma_tx,sigma_ty,sigma_tz,reason\n";
 
 // Results of alice (0) and bob (1), who are not in one frame.
 class Results {
@@ -94,7 +94,7 @@ class Results {
   TemporaryFolder folder;
 };
 
-const char* const kMeasured = "verified,60,39,1,2,3,0,0,0,1,";
+const char* const kMeasured = "verified,60,39,1,2,3,0,0,0,1,1,1,1,1,1,1,";
 
 }  // namespace
 
@@ -103,12 +103,12 @@ TEST_CASE("The doctor gives the reason why robots did not join, from all files",
   results.folder.write(
       "alice/loop_closures.csv",
       std::string(kHeader) +
-          "0,1,1,2,0.5,received,40,0,,,,,,,,\"matches do not agree, on a pose\"\n" +
+          "0,1,1,2,0.5,received,40,0,,,,,,,,,,,,,,,,,,,,\"matches do not agree, on a pose\"\n" +
           "0,3,1,4,0.5," + kMeasured + "\"rejected: the other closures contradict it\"\n" +
-          "0,5,1,6,0.5,inlier,60,39,1,2,3,0,0,0,1,\"\"\n");
+          "0,5,1,6,0.5,inlier,60,39,1,2,3,0,0,0,1,1,1,1,1,1,1,\"\"\n");
   results.folder.write(
       "bob/loop_closures.csv",
-      std::string(kHeader) + "0,7,1,8,0.5,candidate,0,0,,,,,,,,\"not requested\"\n");
+      std::string(kHeader) + "0,7,1,8,0.5,candidate,0,0,,,,,,,,,,,,,,\"not requested\"\n");
   CHECK(are_results(results.folder.path()));
   const Examination result = examine_results(results.folder.path());
   CHECK_THAT(to_text(result.findings),

@@ -75,22 +75,24 @@ TEST_CASE("closures judges the folders of a run", "[evaluate]") {
                        "robot,keyframe,stamp_ns,median_depth_m\n" + id + ",0,105000000000,4\n");
     files.folder.write("r" + id + "/loop_closures.csv",
                        "from_robot,from_keyframe,to_robot,to_keyframe,similarity,stage,matches,"
-                       "inliers,tx,ty,tz,qx,qy,qz,qw,reason\n" +
+                       "inliers,tx,ty,tz,qx,qy,qz,qw,s1,s2,s3,s4,s5,s6,reason\n" +
                            closures);
     return (files.folder.path() / ("r" + id)).string();
   };
-  const std::string a = robot("1", "1,0,2,0,0.5,inlier,80,60,0.1,0,0,0,0,0,1,\"\"\n");
-  const std::string b = robot("2", "2,0,1,0,0.5,inlier,80,60,0.9,0,0,0,0,0,1,\"\"\n");
+  const std::string a =
+      robot("1", "1,0,2,0,0.5,inlier,80,60,0.1,0,0,0,0,0,1,.1,.1,.1,.1,.1,.1,\"\"\n");
+  const std::string b =
+      robot("2", "2,0,1,0,0.5,inlier,80,60,0.9,0,0,0,0,0,1,.1,.1,.1,.1,.1,.1,\"\"\n");
   const std::string json = (files.folder.path() / "closures.json").string();
   const std::string command = kTool + "closures --dataset " + recording.root().string() +
                               " --truth " + files.truth + " --json " + json + " --results ";
   const auto result = run_command(command + a + ' ' + b);
   CAPTURE(result.output);
   REQUIRE(result.exit_code == 0);
-  CHECK_THAT(result.output, Catch::Contains("inliers          2     1      50.0%"));
+  CHECK_THAT(result.output, Catch::Contains("inliers          2     1              1      50.0%"));
   CHECK_THAT(files.folder.read("closures.json"), Catch::Contains("\"pair_recall\": 1"));
   CHECK_THAT(run_command(command + a + ' ' + b + " --max-translation 1").output,
-             Catch::Contains("inliers          2     2     100.0%"));
+             Catch::Contains("inliers          2     2              0     100.0%"));
   CHECK_THAT(result.output,
              Catch::Contains("note: " + files.truth + " is taken for the true poses of robot 1 (" +
                              a + ") and of robot 2 (" + b + ") at the same times"));

@@ -245,7 +245,7 @@ TEST_CASE("Closures are judged in the robots' common world", "[team]") {
   Team two;
   const std::string closures =
       "from_robot,from_keyframe,to_robot,to_keyframe,similarity,stage,matches,inliers,"
-      "tx,ty,tz,qx,qy,qz,qw,reason\n";
+      "tx,ty,tz,qx,qy,qz,qw,s1,s2,s3,s4,s5,s6,reason\n";
   for (RobotPlan& robot : two.plan.robots) {
     robot.graph.clear();
     robot.dataset = recording.root();
@@ -255,9 +255,9 @@ TEST_CASE("Closures are judged in the robots' common world", "[team]") {
                                                         ",0,5000000000,20\n");
   }
   two.folder.write("a/loop_closures.csv",
-                   closures + "1,0,2,0,0.5,inlier,80,60,0,0,0.1,0,0,0,1,\"\"\n");
+                   closures + "1,0,2,0,0.5,inlier,80,60,0,0,0.1,0,0,0,1,1,1,1,1,1,1,\"\"\n");
   two.folder.write("b/loop_closures.csv",
-                   closures + "2,0,1,0,0.5,verified,80,60,0,3,0,0,0,0,1,\"\"\n");
+                   closures + "2,0,1,0,0.5,verified,80,60,0,3,0,0,0,0,1,.1,.1,.1,.1,.1,.1,\"\"\n");
   const TeamResult team = two.collect();
   REQUIRE(team.closures);
   CHECK(team.closures->true_pairs == 1);

@@ -74,12 +74,13 @@ class SmallRun {
     summary.keyframes = 3;
     summary.mapping = MappingSummary{.faces = 2};
     write_summary(of(robot) / kSummary, summary);
-    folder.write(name + "loop_closures.csv",
-                 "from_robot,from_keyframe,to_robot,to_keyframe,similarity,stage,matches,inliers,"
-                 "tx,ty,tz,qx,qy,qz,qw,reason\n" +
-                     (robot == 0 ? std::string("0,0,1,1,0.5,inlier,80,60,1,0,0,0,0,0,1,\"\"\n"
-                                               "0,1,1,2,0.5,received,9,0,,,,,,,,\"no pose\"\n")
-                                 : ""));
+    folder.write(
+        name + "loop_closures.csv",
+        "from_robot,from_keyframe,to_robot,to_keyframe,similarity,stage,matches,inliers,"
+        "tx,ty,tz,qx,qy,qz,qw,s1,s2,s3,s4,s5,s6,reason\n" +
+            (robot == 0 ? std::string("0,0,1,1,0.5,inlier,80,60,1,0,0,0,0,0,1,1,1,1,1,1,1,\"\"\n"
+                                      "0,1,1,2,0.5,received,9,0,,,,,,,,,,,,,,\"no pose\"\n")
+                        : ""));
     LabelledMesh mesh;
     for (const float x : {0.5F, 9.5F}) {  // in cells of their own
       const auto first = static_cast<std::uint32_t>(mesh.vertices.size());

@@ -93,7 +93,8 @@ TEST_CASE("Inserted errors are counted at each stage, by the given limits", "[cl
   CHECK(scores.candidates.pairs_found == 5);
   CHECK(scores.candidates.frames_found == 10);
   CHECK(scores.verified.judged == 6);
-  CHECK(scores.verified.correct == 3);
+  CHECK(scores.verified.correct == 3);  // unknown covariances explain no error
+  CHECK(scores.verified.beyond_limits == 3);
   CHECK(scores.verified.pairs_found == 2);
   CHECK(scores.inliers.judged == 4);
   CHECK(scores.inliers.correct == 3);
@@ -108,6 +109,25 @@ TEST_CASE("Inserted errors are counted at each stage, by the given limits", "[cl
   CHECK(correct({.max_translation_m = 0.4}) == 2);
   CHECK(correct({.max_rotation_deg = 3.9}) == 2);
   CHECK(correct({.max_translation_m = 0.61}) == 4);
+}
+
+TEST_CASE("A closure beyond the limits is false unless its covariance explains the error",
+          "[closure_truth]") {
+  const auto keyframes = two_rows(2);
+  ClosureRecord off = closure({0, 0}, {1, 0}, ClosureStage::kInlier, kTruth * at(0.0, 2.0, 8.0));
+  const auto scores = [&] { return score_closures(keyframes, std::vector{off}, camera()).inliers; };
+  off.sigma << 0.01, 0.01, 0.04, 0.1, 0.1, 2.0;  // 3.5 of the rotation, 20 of the translation
+  CHECK(scores().correct == 0);
+  off.sigma[4] = 1.0;  // 3.5 and 2
+  CHECK(scores().correct == 1);
+  CHECK(scores().beyond_limits == 1);
+  CHECK(to_table(score_closures(keyframes, std::vector{off}, camera()))
+            .find("inliers          1     1              1     100.0%") != std::string::npos);
+  off.sigma[2] = 0.01;  // 14 of the rotation
+  CHECK(scores().correct == 0);
+  off.T_from_to = kTruth * at(0.4, 0.0);  // 4 sigma, but within the limits
+  CHECK(scores().correct == 1);
+  CHECK(scores().beyond_limits == 0);
 }
 
 TEST_CASE("Places scale with the depth of the scene", "[closure_truth]") {
@@ -176,17 +196,18 @@ TEST_CASE("Invalid closures and options are refused", "[closure_truth]") {
 
 const std::string kHeader =
     "from_robot,from_keyframe,to_robot,to_keyframe,similarity,stage,matches,inliers,"
-    "tx,ty,tz,qx,qy,qz,qw,reason\n";
+    "tx,ty,tz,qx,qy,qz,qw,sigma_rx,sigma_ry,sigma_rz,sigma_tx,sigma_ty,sigma_tz,reason\n";
 
 TEST_CASE("Errors in closure files are reported with their line", "[closure_files]") {
   const TemporaryFolder folder;
   const auto [row, problem] = GENERATE(table<std::string, std::string>(
-      {{"1,2,3", "c.csv line 2: 3 fields, expected 15"},
-       {"1,2,3,4,0.5,married,0,0,,,,,,,,", "married is no stage of a closure"},
-       {"1,2,3,4,0.5,verified,0,0,,,,,,,,", "a verified closure without a pose"},
-       {"70000,2,3,4,0.5,candidate,0,0,,,,,,,,", "70000 is not a number from 0 to 65535"},
-       {"1,2,3,4,0.5,inlier,0,0,1,2,x,0,0,0,1,", "x is not a finite number"},
-       {"1,2,3,4,0.5,inlier,0,0,1,2,3,0,0,0,2,", "the quaternion's norm is 2"}}));
+      {{"1,2,3", "c.csv line 2: 3 fields, expected 21"},
+       {"1,2,3,4,0.5,married,0,0,,,,,,,,,,,,,,", "married is no stage of a closure"},
+       {"1,2,3,4,0.5,verified,0,0,,,,,,,,,,,,,,", "a verified closure without a pose"},
+       {"70000,2,3,4,0.5,candidate,0,0,,,,,,,,,,,,,,", "70000 is not a number from 0 to 65535"},
+       {"1,2,3,4,0.5,inlier,0,0,1,2,x,0,0,0,1,,,,,,,", "x is not a finite number"},
+       {"1,2,3,4,0.5,inlier,0,0,1,2,3,0,0,0,2,,,,,,,", "the quaternion's norm is 2"},
+       {"1,2,3,4,0.5,inlier,0,0,1,2,3,0,0,0,1,1,1,1,1,,1,", " is not a finite number"}}));
   CHECK_THROWS_WITH(read_closures(folder.write("c.csv", kHeader + row + '\n')),
                     Catch::Contains(problem));
   CHECK_THROWS_WITH(read_keyframes(folder.path() / "none.csv"), Catch::EndsWith("no such file"));

@@ -64,9 +64,9 @@ TEST_CASE("Corrupted tables of a run are refused with file and line", "[evaluati
   SECTION("loop_closures.csv") {
     check_corrupted<InputFileError>(
         "robot_a,index_a,robot_b,index_b,similarity,stage,matches,inliers,x,y,z,qx,qy,qz,qw,"
-        "reason\n"
-        "0,1,1,7,0.5,inlier,40,30,1.5,2.5,3.5,0,0,0.6,0.8,\n"
-        "0,2,1,9,0.25,candidate,0,0,,,,,,,,\"far, apart\"\n",
+        "s1,s2,s3,s4,s5,s6,reason\n"
+        "0,1,1,7,0.5,inlier,40,30,1.5,2.5,3.5,0,0,0.6,0.8,0.01,0.01,0.01,0.1,0.1,0.1,\n"
+        "0,2,1,9,0.25,candidate,0,0,,,,,,,,,,,,,,\"far, apart\"\n",
         "loop_closures.csv", [&](const std::string& text) {
           for (const auto& closure : read_closures(folder.write("loop_closures.csv", text)))
             if (closure.T_from_to) CHECK(closure.T_from_to->matrix().allFinite());
