@@ -3,16 +3,18 @@
 #include <cstdlib>
 #include <functional>
 #include <iostream>
+#include <limits>
 #include <map>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "apps/robot/run.hpp"
 #include "apps/robot/wiring.hpp"
 
 // A robot of which one module fails: what reads its topic throws, or never returns, on the module's
-// own thread.
-//   test_faulty_robot MODULE throw|hang OUTPUT DOMAIN DATASET|GRAPH [section.key=value ...]
+// own thread. With `none lie` it sends false maps and objects to its team.
+//   test_faulty_robot MODULE throw|hang|lie OUTPUT DOMAIN DATASET|GRAPH [section.key=value ...]
 
 namespace km {
 namespace {
@@ -20,6 +22,36 @@ namespace {
 void fail(const std::string& how) {
   if (how == "throw") throw std::runtime_error("injected");
   while (true) pause();
+}
+
+// Sends a surface of 60,000 faces in 20 chunks, and 1000 objects. Some chunks have no size, are far
+// away, or contain impossible faces. Half of the objects have no size.
+void lie(Topics& topics, int number) {
+  constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+  constexpr std::uint16_t kVertices = 2000, kFaces = 3000;
+  for (int k = 0; k < 20; ++k) {
+    MeshChunk chunk{.key = {1, {number, k, 0}, 0},
+                    .step_m = k % 4 == 0 ? kNan : 0.01F,
+                    .voxel_m = 0.05F,
+                    .origin = {900 * number, 900 * k, k % 4 == 1 ? 2'000'000'000 : 0}};
+    for (std::uint16_t v = 0; v < kVertices; ++v)
+      chunk.offsets.push_back({static_cast<std::uint16_t>(v % 45 * 20),
+                               static_cast<std::uint16_t>(v / 45 * 20),
+                               static_cast<std::uint16_t>(k % 4 == 2 ? 37 * v : 0)});
+    for (std::uint16_t f = 0; f < kFaces; ++f) {
+      const auto corner = static_cast<std::uint16_t>(f % (kVertices - 46));
+      chunk.faces.push_back({corner, static_cast<std::uint16_t>(corner + 1),
+                             static_cast<std::uint16_t>(corner + (f < 2000 ? 45 : 46))});
+    }
+    topics.chunks.to_peers().publish(std::move(chunk));
+  }
+  RobotObjects objects{.robot = 1, .objects = {}};
+  for (int k = 0; k < 1000; ++k)
+    objects.objects.push_back({.keyframe = static_cast<KeyframeIndex>(k),
+                               .size_m = Eigen::Vector3d::Constant(k % 2 == 0 ? kNan : 1.0),
+                               .surface_m2 = 1e6,
+                               .views = 1000});
+  topics.objects.to_peers().publish(std::move(objects));
 }
 
 std::map<std::string, std::function<void(Topics&)>> faults(const std::string& how) {
@@ -40,7 +72,11 @@ std::map<std::string, std::function<void(Topics&)>> faults(const std::string& ho
           {"pcm", on(&Topics::own_inlier_sets)},
           {"pose_graph", on(&Topics::progress)},
           {"mesh_deformation", on(&Topics::optimized_meshes)},
-          {"none", [](Topics&) {}}};
+          {"none", [how](Topics& topics) {
+             if (how != "lie") return;
+             topics.keyframe_odometry.subscribe(
+                 [&topics, number = 0](const auto&) mutable { lie(topics, ++number); });
+           }}};
 }
 
 }  // namespace

@@ -3,9 +3,11 @@
 #include <catch2/catch.hpp>
 #include <csignal>
 #include <fstream>
+#include <iostream>
 #include <list>
 
 #include "apps/robot/run_summary.hpp"
+#include "test/support/demo_world.hpp"
 #include "test/support/process.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/temporary_folder.hpp"
@@ -105,6 +107,37 @@ TEST_CASE("A disk that stands still under the map leaves the other results", "[s
   CHECK_THAT(read_summary(robot.output / "summary.json").exit_reason,
              Catch::StartsWith("mesh_files: ") && Catch::Contains("1 result lost") &&
                  Catch::Contains("mesh.ply"));
+}
+
+// Hidden: for test/endure lies.
+TEST_CASE("A member that sends false maps and objects costs the others little", "[.lies]") {
+  const TemporaryFolder folder;
+  const auto run_beside = [&](const std::string& how) {
+    const std::string output = (folder.path() / how).string();
+    const std::string domain = std::to_string(random_domain());
+    const std::string map = " mapping.mode=semantic run.settle_s=3";
+    Process member(words_of(KM_BIN_DIR "/test_faulty_robot none " + how + ' ' + output +
+                            "_member " + domain + ' ' + (kDemoWorld / "robot1").string() + map));
+    Process honest(words_of(KM_BIN_DIR "/kimera_multi_robot --config euroc --robot 0 --rate max "
+                                       "--serve-limit 60 --dataset " +
+                            (kDemoWorld / "robot0").string() + " --output " + output +
+                            " --domain " + domain + " --set" + map));
+    CHECK(honest.wait() == 0);
+    CHECK(member.wait() == 0);
+    return read_summary(output + "/summary.json");
+  };
+  const RunSummary usual = run_beside("hang"),
+                   lied_to = run_beside("lie");  // `none hang`: no fault
+  const auto print = [](const char* beside, const RunSummary& summary) {
+    std::cout << beside << ": " << summary.process.cpu_s << " s of CPU, "
+              << static_cast<double>(summary.process.peak_memory_bytes) / 1e6 << " MB, "
+              << summary.pgo.members.size() << " robots joined\n";
+  };
+  print("beside a sound member", usual);
+  print("beside a liar", lied_to);
+  CHECK(lied_to.pgo.members.size() == 2);
+  CHECK(lied_to.process.cpu_s < 2.0 * usual.process.cpu_s + 5.0);
+  CHECK(lied_to.process.peak_memory_bytes < usual.process.peak_memory_bytes + 200'000'000);
 }
 
 }  // namespace

@@ -69,6 +69,12 @@ class Team {
       network_.set_address(host, "");
   }
 
+  // Larger packets do not reach any robot.
+  void set_path_mtu(int bytes) {
+    for (int host = 1; host <= static_cast<int>(robots_.size()); ++host)
+      network_.set_path_mtu(host, bytes);
+  }
+
   void interrupt() {
     for (const auto& robot : robots_) robot->kill(SIGTERM);
   }
@@ -232,6 +238,22 @@ TEST_CASE("A team that splits in two ends, and both sides report the robots they
       CHECK_THAT(summary.exit_reason, Catch::Matches(".*" + name + " \\(not received for .*"));
     for (const auto& [name, missed_s] : summary.lost_peers) CHECK(missed_s > 0.0);
   }
+}
+
+TEST_CASE("A path that drops large packets is a finding of the run with their size",
+          "[system][namespaces]") {
+  if (!VirtualNetwork::available()) return;
+  const SplitGraph graph = random_team(23, {0, 1}, 200, {{0, 1}});
+  const TemporaryFolder folder;
+  Team team(graph, {{0, 1}}, folder.path(), "newton --serve-limit 15");
+  team.set_path_mtu(1000);
+  CHECK(team.wait() == std::vector<int>{0, 0});
+  const RunSummary summary = read_summary(folder.path() / robot_name(0) / "summary.json");
+  CHECK(summary.pgo.members.size() < 2);
+  const auto found = std::ranges::find(summary.findings, "network.path_mtu", &Finding::id);
+  REQUIRE(found != summary.findings.end());
+  CHECK_THAT(found->what, Catch::Contains("answers packets of up to 9") ||
+                              Catch::Contains("answers packets of up to 1000 B"));
 }
 
 // Bytes sent by the interfaces of a host, headers included.
