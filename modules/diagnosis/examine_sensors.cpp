@@ -347,8 +347,7 @@ Examination examine_images(const SensorSample& sample) {
   if (level < kDark)
     result.add(kWarning, "images.dark", "a mean grey level of " + fixed(level, 0) + " of 255",
                "few features are found, and some of them are noise",
-               "use a longer exposure, more gain or more light; values of 10 or 12 bits must fill "
-               "the 16 bits of mono16");
+               "use a longer exposure, more gain or more light");
   if (level > kBright || saturated > kSaturated)
     result.add(kWarning, "images.bright",
                percent(saturated) + " of the pixels are saturated, mean level " + fixed(level, 0),

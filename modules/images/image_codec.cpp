@@ -4,6 +4,7 @@
 #include <turbojpeg.h>
 
 #include <algorithm>
+#include <bit>
 #include <cstdlib>
 #include <memory>
 #include <opencv2/imgproc.hpp>
@@ -76,7 +77,7 @@ cv::Mat as_wanted(const cv::Mat& image, DecodedPixels pixels) {
     return converted(image, gray ? cv::COLOR_RGBA2GRAY : cv::COLOR_RGBA2BGRA);
   if (image.type() == CV_8UC3)
     return converted(image, gray ? cv::COLOR_RGB2GRAY : cv::COLOR_RGB2BGR);
-  return image.type() == CV_16UC1 && pixels != DecodedPixels::kStored ? upper_bytes(image) : image;
+  return image.type() == CV_16UC1 && pixels != DecodedPixels::kStored ? upper_bits(image) : image;
 }
 
 cv::Mat decode_png(std::string_view file, DecodedPixels pixels) {
@@ -134,11 +135,14 @@ cv::Mat read_pixels(const std::filesystem::path& file, DecodedPixels pixels) {
   }
 }
 
-cv::Mat upper_bytes(const cv::Mat& image) {
+cv::Mat upper_bits(const cv::Mat& image) {
+  const unsigned largest =
+      *std::max_element(image.begin<std::uint16_t>(), image.end<std::uint16_t>());
+  const int used = std::max(10, (static_cast<int>(std::bit_width(largest)) + 1) / 2 * 2);
   cv::Mat gray(image.size(), CV_8UC1);
-  std::transform(image.begin<std::uint16_t>(), image.end<std::uint16_t>(),
-                 gray.begin<std::uint8_t>(),
-                 [](std::uint16_t value) { return static_cast<std::uint8_t>(value >> 8U); });
+  std::transform(
+      image.begin<std::uint16_t>(), image.end<std::uint16_t>(), gray.begin<std::uint8_t>(),
+      [used](std::uint16_t value) { return static_cast<std::uint8_t>(value >> (used - 8)); });
   return gray;
 }
 

@@ -229,7 +229,7 @@ ImageResult gray_of_message(const BagChannel& channel, const BagMessage& message
     gray = cv::Mat();  // a Bayer pattern cannot be converted in place
     cv::cvtColor(raw.loaded.image, gray, raw.to_gray);
   }
-  if (gray.type() == CV_16UC1) gray = upper_bytes(gray);
+  if (gray.type() == CV_16UC1) gray = upper_bits(gray);
   if (gray.type() != CV_8UC1)
     return {ImageStatus::kWrongFormat, place + ": metres are no grey values", {}};
   return {ImageStatus::kOk, {}, {gray.cols, gray.rows, {gray.datastart, gray.dataend}}};

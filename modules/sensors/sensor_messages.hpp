@@ -18,7 +18,7 @@ namespace km {
 /// The type of the messages on a topic of images, by the name that image_transport gives it.
 [[nodiscard]] std::string_view type_of_images(std::string_view topic);
 
-/// The grey values of an image message. Encodings: mono8, mono16 (its higher byte), bgr8, rgb8,
+/// The grey values of an image message. Encodings: mono8, mono16 (see upper_bits()), bgr8, rgb8,
 /// bgra8, rgba8, bayer_*8, yuv422 (UYVY), yuv422_yuy2, OpenCV's 8UC1, 8UC3, 8UC4 and 16UC1, and
 /// compressed images (PNG or JPEG). kUnreadable: not such a message;
 /// kWrongFormat: another encoding. `place` begins the problem.
