@@ -21,13 +21,14 @@ std::string_view unquoted(std::string_view field) {
   return is_quoted ? field.substr(1, field.size() - 2) : field;
 }
 
-std::vector<std::string_view> split_at_commas(std::string_view line, std::size_t max_fields) {
+std::vector<std::string_view> split_at(char separator, std::string_view line,
+                                       std::size_t max_fields) {
   std::vector<std::string_view> fields;
   while (fields.size() < max_fields) {
-    const std::size_t comma = line.find(',');
-    fields.push_back(unquoted(trimmed(line.substr(0, comma))));
-    if (comma == line.npos) break;
-    line.remove_prefix(comma + 1);
+    const std::size_t end = line.find(separator);
+    fields.push_back(unquoted(trimmed(line.substr(0, end))));
+    if (end == line.npos) break;
+    line.remove_prefix(end + 1);
   }
   return fields;
 }
@@ -68,8 +69,10 @@ std::optional<TextRow> RowReader::next() {
                                                               : std::min(end + 1, text_.size()));
     line = trimmed(line.substr(0, line.find('#')));
     if (line.empty() || line == "\"") continue;  // a quoted comment leaves its first quote
-    return TextRow{line_, line.find(',') == line.npos ? split_at_blanks(line, max_fields_)
-                                                      : split_at_commas(line, max_fields_)};
+    for (const char separator : {',', ';'})
+      if (line.find(separator) != line.npos)
+        return TextRow{line_, split_at(separator, line, max_fields_)};
+    return TextRow{line_, split_at_blanks(line, max_fields_)};
   }
   return std::nullopt;
 }

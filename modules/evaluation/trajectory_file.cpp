@@ -98,7 +98,8 @@ Columns columns_of(std::string_view text, const TextRow& first, const std::strin
   const std::string_view head = first.fields.front();
   const auto after_first = static_cast<std::size_t>(head.data() + head.size() - text.data());
   const std::size_t separator = text.find_first_not_of(" \t", after_first);
-  const bool has_commas = separator != text.npos && text[separator] == ',';
+  const bool has_commas =
+      separator != text.npos && (text[separator] == ',' || text[separator] == ';');
   if (!named) columns.w_first = has_commas;
   const bool is_whole = columns.stamp < first.fields.size() &&
                         first.fields[columns.stamp].find_first_of(".eE") == std::string_view::npos;

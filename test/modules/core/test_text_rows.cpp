@@ -20,13 +20,13 @@ TEST_CASE("Rows keep their line numbers past comments and empty lines", "[core]"
 TEST_CASE("Tables of spreadsheets and of other systems are read", "[core]") {
   const std::string end = GENERATE("\n", "\r\n", "\r");
   const std::string text =
-      "\xEF\xBB\xBF\"#t\",\"n\"" + end + "1 ,\ta b , \"3\" # note" + end + "4  5\t6" + end + "7";
+      "\xEF\xBB\xBF\"#t\",\"n\"" + end + "1 ,\ta b , \"3\" # note" + end + "4  5\t6" + end + "7; 8";
   const auto rows = split_rows(text);
   REQUIRE(rows.size() == 3);
   CHECK(rows[0].fields == Fields{"1", "a b", "3"});
   CHECK(rows[0].line == 2);
   CHECK(rows[1].fields == Fields{"4", "5", "6"});
-  CHECK(rows[2].fields == Fields{"7"});
+  CHECK(rows[2].fields == Fields{"7", "8"});
   CHECK(rows[2].line == 4);
 }
 
