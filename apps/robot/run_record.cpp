@@ -18,9 +18,9 @@ constexpr std::size_t kMostInEvent = 2000;  // so that an event is far smaller t
 
 // Appends `whole` in events of at most kMostInEvent elements of its list.
 template <typename Event, typename Element>
-void append_in_parts(const Event& whole, std::vector<Element> Event::*list,
+void append_in_parts(Event whole, std::vector<Element> Event::*list,
                      std::vector<JournalEntry>& events) {
-  const std::vector<Element>& all = whole.*list;
+  const std::vector<Element> all = std::exchange(whole.*list, {});
   for (std::size_t begin = 0; begin < all.size(); begin += kMostInEvent) {
     const auto first = all.begin() + static_cast<std::ptrdiff_t>(begin);
     Event part = whole;
@@ -188,8 +188,8 @@ void RunRecord::add(const RobotSample& sample) {
 
 void RunRecord::state_poses() {
   if (!trajectory_ || std::exchange(trajectory_is_stated_, true)) return;
-  if (const auto changes = stated_poses_.update(*trajectory_))
-    append_in_parts(*changes, &PoseChanges::poses, events_);
+  if (auto changes = stated_poses_.update(*trajectory_))
+    append_in_parts(*std::move(changes), &PoseChanges::poses, events_);
 }
 
 std::vector<JournalEntry> RunRecord::take_events() {

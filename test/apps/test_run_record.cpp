@@ -151,6 +151,7 @@ TEST_CASE("changes of decisions, poses and cells become events, each once", "[ro
   record.state_poses();
   events = record.take_events();
   REQUIRE(events.size() == 3);  // because entries of a journal have a largest size
+  CHECK(std::get<PoseChanges>(events[2]).poses.capacity() < 2000);  // no copy of the other parts
   CHECK(std::get<PoseChanges>(events[2]).poses.back().id == KeyframeId{1, 5000});
 
   OptimizedMesh mesh;
