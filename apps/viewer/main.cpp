@@ -1,3 +1,5 @@
+#include <malloc.h>
+
 #include <exception>
 #include <filesystem>
 #include <iostream>
@@ -150,6 +152,8 @@ int main(int argc, char** argv) try {
   km::ViewerOptions options;
   km::define(app, options);
   if (const auto exit_code = km::parse_options(app, argc, argv)) return *exit_code;
+  // The memory of a large frame that a page sends goes back to the system with the frame.
+  mallopt(M_MMAP_THRESHOLD, 1 << 20);
   km::SignalWatch signals;  // before any thread: threads inherit the blocked signals
   km::ViewStore store(static_cast<std::size_t>(options.memory_MB * 1e6));
   (options.results.empty() ? km::show_team : km::show_run)(options, store, signals);

@@ -13,17 +13,25 @@ namespace {
 
 const std::string kViewer = KM_BIN_DIR "/kimera_multi_viewer";
 
-TEST_CASE("The page has the content of the files of a run, at any time of the run",
-          "[page][slow]") {
+void check_page_of_run(const std::string& script) {
   if (const std::string why = missing_page_program(); !why.empty()) {
     std::cout << "SKIPPED: " << why << '\n';
     return;
   }
   const SmallRun run;
-  const CommandResult result = run_command("node test/apps/viewer/page_of_run.mjs " + kViewer +
-                                           ' ' + run.folder.path().string());
+  const CommandResult result = run_command("node test/apps/viewer/" + script + ' ' + kViewer + ' ' +
+                                           run.folder.path().string());
   INFO(result.output);
   CHECK(result.exit_code == 0);
+}
+
+TEST_CASE("The page has the content of the files of a run, at any time of the run",
+          "[page][slow]") {
+  check_page_of_run("page_of_run.mjs");
+}
+
+TEST_CASE("The page opens and turns while another host attacks the viewer", "[page][slow]") {
+  check_page_of_run("page_under_attack.mjs");
 }
 
 TEST_CASE("The page follows a team that runs, shows its past, and knows how it ended",
