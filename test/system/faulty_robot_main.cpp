@@ -24,8 +24,14 @@ void fail(const std::string& how) {
   while (true) pause();
 }
 
-// Sends a surface of 60,000 faces in 20 chunks, and 1000 objects. Some chunks have no size, are far
-// away, or contain impossible faces. Half of the objects have no size.
+SE3 far(double x_m) {
+  return make_pose(Eigen::Matrix3d::Identity(), {x_m, 0.0, 0.0});
+}
+
+// Sends a surface of 60,000 faces in 20 chunks with a pose, and 1000 objects. Some chunks have no
+// size, are far away, or contain impossible faces. Objects have no size or 1e9 m, and are 1e9 or
+// 1e300 m from their keyframe. Replies answer requests that robot 0 never made, and a closure has
+// no covariance.
 void lie(Topics& topics, int number) {
   constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
   constexpr std::uint16_t kVertices = 2000, kFaces = 3000;
@@ -48,10 +54,26 @@ void lie(Topics& topics, int number) {
   RobotObjects objects{.robot = 1, .objects = {}};
   for (int k = 0; k < 1000; ++k)
     objects.objects.push_back({.keyframe = static_cast<KeyframeIndex>(k),
-                               .size_m = Eigen::Vector3d::Constant(k % 2 == 0 ? kNan : 1.0),
+                               .T_kf_box = far(number % 3 == 0 ? 1e300 : 1e9),
+                               .size_m = Eigen::Vector3d::Constant(number % 3 == 1 ? kNan : 1e9),
                                .surface_m2 = 1e6,
                                .views = 1000});
   topics.objects.to_peers().publish(std::move(objects));
+  topics.mesh_poses.to_peers().publish(
+      MeshPoses{.robot = 1, .keyframes = {{0, RoundedPose::of(far(2e6))}}});
+  const auto to_robot_0 = [](auto message) {
+    return Addressed{0, std::make_shared<const decltype(message)>(std::move(message))};
+  };
+  const auto index = static_cast<KeyframeIndex>(number);
+  KeyframeReply reply;
+  reply.number = index;
+  reply.found = true;
+  reply.keyframe.odometry = {.id = {1, index}, .T_odom_kf = far(1e6)};
+  topics.replies.own.publish(to_robot_0(reply));
+  topics.words.own.publish(to_robot_0(KeyframeWords{index, {1, index}, {}}));
+  Closure closure{.from = {.id = {1, index}}, .to = {.id = {0, index}}, .T_from_to = far(1e6)};
+  closure.covariance.setConstant(number % 2 == 0 ? kNan : 1e300);
+  topics.shared_closures.own.publish(to_robot_0(closure));
 }
 
 std::map<std::string, std::function<void(Topics&)>> faults(const std::string& how) {

@@ -306,6 +306,32 @@ TEST_CASE("false closures between robots in one datum are rejected", "[pose_grap
   }
 }
 
+TEST_CASE("fixes of one robot that are 900 km away leave the other robots in their frame",
+          "[pose_graph][fixes]") {
+  TeamNetwork network;
+  const bool is_scattered = GENERATE(true, false), are_joined = GENERATE(true, false);
+  const RobotId id = GENERATE(RobotId{1}, RobotId{9});
+  CAPTURE(is_scattered, are_joined, id);
+  using enum PgoMethod;
+  Run low(network, 3, 61, true, kNewton), high(network, 6, 62, true, kNewton),
+      liar(network, id, 63, true, kNewton);
+  for (Run* const run : {&low, &high}) run->fix_all();
+  std::mt19937 rng(64);
+  for (KeyframeIndex i = 1; i < kRunKeyframes; ++i)
+    liar.fix(i, 9e5 * (is_scattered ? random_vector<3>(rng).normalized().eval()
+                                    : Eigen::Vector3d::UnitX()));
+  close(low, high);
+  if (are_joined) {
+    id < 3 ? close(liar, low) : close(low, liar);
+    id < 3 ? close(liar, high) : close(high, liar);
+  }
+  REQUIRE(each_settles_again(network));
+  for (Run* const run : {&low, &high}) {
+    REQUIRE(run->state().trajectory);
+    CHECK(run->error_m() < kLargest_m);
+  }
+}
+
 TEST_CASE("robots share an absolute frame without closures if they have one datum",
           "[pose_graph][fixes]") {
   TeamNetwork network;
