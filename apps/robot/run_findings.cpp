@@ -333,7 +333,9 @@ class FindingsOfRun {
   }
 
   void add_cameras() {
-    if (!run_.cameras) return;
+    // Odometry that is wrong for a known reason estimates wrong errors of the cameras.
+    const auto is_error = [](const Finding& one) { return one.severity == kError; };
+    if (!run_.cameras || std::ranges::any_of(run_.noticed, is_error)) return;
     const CamerasSummary& found = *run_.cameras;
     constexpr double kSure = 3.0;  // standard deviations
     constexpr double kOffset_s = 2e-3, kLargeOffset_s = 1e-2, kRotation_rad = 8.7e-3;

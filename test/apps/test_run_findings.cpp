@@ -192,8 +192,10 @@ TEST_CASE("A finding on a run is reported with its severity and its number", "[r
       {nullptr, kNote, "rare faults", of([](auto& s) {
          s.sensor_faults = {{"images missing between others", 5}};
        })},
-      {"stereo.baseline", kError, ": a baseline of 110 m",
-       of([](auto& s) { s.noticed = {finding_of(*doubt(UsualNumber::kBaseline_m, 110.0))}; })},
+      {"stereo.baseline", kError, ": a baseline of 110 m", of([](auto& s) {
+         s.noticed = {finding_of(*doubt(UsualNumber::kBaseline_m, 110.0))};
+         s.cameras = {.rotation_y_rad = 0.08, .rotation_sigma_rad = 0.005};
+       })},
       {"trajectory.hole", kWarning, "no pose for 6.3 s, from 12.1 s on",
        of([=](auto& s) { s.holes = hole; })},
       {"trajectory.hole", kWarning, "the longest of 3 holes of 9.0 s in all",
