@@ -1,5 +1,5 @@
 // Opens the page of a finished run and turns its view, at rest and while another host attacks the
-// viewer: frames of 20 MB, 65,536 image requests, 70 open WebSockets, 100 slow clients.
+// viewer. The attacks: frames of 20 MB, 65,536 image requests, 70 open WebSockets, 100 slow clients.
 //   node page_under_attack.mjs VIEWER RESULTS
 import assert from 'node:assert/strict';
 import {readFileSync} from 'node:fs';
