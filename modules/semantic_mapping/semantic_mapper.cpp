@@ -29,7 +29,7 @@ DepthNoise noise_of(const SemanticMappingConfig& config) {
           config.depth_sigma_per_m.value_or(SemanticMappingConfig::kDepthSigma_per_m)};
 }
 
-// Bands of depths for voxels of voxel_m(), twice and four times as large, and so on up to
+// Bands of depths for voxels of voxel_size_m, twice and four times as large, and so on up to
 // max_range_m. At the end of a band the truncation is two standard deviations. Bands overlap, so
 // that their surfaces meet.
 std::vector<DepthBand> bands_of(const SemanticMappingConfig& config) {
@@ -37,13 +37,18 @@ std::vector<DepthBand> bands_of(const SemanticMappingConfig& config) {
   const double per_m = std::max(noise_of(config).per_m, 1e-9);
   std::vector<DepthBand> bands;
   double from_m = 0.0;
-  for (double voxel_m = config.voxel_m();; voxel_m *= 2.0) {
+  for (double voxel_m = *config.voxel_size_m;; voxel_m *= 2.0) {
     const double to_m =
         std::sqrt(SemanticMappingConfig::kTruncation_voxels * voxel_m / (2.0 * per_m));
     bands.push_back({from_m, to_m});
     if (to_m >= config.max_range_m) return bands;
     from_m = (1.0 - kOverlap) * to_m;
   }
+}
+
+SemanticMappingConfig complete(const SemanticMappingConfig& config) {
+  if (!config.voxel_size_m) throw std::invalid_argument("mapping: no voxel_size_m");
+  return checked(config);
 }
 
 bool usable(const SE3& T) {
@@ -87,13 +92,13 @@ struct SemanticMapper::State {
 
   State(const SemanticMappingConfig& settings, const Camera& its_camera,
         const LabelPalette& palette)
-      : config(checked(settings)),
+      : config(complete(settings)),
         camera(its_camera),
         views(camera, config.min_range_m, config.max_range_m, palette),
         coarse_views(camera, noise_of(config), config.min_range_m),
         bands(bands_of(config)) {
     for (std::size_t level = 0; level < bands.size(); ++level) {
-      const double voxel_m = std::ldexp(config.voxel_m(), static_cast<int>(level));
+      const double voxel_m = std::ldexp(*config.voxel_size_m, static_cast<int>(level));
       maps.emplace_back(voxel_m, known_from(config, voxel_m));
     }
   }

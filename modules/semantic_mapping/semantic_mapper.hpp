@@ -67,8 +67,9 @@ struct MapSize {
 class SemanticMapper {
  public:
   /// `camera` takes the depth and label images; its T_body_cam is not used. Labels that `palette`
-  /// lacks count as unknown. Throws ConfigError if `config` is out of bounds and
-  /// std::invalid_argument for a camera without pixels or focal length.
+  /// lacks count as unknown. Throws ConfigError if `config` is out of bounds, std::invalid_argument
+  /// for one without voxel_size_m (see fitting_voxel_m()) and for a camera without pixels or focal
+  /// length.
   SemanticMapper(const SemanticMappingConfig& config, const Camera& camera,
                  const LabelPalette& palette = {});
   ~SemanticMapper();

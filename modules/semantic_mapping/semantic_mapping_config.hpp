@@ -37,8 +37,6 @@ struct SemanticMappingConfig {
   /// depth_sigma_per_m if there is none: that of usual RGB-D cameras.
   static constexpr double kDepthSigma_per_m = 0.003;
 
-  [[nodiscard]] double voxel_m() const { return voxel_size_m.value_or(0.10); }
-
   void visit_fields(auto& visitor) {
     visitor.field("voxel_size_m", voxel_size_m, {0.005, 1.0},
                   "[m] side of the smallest voxels; half of it needs up to four times the memory, "

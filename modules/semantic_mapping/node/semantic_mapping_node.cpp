@@ -94,7 +94,7 @@ void SemanticMappingNode::make_mapper() {
   std::vector<std::shared_ptr<const DepthImage>> images;
   for (const DenseFrame& frame : first_) images.push_back(frame.depth);
   if (is_chosen) config_.voxel_size_m = fitting_voxel_m(config_, images);
-  log::info(name()) << "voxels from " << fixed(config_.voxel_m(), 3) << " m on"
+  log::info(name()) << "voxels from " << fixed(*config_.voxel_size_m, 3) << " m on"
                     << (is_chosen ? ", by the depths of the first images" : "") << "; depths up to "
                     << fixed(config_.max_range_m, 1) << " m";
   mapper_.emplace(config_, camera_, palette_);

@@ -262,7 +262,8 @@ TEST_CASE("The smallest voxels fit the depths", "[semantic_mapping]") {
   CHECK(voxel_m(2200) == 0.03);
   CHECK(voxel_m(3000) == 0.05);
   CHECK(voxel_m(4000) == 0.1);
-  CHECK(voxel_m(0) == 0.1);  // unknown
+  CHECK(voxel_m(0) == 0.1);                                                    // unknown
+  CHECK_THROWS_AS(SemanticMapper({}, small_camera()), std::invalid_argument);  // without images
 }
 
 TEST_CASE("Far surface has larger voxels until it is seen from near", "[semantic_mapping]") {
