@@ -41,14 +41,17 @@ std::variant<MeasuredPose, RowFault> parse_pose(const TextRow& row) {
 
 // See ImuStream::why_not(). `first`, `last`: stamps of a stream.
 std::string why_not_between(std::optional<Stamp> first, Stamp last, Stamp stamp) {
-  constexpr double kOtherClock_s = 2.0;
+  constexpr double kOtherClock_s = 2.0, kYear_s = 3.2e7;
   if (first && *first <= stamp && last >= stamp) return {};
   if (!first) return "are missing";
   const bool is_late = *first > stamp;
   const double seconds = seconds_between(is_late ? stamp : last, is_late ? *first : stamp);
   return (is_late ? "start " : "end ") + fixed(seconds, 1) +
          (is_late ? " s after it" : " s before it") +
-         (seconds > kOtherClock_s ? ": are the clocks different?" : "");
+         (seconds > kYear_s
+              ? ": one of them has stamps of another clock, unit or column (an index?)"
+          : seconds > kOtherClock_s ? ": are the clocks different?"
+                                    : "");
 }
 
 }  // namespace

@@ -148,6 +148,7 @@ TEST_CASE("Between poses the body moves at constant velocity", "[sensors][poses]
   CHECK(poses.why_not(nanoseconds(9.9)) == "start 0.1 s after it");
   CHECK(poses.why_not(nanoseconds(10.0)).empty());
   CHECK(poses.why_not(nanoseconds(48.0)) == "end 37.0 s before it: are the clocks different?");
+  CHECK_THAT(poses.why_not(nanoseconds(1e9)), Catch::Contains("another clock, unit or column"));
   CHECK(!poses.at(nanoseconds(9.9)));
   for (const double t_s : {10.0, 10.1, 10.4, 10.75, 11.0}) {
     CAPTURE(t_s);
