@@ -61,8 +61,10 @@ struct RobotOptions {
   bool resume = false;                          ///< Continue the run whose results are in `output`.
   std::optional<std::filesystem::path> record;  ///< MCAP file for viewers; empty: in `output`.
   bool record_images = false;                   ///< Record the left images, too.
-  bool view = false;             ///< Send the state of the robot to viewers in the domain.
-  double serve_limit_s = 120.0;  ///< Longest time to serve peers after the input has ended.
+  bool view = false;  ///< Send the state of the robot to viewers in the domain.
+  /// Longest time to serve peers after the input has ended. It is longer than
+  /// PoseGraphConfig::session_wait_s, after which the last session comes at the latest.
+  double serve_limit_s = 300.0;
   std::string log_level = "info";
 };
 

@@ -5,6 +5,7 @@
 #include <tuple>
 #include <vector>
 
+#include "apps/robot/robot_config.hpp"
 #include "apps/robot/run_end.hpp"
 #include "apps/robot/unmet_peers.hpp"
 
@@ -46,6 +47,10 @@ TEST_CASE("A robot serves a peer that is still running, up to the limit", "[depa
   for (double now_s = 5.0; now_s < 5.0 + kLimit_s; now_s += 1.0)
     CHECK_FALSE(robot.leaves_at(now_s));
   CHECK(robot.leaves_at(5.0 + kLimit_s));
+}
+
+TEST_CASE("A robot serves its peers until the last session has come", "[departure]") {
+  CHECK(RobotOptions{}.serve_limit_s > PoseGraphConfig{}.session_wait_s);
 }
 
 TEST_CASE("A robot awaits the robots of its closures, up to the limit", "[departure]") {
