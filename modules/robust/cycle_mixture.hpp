@@ -47,6 +47,7 @@ class ClosureVolume {
 };
 
 // Priors that fits of noise share.
+inline constexpr double kMostlyTrue = 0.5;  ///< Share of true cycles from which on most are true.
 inline constexpr double kNoiseFactorWidth = 1.0986;  ///< Log 3, of the log of a factor of noise.
 inline constexpr double kThousandToOne = 6.9;        ///< Log of odds against an unusual noise.
 

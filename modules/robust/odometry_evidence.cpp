@@ -25,7 +25,6 @@ constexpr std::size_t kPlacesBeside = 8;   // places before and after, among whi
 constexpr std::size_t kMostPlaces = 60;    // bounds the time
 constexpr std::size_t kEnoughPlaces = 3;
 constexpr std::size_t kClosureLevels = 4;
-constexpr double kLeastTrueShare = 0.5;  // least share of true cycles
 
 double log_prior(double level) {
   const double away = level * std::numbers::ln2 / kNoiseFactorWidth;
@@ -283,7 +282,7 @@ std::vector<float> odometry_evidence(std::span<const PoseEdge> closures,
       if (!std::isfinite(best)) return {};
       evidence.push_back(static_cast<float>(best));
     }
-  return share > kLeastTrueShare ? evidence : std::vector<float>();
+  return share > kMostlyTrue ? evidence : std::vector<float>();
 }
 
 std::map<RobotId, double> likely_odometry_noise(std::span<const PairVote> pairs) {

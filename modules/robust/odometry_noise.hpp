@@ -14,14 +14,23 @@ struct OdometryNoise {
   double rotation = 1.0;     ///< At least 1.
   double translation = 1.0;  ///< At least 1.
   bool of_closures = false;  ///< The closures inside the robot have these ratios, too.
-  std::size_t places = 0;    ///< Number of places behind the estimate.
+  /// Noise of the closures inside the robot, relative to that of odometry, both as shares of what
+  /// they claim: 1, or at least 16 if the odds are 1000 to 1, most cycles are true, and odometry is
+  /// not noisier than it claims.
+  double beside = 1.0;
+  std::size_t places = 0;  ///< Number of places behind the estimate.
   /// Closures that are more likely true than false; a subset if there are very many. Empty if the
   /// odometry is as precise as it claims.
   std::vector<PoseEdge> likely = {};
 
-  /// The actual precision of a step of odometry, or of a closure if `of_closures`.
+  /// The actual precision of a step of odometry.
   [[nodiscard]] Precision corrected(const Precision& claimed) const {
     return {claimed.kappa / (rotation * rotation), claimed.tau / (translation * translation)};
+  }
+  /// The actual precision of a closure inside the robot.
+  [[nodiscard]] Precision corrected_closure(const Precision& claimed) const {
+    const auto [kappa, tau] = of_closures ? corrected(claimed) : claimed;
+    return {kappa / (beside * beside), tau / (beside * beside)};
   }
 };
 

@@ -212,7 +212,7 @@ std::vector<PoseEdge> OwnGraph::own_edges() const {
   odometry_judgement_.correct(edges);
   const OdometryNoise& noise = odometry_judgement_.noise;
   for (PoseEdge e : newest_edges(self_)) {
-    if (noise.of_closures) e.precision = noise.corrected(e.precision);
+    e.precision = noise.corrected_closure(e.precision);
     edges.push_back(e);
   }
   return edges;

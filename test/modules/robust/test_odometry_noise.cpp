@@ -193,6 +193,25 @@ TEST_CASE("Closures that are noisier than they claim do not count as noise of od
   CHECK(noise.translation < 2.0);
 }
 
+TEST_CASE("Closures that are much noisier than odometry, as shares of their claims, weigh less",
+          "[odometry_noise]") {
+  const unsigned seed = GENERATE(range(1U, 11U));
+  const int dimension = GENERATE(2, 3);
+  CAPTURE(seed, dimension);
+  const auto beside = [&](double odometry, double closures, std::size_t are_false) {
+    Walk walk(seed, dimension);
+    walk.walk(odometry, odometry);
+    walk.close(2, closures);
+    walk.add_false(are_false);
+    return walk.noise().beside;
+  };
+  CHECK(beside(1.0, 1.0, 0) == 1.0);
+  CHECK(beside(0.005, 0.005, 0) == 1.0);
+  CHECK(beside(0.01, 1.0, 0) >= 16.0);
+  CHECK(beside(0.01, 1.0, 8) >= 16.0);
+  CHECK(beside(1.0, 1.0, 1000) == 1.0);  // false closures are no noise
+}
+
 TEST_CASE("Without closures, or with a single one, the noise of odometry is the claimed one",
           "[odometry_noise]") {
   Walk walk(1);
