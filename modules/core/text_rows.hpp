@@ -36,9 +36,10 @@ class RowReader {
   int line_ = 0;
 };
 
-/// Rows of a CSV or blank-separated table. A line with a comma is divided at its commas, any other
-/// line at its blanks. `#` starts a comment; lines without content are dropped; CRLF line ends and
-/// a byte order mark are accepted. `text` must outlive the result.
+/// Rows of a CSV or blank-separated table. A line with a comma is divided at its commas, another
+/// one with a semicolon at its semicolons, any other line at its blanks. `#` starts a comment;
+/// lines without content are dropped; CRLF line ends and a byte order mark are accepted. `text`
+/// must outlive the result.
 [[nodiscard]] std::vector<TextRow> split_rows(std::string_view text);
 
 /// The number in the whole of `field`, or nullopt. NaN and infinities are numbers here.
