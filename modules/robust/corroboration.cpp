@@ -8,6 +8,7 @@
 
 #include "modules/core/covariance.hpp"
 #include "modules/core/lie.hpp"
+#include "modules/outlier_rejection/chi_squared.hpp"
 #include "modules/robust/closure_places.hpp"
 #include "modules/robust/cycle_mixture.hpp"
 #include "modules/robust/odometry_cycles.hpp"
@@ -21,6 +22,11 @@ constexpr double kLargestTurn = 0.25 * std::numbers::pi;
 // Largest number of steps of odometry in a cycle between two places. The noise of more steps would
 // hide the noise of the closures.
 constexpr std::uint32_t kStepsBetweenPlaces = 60;
+// Share of the errors of the path that count as drift. Errors at the solution are smaller: true
+// closures of COSMO-Bench have at most 0.4 of this squared length, false ones nearly all more.
+constexpr double kPossible = 0.5;
+// Precision of an identity.
+constexpr Precision kExact{1e18, 1e18};
 constexpr double kLonger = 0.01;  // relative step of numeric derivatives by length
 // Largest standard deviation of the rotation of odometry in a cycle between two places. Errors of
 // cycles with a larger one are not normally distributed.
@@ -205,6 +211,31 @@ std::vector<bool> Corroboration::isolated(double barc) const {
       isolated[closures_[a].index] = isolated[closures_[b].index] = false;
     }
   return isolated;
+}
+
+std::vector<bool> Corroboration::possible(const std::vector<bool>& kept) const {
+  const double quantile = pose_quantile(kPossible, dimension_);
+  std::vector<bool> possible(closures_.size(), false);
+  for (const Upward& one : closures_) {
+    if (kept[one.index]) continue;
+    // Without a kept closure near it, a closure inside one robot is compared with its odometry.
+    const Upward along{one.index, one.lower, one.lower, SE3::Identity(), kExact};
+    const Upward* nearest = one.lower.robot == one.upper.robot ? &along : nullptr;
+    const auto steps_to = [&one](const Upward& other) {
+      return steps_between(one.lower, other.lower) + steps_between(one.upper, other.upper);
+    };
+    for (const Upward& other : closures_)
+      if (kept[other.index] && same_runs(one, other) &&
+          (nearest == nullptr || steps_to(other) < steps_to(*nearest)))
+        nearest = &other;
+    if (nearest == nullptr || !same_runs(one, *nearest)) continue;
+    const TwoClosureCycle cycle = cycle_of(one, *nearest, true);
+    const SE3 T = cycle.T();
+    possible[one.index] =
+        angle_of(T.linear()) <= kLargestTurn &&
+        mahalanobis_length(se3_log(T), cycle.covariance(), dimension_).squared <= quantile;
+  }
+  return possible;
 }
 
 }  // namespace km

@@ -47,6 +47,12 @@ class Corroboration {
   /// [sigma], given the noise of both closures and of the odometry between them.
   [[nodiscard]] std::vector<bool> isolated(double barc) const;
 
+  /// Marks the closures without `kept` that the drift of odometry may explain. `pose` is a solution
+  /// without them, and the error of a closure is its error there. Its covariance is that of the
+  /// path along odometry over the nearest kept closure; inside one robot also along odometry alone.
+  /// The solution is more precise than this path, so the median of the path is the limit.
+  [[nodiscard]] std::vector<bool> possible(const std::vector<bool>& kept) const;
+
  private:
   // A closure, directed from its end on the first robot of the pair (see first_robot()) to the
   // other one; inside a robot from the earlier keyframe to the later one.

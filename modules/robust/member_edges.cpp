@@ -24,6 +24,10 @@ constexpr double kStrongest = 1.25;
 // Number of isolated closures of a pair up to which they do no harm and are weighed from the start.
 constexpr std::ptrdiff_t kFewIsolated = 16;
 
+// Largest residual of a closure that a second look weighs, relative to the largest one of an
+// inlier. It exceeds 1 because the solution was computed without these closures.
+constexpr double kSecondLook = 5.0;
+
 void divide(Precision& precision, double factor) {
   precision.kappa /= factor;
   precision.tau /= factor;
@@ -50,8 +54,9 @@ MemberEdges::MemberEdges(SessionGraph graph, TreePlace place, const TreeNewtonOp
     (void)start_of(e.to);
     known_.push_back({.edge = e});
   }
-  classify();
   weaken_odometry();  // in a second look
+  reopen();
+  classify();
 }
 
 const SE3& MemberEdges::start_of(const KeyframeId& id) const {
@@ -60,6 +65,55 @@ const SE3& MemberEdges::start_of(const KeyframeId& id) const {
   if (found == graph_.public_poses.end())
     throw std::invalid_argument("TreeNewton: no robot has published pose " + to_string(id));
   return found->second;
+}
+
+// Both robots of a pair use the poses and verdicts that are sent, and so decide equally.
+void MemberEdges::reopen() {
+  if (!(graph_.first_barc > 0.0)) return;
+  const Corroboration::PoseOf pose = [this](const KeyframeId& id) { return start_of(id); };
+  for (const auto& [peer, indices] : by_peer()) {
+    const std::vector<PoseEdge> closures = select(indices, [](const Known&) { return true; });
+    std::vector<bool> kept;
+    for (const PoseEdge& e : closures) kept.push_back(!is_rejected(graph_, e));
+    const std::vector<bool> possible = corroboration(closures, pose).possible(kept);
+    for (std::size_t k = 0; k < closures.size(); ++k) {
+      const PoseEdge& e = closures[k];
+      if (!kept[k] && (possible[k] ||
+                       residual_of(e, pose(e.from), pose(e.to)) <= kSecondLook * graph_.first_barc))
+        graph_.decided.erase(e.id());
+    }
+  }
+}
+
+std::uint32_t MemberEdges::count_possible(const EdgeWeights& weights, const FrontEdges& front,
+                                          std::span<const SE3> present, double barc) const {
+  struct OfPeer {
+    std::vector<PoseEdge> closures;
+    std::vector<bool> kept, far;
+  };
+  std::map<RobotId, OfPeer> pairs;
+  std::map<KeyframeId, SE3> poses;
+  std::size_t weighed = 0;
+  for (const Known& k : known_) {
+    if (!takes_part(k) || !k.own) continue;
+    const std::size_t edge = weighed++;
+    if (k.odometry) continue;
+    const EdgeSlot& slot = front.slots()[edge];
+    poses[k.edge.from] = present[static_cast<std::size_t>(slot.i)];
+    poses[k.edge.to] = present[static_cast<std::size_t>(slot.j)];
+    OfPeer& pair = pairs[k.edge.peer_of(graph_.self)];
+    pair.closures.push_back(k.edge);
+    pair.kept.push_back(weights.keeps(edge));
+    pair.far.push_back(residual_of(k.edge, poses[k.edge.from], poses[k.edge.to]) >
+                       kSecondLook * barc);
+  }
+  const Corroboration::PoseOf pose = [&poses](const KeyframeId& id) { return poses.at(id); };
+  std::uint32_t count = 0;
+  for (const auto& [peer, pair] : pairs) {
+    const std::vector<bool> possible = corroboration(pair.closures, pose).possible(pair.kept);
+    for (std::size_t k = 0; k < possible.size(); ++k) count += possible[k] && pair.far[k] ? 1 : 0;
+  }
+  return count;
 }
 
 void MemberEdges::classify() {
@@ -131,7 +185,7 @@ TreeSums MemberEdges::count() {
                 .poses = static_cast<std::uint32_t>(graph_.start.size())};
   for (const Known& k : known_) {
     if (!reports(k)) continue;
-    if (k.deferred) ++sums.isolated;
+    if (k.deferred) ++sums.left;
     if (k.trust != Trust::kOpen) continue;
     const auto r =
         static_cast<float>(residual_of(k.edge, start_of(k.edge.from), start_of(k.edge.to)));

@@ -16,8 +16,9 @@ namespace km {
 /// These are their noise, the deferred closures, and the closures that the start decides. The two
 /// robots of a pair know the same closures, poses and claimed precisions, so both decide equally.
 ///
-/// In a second look (SessionGraph::again), a pair with undecided closures weighs its closures
-/// again, except for the rejected ones. A closure to a held pose is left out if an earlier session
+/// In a second look (SessionGraph::again), the deferred and rejected closures that nearly fit, or
+/// that drift may explain, are undecided. A pair with undecided closures weighs its closures again,
+/// except for the rejected ones. A closure to a held pose is left out if an earlier session
 /// has rejected it, and otherwise has weight 1.
 ///
 /// Exactly one of two robots weighs a closure between them and has it among its own edges. The
@@ -42,6 +43,10 @@ class MemberEdges {
   [[nodiscard]] FrontGraph front_graph(bool free);
   /// The weights of the first edges of front_graph(), which was called before.
   [[nodiscard]] EdgeWeights weights(const Precision& usual_pair) const;
+  /// Number of rejected closures of `front` that drift may explain: see Corroboration::possible().
+  /// `weights`: from weights(). `present`: poses of the nodes of `front`.
+  [[nodiscard]] std::uint32_t count_possible(const EdgeWeights& weights, const FrontEdges& front,
+                                             std::span<const SE3> present, double barc) const;
   /// On all closures that this robot reports, by the final `weights`.
   [[nodiscard]] ClosureVerdicts verdicts(const EdgeWeights& weights) const;
 
@@ -69,6 +74,7 @@ class MemberEdges {
   [[nodiscard]] Corroboration corroboration(std::span<const PoseEdge> closures,
                                             const Corroboration::PoseOf& pose) const;
   void for_cycles(auto&& visit);
+  void reopen();
   void classify();
   [[nodiscard]] PairVote vote_on(RobotId peer, const Indices& closures, bool first) const;
   void weaken_odometry();

@@ -28,7 +28,7 @@ struct SolverState {
   double noise_scale = 1.0;  ///< Noise scale of the closures, estimated by the team.
   double odometry_noise = 1.0;  ///< This robot: likely_odometry_noise() [ratio].
   double barc = 0.0;  ///< Largest residual of a closure that is kept [sigma]; 0: none is rejected.
-  bool deferred = false;  ///< Closures that stand alone were deferred: a second look is due.
+  bool deferred = false;  ///< A second look is due: closures were deferred, or are possible.
   bool failed = false;    ///< The graph of the team could not be solved.
 };
 

@@ -72,7 +72,7 @@ void TreeSums::add(const TreeSums& other) {
   fractional += other.fractional;
   kept += other.kept;
   rejected += other.rejected;
-  isolated += other.isolated;
+  left += other.left;
   fixed += other.fixed;
   poses += other.poses;
   for (const auto& [bin, n] : other.lengths) lengths[bin] += n;
@@ -104,7 +104,7 @@ void describe(auto& archive, As<PairVote> auto& v) {
 
 void describe(auto& archive, As<TreeSums> auto& s) {
   archive(s.base_cost, s.cost, s.decrement, s.largest, s.largest_of_all, s.open, s.changed,
-          s.fractional, s.kept, s.rejected, s.isolated, s.fixed, s.poses);
+          s.fractional, s.kept, s.rejected, s.left, s.fixed, s.poses);
   using Length = std::pair<std::uint16_t, std::uint32_t>;
   std::vector<Length> lengths(s.lengths.begin(), s.lengths.end());
   archive.list(lengths, kMaxElements, 2,

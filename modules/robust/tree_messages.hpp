@@ -46,8 +46,8 @@ struct TreeSums {
   std::uint32_t fractional = 0;  ///< Open closures with a weight between 0 and 1.
   std::uint32_t kept = 0;        ///< Closures with a weight above one half.
   std::uint32_t rejected = 0;    ///< Open closures between robots with a lower weight.
-  std::uint32_t isolated = 0;    ///< Deferred closures, see Corroboration.
-  std::uint32_t fixed = 0;       ///< Number of edges to held poses.
+  std::uint32_t left = 0;   ///< Closures for a second look: deferred, or rejected and possible.
+  std::uint32_t fixed = 0;  ///< Number of edges to held poses.
   std::uint32_t poses = 0;
   std::map<std::uint16_t, std::uint32_t> lengths = {};  ///< See NoiseHistogram; at the start only.
   std::vector<PairVote> votes = {};                     ///< Ascending by (a, b).
@@ -85,10 +85,12 @@ struct TreeVerdict {
 
   std::uint32_t round = 0;  ///< Round to which this is the answer.
   Next next = Next::kStep;
-  bool accept = false;    ///< kRefresh: the new poses are accepted.
-  bool full = false;      ///< Send full second derivatives from now on.
-  bool deferred = false;  ///< kCount: defer closures that stand alone. kStart: they remain so.
-  bool free = true;       ///< kStart: nothing holds the frame of the team.
+  bool accept = false;  ///< kRefresh: the new poses are accepted.
+  bool full = false;    ///< Send full second derivatives from now on.
+  /// kCount: defer closures that stand alone. kStart: they remain so. kDone: closures are left for
+  /// a second look.
+  bool deferred = false;
+  bool free = true;  ///< kStart: nothing holds the frame of the team.
   /// kStart, kRefresh: also weigh the closures that robots have decided. kRefresh: the start
   /// poses are the accepted ones again.
   bool weigh_all = false;

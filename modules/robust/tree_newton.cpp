@@ -68,6 +68,8 @@ UpMessage TreeNewton::equations() {
   message.sums.base_cost = own.cost(base_);
   message.sums.cost = own.cost(present_);
   weights_->weigh(verdict_, own, present_, message.sums);
+  if (decided && options_.robust && !edges_.graph().again)
+    message.sums.left = edges_.count_possible(*weights_, own, present_, verdict_.barc);
   own.weigh(weights_->in_equations(true), decided);
   if (refresh_ || own.stale())
     front_->linearise(present_, verdict_.full ? Curvature::kFull : Curvature::kGaussNewton);
@@ -257,7 +259,8 @@ std::vector<SolverMessage> TreeNewton::go_down(const DownMessage& message) {
             .noise_scale = v.noise_scale,
             .odometry_noise = edges_.odometry_noise(),
             .barc = options_.robust ? v.barc : 0.0,
-            .deferred = state_.deferred || (v.next == Next::kStart && v.deferred),
+            .deferred = state_.deferred ||
+                        ((v.next == Next::kStart || v.next == Next::kDone) && v.deferred),
             .failed = state_.failed};
   if (!done()) phase_ = Phase::kUp;
   std::vector<SolverMessage> messages;

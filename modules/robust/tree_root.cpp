@@ -162,12 +162,12 @@ DownMessage TreeRoot::decide_start(const TreeSums& sums, std::uint32_t round) {
   round_ = round;
   if (first_) {
     first_->largest = sums.largest_of_all;  // after the robots have moved
-    const double all = first_->open, left = all - sums.isolated;
-    alone_ = alone_ && left - sums.open >= kWorthDeciding * all;
+    const double all = first_->open, near = all - sums.left;
+    alone_ = alone_ && near - sums.open >= kWorthDeciding * all;
     if (!may_defer_) return start(false, alone_ ? sums : *first_);
     usual_noise_ = usual_pair_noise(sums.votes);
-    const bool enough = left >= kClosuresPerPose * sums.poses;
-    const bool deferred = sums.isolated > kFewOpen && enough && joined(members_, sums.votes);
+    const bool enough = near >= kClosuresPerPose * sums.poses;
+    const bool deferred = sums.left > kFewOpen && enough && joined(members_, sums.votes);
     return start(deferred, deferred ? sums : *first_);
   }
   const bool weighs = options_.robust && members_.size() > 1;
@@ -270,7 +270,9 @@ DownMessage TreeRoot::step(const TreeSums& sums, const TreeFront& front,
   if ((decided && small && unlimited) || round_ + 1 >= options_.max_rounds) {
     noise_scale_ =
         noise_allowed(noise_scale_, cost_, sums.kept, members_.size(), options_.dimension);
-    return answer(Next::kDone);
+    DownMessage message = answer(Next::kDone);
+    message.verdict.deferred = !again_ && sums.left > 0;
+    return message;
   }
   if (decided && worth_refreshing(decrement_)) {
     full_ = true;

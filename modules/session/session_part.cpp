@@ -27,25 +27,6 @@ void add_absent(const MemberPoses& poses, RobotId self, std::span<const PoseEdge
     if (graph.public_poses.contains(e.other(self))) graph.to_absent.push_back(e);
 }
 
-// Largest residual of a closure that a second look weighs, relative to the largest one of an
-// inlier. It exceeds 1 because the solution was computed without these closures.
-constexpr double kSecondLook = 5.0;
-
-// Opens the rejected closures that nearly fit. For a closure between robots, both robots use the
-// poses and the verdict that are sent, and so decide equally.
-void reopen_closures(SessionGraph& graph, double limit) {
-  const auto pose = [&](const KeyframeId& id) {
-    return id.robot == graph.self ? graph.start[id.index] : graph.public_poses.at(id);
-  };
-  for (const auto* edges : {&graph.own, &graph.between})
-    for (const PoseEdge& e : *edges) {
-      const auto decided = graph.decided.find(e.id());
-      if (decided != graph.decided.end() && !decided->second &&
-          residual_of(e, pose(e.from), pose(e.to)) <= limit)
-        graph.decided.erase(decided);
-    }
-}
-
 // Limit of the messages kept before there is a solver. Senders repeat the messages beyond it.
 constexpr std::size_t kMaxEarlyMessages = 1000;
 constexpr std::size_t kMaxEarlyBytes = 1U << 26U;
@@ -206,10 +187,7 @@ bool SessionPart::gather(const PublicPoses& published) {
     for (const auto& [id, kept] : poses.verdicts)
       if (graph_.again && joins_members(id)) graph_.decided[id] = kept;
   }
-  if (graph_.again)
-    reopen_closures(graph_, kSecondLook * result_.state.barc);
-  else if (closures_may_be_false_)
-    limit_precisions(graph_);
+  if (!graph_.again && closures_may_be_false_) limit_precisions(graph_);
   take(SessionEvent::kGathered);
   return true;
 }
@@ -257,6 +235,7 @@ void SessionPart::solve(double now_s) {
 
 void SessionPart::look_again() {
   graph_.again = true;
+  graph_.first_barc = result_.state.barc;
   graph_.start = result_.poses;
   graph_.noise = result_.noise;
   for (const auto& [id, kept] : result_.verdicts.closures) graph_.decided[id] = kept;

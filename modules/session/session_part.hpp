@@ -79,10 +79,8 @@ struct SessionCost {
 /// are then rounded to single precision and ready to be sent. Once the public poses of all members
 /// have arrived, its solver begins. Members exchange messages until the solver is done or fails.
 ///
-/// If the solver has deferred closures, a second look follows. All members send their poses and
-/// verdicts, and another solver begins there. It weighs the rejected and deferred closures whose
-/// residual is at most kSecondLook times the largest one of an inlier, together with all other
-/// closures of their pairs. Deterministic; not thread-safe.
+/// If closures are left for a second look, it follows. All members send their poses and verdicts,
+/// and another solver begins there: see MemberEdges. Deterministic; not thread-safe.
 class SessionPart {
  public:
   SessionPart(Session session, TeamPeer self, FrozenPart part, MemberSolverFactory factory,

@@ -92,6 +92,21 @@ class Lanes {
     return ids;
   }
   [[nodiscard]] std::set<ClosureId> isolated() const { return isolated(closures_); }
+  // Those that drift may explain if the closures up to keyframe `last_kept` of the first robot are
+  // kept.
+  [[nodiscard]] std::set<ClosureId> possible(const std::vector<PoseEdge>& closures,
+                                             KeyframeIndex last_kept) const {
+    const Corroboration::PoseOf pose = [this](const KeyframeId& k) { return poses_.at(k); };
+    std::vector<bool> kept;
+    for (const PoseEdge& e : closures)
+      kept.push_back((e.from.robot == kOne ? e.from : e.to).index <= last_kept);
+    const std::vector<bool> possible =
+        Corroboration(closures, pose, step_, dimension_, later_runs_).possible(kept);
+    std::set<ClosureId> ids;
+    for (std::size_t k = 0; k < closures.size(); ++k)
+      if (possible[k]) ids.insert(closures[k].id());
+    return ids;
+  }
   [[nodiscard]] std::set<ClosureId> ids() const {
     std::set<ClosureId> ids;
     for (const PoseEdge& e : closures_) ids.insert(e.id());
@@ -270,6 +285,14 @@ TEST_CASE("False closures stand alone, even near true ones", "[pose_graph]") {
   CHECK(lanes.isolated() == all_false);
 }
 
+std::vector<PoseEdge> seen_from_the_other(std::vector<PoseEdge> closures) {
+  for (PoseEdge& e : closures) {
+    std::swap(e.from, e.to);
+    e.T_from_to = e.T_from_to.inverse();
+  }
+  return closures;
+}
+
 TEST_CASE("Both robots of a pair find equal sets of closures that stand alone", "[pose_graph]") {
   const unsigned seed = GENERATE(range(1U, 6U));
   const int dimension = GENERATE(2, 3);
@@ -278,16 +301,40 @@ TEST_CASE("Both robots of a pair find equal sets of closures that stand alone", 
   for (int k = 0; k < kKeyframes; k += 3) lanes.add_true(k, k, k % 2 == 0 ? 1.0 : 4.0);
   lanes.add_random_false(100);
   lanes.add_random_false(100, false);
-  std::vector<PoseEdge> seen_from_there = lanes.closures();
+  std::vector<PoseEdge> seen_from_there = seen_from_the_other(lanes.closures());
   std::shuffle(seen_from_there.begin(), seen_from_there.end(), lanes.rng());
-  for (PoseEdge& e : seen_from_there) {
-    std::swap(e.from, e.to);
-    e.T_from_to = e.T_from_to.inverse();
-  }
   const std::set<ClosureId> alone = lanes.isolated();
   CHECK(alone.size() > 50);
   CHECK(alone.size() < lanes.closures().size());
   CHECK(lanes.isolated(seen_from_there) == alone);
+}
+
+// The solution is as imprecise as the path here, so half of the true ones are possible. The bound
+// is three standard deviations of the binomial distribution below.
+TEST_CASE("Drift explains true closures far from the kept ones, but no random ones",
+          "[pose_graph]") {
+  const int dimension = GENERATE(2, 3);
+  CAPTURE(dimension);
+  int of_true = 0, of_false = 0;
+  for (unsigned seed = 1; seed <= 100; ++seed) {
+    Lanes lanes(dimension, 1.0, seed);
+    for (int k = 0; k <= 50; k += 5) lanes.add_true(k, k);
+    for (const int k : {80, 120, 199}) lanes.add_true(k, k);
+    std::set<ClosureId> possible = lanes.possible(lanes.closures(), 50);
+    CHECK(lanes.possible(seen_from_the_other(lanes.closures()), 50) == possible);
+    of_true += static_cast<int>(possible.size());
+    for (int k = 51; k < kKeyframes; k += 7) lanes.add_false(k, kKeyframes - 1 - k);
+    of_false += static_cast<int>(lanes.possible(lanes.closures(), 50).size() - possible.size());
+  }
+  CHECK(of_true >= 124);   // 300 in all
+  CHECK(of_false <= 110);  // 2200 in all
+}
+
+TEST_CASE("Nothing is possible beyond an unknown step", "[pose_graph]") {
+  Lanes lanes(3, 1.0, 5);
+  for (const int k : {10, 20, 30}) lanes.add_true(k, k);
+  lanes.interrupt(25);
+  CHECK(lanes.possible(lanes.closures(), 20).empty());
 }
 
 }  // namespace

@@ -28,7 +28,7 @@ TreeSums some_sums() {
                 .fractional = 1,
                 .kept = 5,
                 .rejected = 900,
-                .isolated = 2,
+                .left = 2,
                 .fixed = 0,
                 .poses = 4'000'000'000U,
                 .lengths = {{0, 1}, {90, 1'000'000}, {65535, 3}}};

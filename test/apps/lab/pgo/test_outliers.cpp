@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <nlohmann/json.hpp>
+#include <random>
 #include <set>
 #include <sstream>
 #include <string>
@@ -9,7 +10,9 @@
 #include "apps/lab/pgo/outlier_study.hpp"
 #include "apps/lab/pgo/team_graph_file.hpp"
 #include "modules/core/json.hpp"
+#include "modules/core/lie.hpp"
 #include "test/support/command.hpp"
+#include "test/support/random_pose.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/team_graphs.hpp"
 #include "test/support/temporary_folder.hpp"
@@ -158,6 +161,43 @@ TEST_CASE("a robot with few closures and imprecise odometry keeps its true ones"
     CHECK(result.true_lost == 0);
     CHECK(result.false_kept <= 1);  // odometry allows it
   }
+}
+
+// Two robots drive side by side for 300 m. They see each other on the first 200 m and once at the
+// end, where drift is 100 to 600 sigma of a closure. All false closures are random.
+TEST_CASE("a closure that alone corrects a long drift is kept among false ones", "[outliers]") {
+  const unsigned seed = GENERATE(range(1U, 6U));
+  CAPTURE(seed);
+  constexpr Eigen::Index kPoses = 300;
+  std::mt19937 rng(seed);
+  const auto noise = [&rng](double sigma_rad, double sigma_m) {
+    Vector6 xi = random_vector<6>(rng);
+    xi.head<3>() *= sigma_rad;
+    xi.tail<3>() *= sigma_m;
+    return se3_exp(xi);
+  };
+  TeamGraph graph{.first = {0, kPoses, 2 * kPoses}};
+  const SE3 ahead = make_pose(Eigen::Matrix3d::Identity(), Eigen::Vector3d::UnitX());
+  for (Eigen::Index i = 0; i < 2 * kPoses; ++i) {
+    graph.ids.push_back({0, static_cast<std::uint32_t>(i)});
+    if (i + 1 != kPoses && i + 1 != 2 * kPoses)
+      graph.edges.push_back({i, i + 1, ahead * noise(0.005, 0.05), 2e4, 400.0});
+  }
+  const auto add_closure = [&](Eigen::Index i, Eigen::Index j, const SE3& T) {
+    graph.edges.push_back({i, kPoses + j, T, 1250.0, 2500.0});
+  };
+  for (Eigen::Index i = 0; i < 200; ++i) add_closure(i, i, noise(0.02, 0.02));
+  add_closure(kPoses - 1, kPoses - 1, noise(0.02, 0.02));
+  const std::size_t all_true = graph.edges.size();
+  std::uniform_int_distribution<Eigen::Index> pose(0, kPoses - 1);
+  for (int n = 0; n < 80; ++n) {
+    const Eigen::Index i = pose(rng), j = pose(rng);
+    add_closure(i, j, random_pose(rng, 100.0));
+  }
+  const std::vector<bool> kept = run_agent_team(graph, {}).kept;
+  const auto first_false = kept.begin() + static_cast<std::ptrdiff_t>(all_true);
+  CHECK(std::count(kept.begin(), first_false, false) == 0);
+  CHECK(std::count(first_false, kept.end(), true) == 0);
 }
 
 TEST_CASE("noise of steps and closures that no claim covers rejects nothing", "[outliers]") {
