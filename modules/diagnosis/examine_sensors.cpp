@@ -345,9 +345,11 @@ Examination examine_images(const SensorSample& sample) {
   constexpr double kDark = 25.0, kBright = 225.0, kSaturated = 0.35, kBlurred = 0.58;
   constexpr double kFewCorners = 100.0;
   if (level < kDark)
-    result.add(kWarning, "images.dark", "a mean grey level of " + fixed(level, 0) + " of 255",
-               "few features are found, and some of them are noise",
-               "use a longer exposure, more gain or more light");
+    result.add(
+        kWarning, "images.dark", "a mean grey level of " + fixed(level, 0) + " of 255",
+        "few features are found, and some of them are noise",
+        "use a longer exposure, more gain or more light; 10 or 14 bits must fill the 16 bits of "
+        "mono16");
   if (level > kBright || saturated > kSaturated)
     result.add(kWarning, "images.bright",
                percent(saturated) + " of the pixels are saturated, mean level " + fixed(level, 0),

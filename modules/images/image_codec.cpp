@@ -4,7 +4,6 @@
 #include <turbojpeg.h>
 
 #include <algorithm>
-#include <bit>
 #include <cstdlib>
 #include <memory>
 #include <opencv2/imgproc.hpp>
@@ -138,11 +137,11 @@ cv::Mat read_pixels(const std::filesystem::path& file, DecodedPixels pixels) {
 cv::Mat upper_bits(const cv::Mat& image) {
   const unsigned largest =
       *std::max_element(image.begin<std::uint16_t>(), image.end<std::uint16_t>());
-  const int used = std::max(10, (static_cast<int>(std::bit_width(largest)) + 1) / 2 * 2);
+  const int unused = largest < 4096 ? 4 : 8;
   cv::Mat gray(image.size(), CV_8UC1);
   std::transform(
       image.begin<std::uint16_t>(), image.end<std::uint16_t>(), gray.begin<std::uint8_t>(),
-      [used](std::uint16_t value) { return static_cast<std::uint8_t>(value >> (used - 8)); });
+      [unused](std::uint16_t value) { return static_cast<std::uint8_t>(value >> unused); });
   return gray;
 }
 

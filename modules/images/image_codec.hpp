@@ -40,8 +40,8 @@ constexpr std::size_t kMaxDecodedBytes = std::size_t{48} << 20U;
 /// InputFileError for a file that cannot be read.
 [[nodiscard]] cv::Mat read_pixels(const std::filesystem::path& file, DecodedPixels pixels);
 
-/// The upper 8 of the bits that a CV_16UC1 image uses. Cameras fill 10, 12, 14 or 16 bits from the
-/// lowest one: the least of these numbers that holds the largest value of the image.
+/// The upper 8 bits of a CV_16UC1 image: of the lower 12 if no value exceeds them, as many cameras
+/// fill these, otherwise of all 16. With finer steps, a change of light would change the scale.
 [[nodiscard]] cv::Mat upper_bits(const cv::Mat& image);
 
 /// Encodes a CV_8UC1, CV_16UC1, CV_8UC3 (BGR) or CV_8UC4 (BGRA) image without loss. Throws

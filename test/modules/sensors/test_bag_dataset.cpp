@@ -329,15 +329,14 @@ TEST_CASE("Depth of a bag joins its frame, at a lower rate too", "[sensors][bag]
 TEST_CASE("Images of every common encoding become the same grey", "[sensors][bag]") {
   struct Kind {
     const char* encoding;
-    std::vector<std::uint8_t> pixel;  // one grey level, 90; mono16 of 16, 10, 12 and 14 bits
+    std::vector<std::uint8_t> pixel;  // one grey level, 90; mono16 of 16 and 12 bits
   };
   const Kind kind = GENERATE(
       Kind{"mono8", {90}}, Kind{"8UC1", {90}}, Kind{"bgr8", {90, 90, 90}},
       Kind{"rgb8", {90, 90, 90}}, Kind{"bgra8", {90, 90, 90, 7}}, Kind{"rgba8", {90, 90, 90, 7}},
       Kind{"8UC3", {90, 90, 90}}, Kind{"bayer_rggb8", {90}}, Kind{"bayer_bggr8", {90}},
       Kind{"bayer_gbrg8", {90}}, Kind{"bayer_grbg8", {90}}, Kind{"mono16", {1, 90}},
-      Kind{"mono16", {0x69, 1}}, Kind{"mono16", {0xa1, 5}}, Kind{"mono16", {0x81, 0x16}},
-      Kind{"yuv422", {128, 90}}, Kind{"yuv422_yuy2", {90, 128}});
+      Kind{"mono16", {0xa1, 5}}, Kind{"yuv422", {128, 90}}, Kind{"yuv422_yuy2", {90, 128}});
   CAPTURE(kind.encoding);
   RosImage message = image(kFirst, 0);
   message.encoding = kind.encoding;
