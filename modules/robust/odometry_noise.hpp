@@ -14,9 +14,9 @@ struct OdometryNoise {
   double rotation = 1.0;     ///< At least 1.
   double translation = 1.0;  ///< At least 1.
   bool of_closures = false;  ///< The closures inside the robot have these ratios, too.
-  /// Noise of the closures inside the robot, relative to that of odometry, both as shares of what
-  /// they claim: 1, or at least 16 if the odds are 1000 to 1, most cycles are true, and odometry is
-  /// not noisier than it claims.
+  /// Ratio of closures to odometry, each with its actual over claimed noise. It is 1 unless it
+  /// reaches 16, the odds are 1000 to 1, and most cycles are true. Odometry is then no noisier than
+  /// it claims.
   double beside = 1.0;
   std::size_t places = 0;  ///< Number of places behind the estimate.
   /// Closures that are more likely true than false; a subset if there are very many. Empty if the
