@@ -3,6 +3,7 @@
 #include <iostream>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 
 #include "apps/lab/pgo/commands.hpp"
@@ -71,6 +72,7 @@ struct SolveCommand {
   GraphInput input;
   bool no_vertical = false;
   SolverOptions solver;
+  std::optional<int> rounds;
   fs::path json;
   fs::path output;
 };
@@ -90,7 +92,9 @@ void define_method(CLI::App& app, SolveCommand& command) {
   app.add_option("--method", solver.method, "See below")
       ->check(CLI::IsMember(kMethods).description(""));
   app.add_flag("--no-vertical", command.no_vertical, "Leave out the verticals of the files");
-  app.add_option("--rounds", solver.run.max_rounds, "Largest number of rounds")
+  app.add_option("--rounds", command.rounds,
+                 "Largest number of rounds; the default is 1000 for newton, as robots have it,\n"
+                 "and 100 for the other methods and --trust-all")
       ->check(CLI::Range(0, 1000000));
   app.add_option("--rank", solver.rank, "rbcd: rank of the relaxation")->check(CLI::Range(3, 10));
   app.add_option("--over-relaxation", solver.over_relaxation,
@@ -118,6 +122,7 @@ std::string listed(const std::vector<std::string>& names) {
 void check(CLI::App& app, SolveCommand& command) {
   if (command.solver.trust_all && command.solver.method != "newton")
     throw std::runtime_error("--trust-all is for --method newton only");
+  command.solver.run.max_rounds = command.rounds.value_or(command.solver.rejects() ? 1000 : 100);
   const std::string method = command.solver.name();
   for (const auto& [option, methods] : takers())
     if (app.count(option) > 0 && std::find(methods.begin(), methods.end(), method) == methods.end())
