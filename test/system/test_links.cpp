@@ -35,8 +35,9 @@ Links all_links(int robots) {
 // A team on hosts connected by `links`; robot k is on host k + 1.
 class Team {
  public:
+  // `path_mtu`: larger packets do not reach any robot; 0: all do.
   Team(const SplitGraph& graph, const Links& links, const fs::path& folder, std::string method,
-       double settle_s = 3.0)
+       double settle_s = 3.0, int path_mtu = 0)
       : network_(static_cast<int>(graph.keyframes.size())),
         folder_(folder),
         method_(std::move(method)),
@@ -45,6 +46,8 @@ class Team {
     for (const auto& [a, b] : all_links(robots))
       if (std::find(links.begin(), links.end(), std::pair(a, b)) == links.end())
         network_.set_link_between(a + 1, b + 1, false);
+    for (int host = 1; path_mtu > 0 && host <= robots; ++host)
+      network_.set_path_mtu(host, path_mtu);
     const int domain = random_domain();
     for (int k = 0; k < robots; ++k) {
       write_part(graph, static_cast<RobotId>(k), folder_);
@@ -67,12 +70,6 @@ class Team {
   void take_addresses() {
     for (int host = 1; host <= static_cast<int>(robots_.size()); ++host)
       network_.set_address(host, "");
-  }
-
-  // Larger packets do not reach any robot.
-  void set_path_mtu(int bytes) {
-    for (int host = 1; host <= static_cast<int>(robots_.size()); ++host)
-      network_.set_path_mtu(host, bytes);
   }
 
   void interrupt() {
@@ -243,10 +240,11 @@ TEST_CASE("A team that splits in two ends, and both sides report the robots they
 TEST_CASE("A path that drops large packets is a finding of the run with their size",
           "[system][namespaces]") {
   if (!VirtualNetwork::available()) return;
-  const SplitGraph graph = random_team(23, {0, 1}, 200, {{0, 1}});
+  // 1000 closures: the messages on them are large.
+  const SplitGraph graph =
+      random_team(23, {0, 1}, 200, std::vector<std::pair<RobotId, RobotId>>(125, {0, 1}));
   const TemporaryFolder folder;
-  Team team(graph, {{0, 1}}, folder.path(), "newton --serve-limit 15");
-  team.set_path_mtu(1000);
+  Team team(graph, {{0, 1}}, folder.path(), "newton --serve-limit 15", 3.0, 1000);
   CHECK(team.wait() == std::vector<int>{0, 0});
   const RunSummary summary = read_summary(folder.path() / robot_name(0) / "summary.json");
   CHECK(summary.pgo.members.size() < 2);
