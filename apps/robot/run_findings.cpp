@@ -334,8 +334,10 @@ class FindingsOfRun {
 
   void add_cameras() {
     // Odometry that is wrong for a known reason estimates wrong errors of the cameras.
-    const auto is_error = [](const Finding& one) { return one.severity == kError; };
-    if (!run_.cameras || std::ranges::any_of(run_.noticed, is_error)) return;
+    const auto is_of_sensors = [](const Finding& one) {
+      return one.severity == kError && !one.id.starts_with("network.");
+    };
+    if (!run_.cameras || std::ranges::any_of(run_.noticed, is_of_sensors)) return;
     const CamerasSummary& found = *run_.cameras;
     constexpr double kSure = 3.0;  // standard deviations
     constexpr double kOffset_s = 2e-3, kLargeOffset_s = 1e-2, kRotation_rad = 8.7e-3;

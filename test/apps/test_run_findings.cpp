@@ -114,6 +114,14 @@ TEST_CASE("Two robots did not join for the first stage that stopped their closur
   CHECK_THAT(why(tally_of(9, 7, 5, 2)), Contains("2 kept, which the other closures contradict"));
 }
 
+TEST_CASE("An error of the network hides no finding on the cameras", "[robot][findings]") {
+  RunFacts run = run_of(0, true, tally_of(400, 30, 10, 10));
+  run.summary.cameras = {.offset_s = 0.02, .offset_sigma_s = 0.001};
+  REQUIRE(the_finding_of(run).id == "cameras.offset");
+  run.summary.noticed = {{.id = "network.path_mtu", .severity = Severity::kError}};
+  CHECK(findings_of_one(run).size() == 2);
+}
+
 TEST_CASE("Robots that one place or no closure ties are reported as such", "[robot][findings]") {
   std::vector<RunFacts> runs{run_of(0, true, tally_of(9, 7, 3, 3)), run_of(2, true, {})};
   CHECK(findings_of(runs).empty());
