@@ -45,8 +45,7 @@ struct SessionGraph {
   KeyframeId origin = {};                     ///< Covariances are relative to this keyframe.
   /// Second look of a session: `start` is the solution without the deferred closures.
   bool again = false;
-  double first_barc =
-      0.0;  ///< Second look: largest residual of an inlier of the first one [sigma].
+  double first_barc = 0.0;  ///< Second look: largest residual of an inlier in the first [sigma].
   /// Kept or rejected: closures to robots out of reach by an earlier session, and in a second look
   /// all closures by the first one. Closures without an entry are undecided.
   std::map<ClosureId, bool> decided = {};

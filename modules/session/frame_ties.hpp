@@ -22,10 +22,10 @@ struct RobotTie {
 };
 
 /// The ties between all robots of `statuses` (by robot), ascending. Both robots of a pair report
-/// these numbers in their statuses. While the two numbers differ, the
-/// lower one counts. With `solved`, the plan of the last session with a solution: a pair of its
-/// members that has found its first closures since is not tied. The solution lacks these closures
-/// and may place the two robots anywhere, until the next session.
+/// these numbers in their statuses. While the two numbers differ, the lower one counts. With
+/// `solved`, the plan of the last session with a solution: a pair of its members that has found its
+/// first closures since is not tied. The solution lacks these closures and may place the two robots
+/// anywhere, until the next session.
 [[nodiscard]] std::vector<RobotTie> find_ties(const std::map<RobotId, TeamStatus>& statuses,
                                               const SessionPlan* solved = nullptr);
 
