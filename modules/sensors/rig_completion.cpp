@@ -385,8 +385,10 @@ Rig complete_rig(const std::string& name, BagReader& bag, PartialRig rig) {
           others += "; " + readable(channel.topic, 80) + " has messages of " +
                     readable(channel.type, 80) + ", not of " + std::string(source.type) +
                     ": state its calibration in the rig file";
-    throw DatasetError(
-        name + ": the calibration is not complete; missing: " + completion.missing() + others);
+    throw DatasetError(name +
+                       ": the calibration is not complete; name its files in the rig file "
+                       "(calibration: ...); missing: " +
+                       completion.missing() + others);
   };
   const bool uses_moving = is_absent(kStaticTransforms) && !is_absent(kTransforms);
   if (uses_moving) completion.use_moving_transforms();
