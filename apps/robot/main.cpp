@@ -46,7 +46,7 @@ Files written to --output: odometry.tum, live.tum, optimized.tum, optimized_keyf
 keyframes.csv, loop_closures.csv, optimizer.csv, traffic.csv, process.csv, timing.csv, config.yaml, summary.json,
 rig_estimated.yaml (for --rig of the next run), run.journal (for --resume and --session); with mapping.mode on also
 mesh.ply, mesh_optimized.ply, label_palette.csv, objects.json, map.yaml and map.pgm; with map.team also team_mesh.ply and
-team_map.*; with --record record.mcap. apps/robot/README.md describes all of them.
+team_map.*; with --record record.mcap. apps/robot/outputs.md describes all of them.
 Ctrl-C, SIGTERM and SIGHUP end the run in order with everything written; a second Ctrl-C or SIGTERM ends it at once.
 Exit codes: 0 done; 1 bad input or configuration, a recording without a pose, or live sensors without an image;
 2 bad command line; 3 a module failed, or another robot uses this robot's id; 4 results could not be written (the log

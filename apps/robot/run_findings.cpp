@@ -468,7 +468,7 @@ Finding failed_run(const std::string& reason) {
           .severity = Severity::kError,
           .what = reason,
           .means = "the results are incomplete or unusable",
-          .to_do = "see the log of the robot, and the exit codes in apps/robot/README.md"};
+          .to_do = "see the log of the robot, and the exit codes in apps/robot/outputs.md"};
 }
 
 }  // namespace km

@@ -19,7 +19,7 @@ CalibrationMap sensor_yaml(const fs::path& mav0, const char* sensor) {
   const fs::path file = mav0 / sensor / "sensor.yaml";
   if (is_absent(file))
     throw DatasetError(file.string() + ": no such file: a EuRoC folder has the calibration of " +
-                       sensor + " there, beside data.csv (see Inputs in apps/robot/README.md)");
+                       sensor + " there, beside data.csv (see apps/robot/recording.md)");
   return CalibrationMap(file);
 }
 
@@ -91,7 +91,7 @@ DepthCamera depth_camera_of(const fs::path& folder, const fs::path& file) {
   throw DatasetError(folder.string() +
                      ": a folder in TUM's layout has no calibration: name it after its camera "
                      "(freiburg1, freiburg2 or freiburg3 in its name), or describe the camera by "
-                     "--rig FILE (see Inputs in apps/robot/README.md)");
+                     "--rig FILE (see apps/robot/recording.md)");
 }
 
 }  // namespace

@@ -33,7 +33,7 @@ const char* text(VioProblem problem) {
       return "images contradict the estimate: the recent poses are wrong, starting again "
              "from the last pose. If it repeats: check calibration and stamps by "
              "kimera_multi_doctor, light and exposure, then the keys under 'Odometry is bad' in "
-             "apps/robot/README.md";
+             "apps/robot/odometry.md";
     case VioProblem::kLost:
       return "images do not determine the pose, and there is no inertial sensor: starting again "
              "from the last pose when they do";
