@@ -116,6 +116,15 @@ Estimate estimate(std::span<const NoiseCycle> cycles, double observations, doubl
   return {std::ranges::find_if(densities, credible)->first, most - log_usual};
 }
 
+// Log of the odds that closures have the factor `s`, against `other`, without a prior.
+double log_odds(std::span<const NoiseCycle> cycles, double observations, double s, double other,
+                double odometry) {
+  if (cycles.empty()) return 0.0;
+  const std::vector<double> weights = weights_of(cycles, observations);
+  return posterior_of(cycles, weights, s, s, odometry).log_density -
+         posterior_of(cycles, weights, other, other, odometry).log_density;
+}
+
 // The errors of length of the odometry of both robots that explain these cycles best, by least
 // squares.
 Eigen::Vector2d fit_length(std::span<const NoiseCycle> cycles, std::span<const double> weights,
@@ -236,13 +245,14 @@ bool shows_noise(const PairCycles& cycles) {
   return cycles.places >= kFewPlaces;
 }
 
+bool shows_factor(const PairCycles& cycles, double usual, double factor) {
+  const double odometry = std::min(1.0, kNoisyOdometry * usual);
+  return log_odds(cycles.inside, cycles.places, factor, usual, odometry) >= kThousandToOne ||
+         log_odds(cycles.between, cycles.places, factor, usual, odometry) >= kThousandToOne;
+}
+
 bool excludes_noise(const PairCycles& cycles, double excluded, double factor) {
-  if (cycles.between.empty()) return false;
-  const std::vector<double> weights = weights_of(cycles.between, cycles.places);
-  const auto log_density = [&](double s) {
-    return posterior_of(cycles.between, weights, s, s, 1.0).log_density;
-  };
-  return log_density(factor) - log_density(excluded) >= kThousandToOne;
+  return log_odds(cycles.between, cycles.places, factor, excluded, 1.0) >= kThousandToOne;
 }
 
 double estimate_closure_noise(const PairCycles& cycles, double usual) {

@@ -61,6 +61,10 @@ struct ClosureNoiseRecord {
 /// True if the pair has enough places for estimate_closure_noise().
 [[nodiscard]] bool shows_noise(const PairCycles& cycles);
 
+/// True if the closures of a pair have the noise `factor` of closures inside one of its robots,
+/// and not the usual one. The odds are then at least 1000 to 1.
+[[nodiscard]] bool shows_factor(const PairCycles& cycles, double usual, double factor);
+
 /// True if the cycles of a pair between places contradict the noise `excluded`. The odds are then
 /// at least 1000 to 1 that closures are `factor` times noisier than claimed, and not `excluded`
 /// times.

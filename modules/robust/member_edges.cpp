@@ -1,6 +1,7 @@
 #include "modules/robust/member_edges.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 #include <stdexcept>
 #include <utility>
@@ -52,7 +53,10 @@ MemberEdges::MemberEdges(SessionGraph graph, TreePlace place, const TreeNewtonOp
   for (const PoseEdge& e : graph_.between) {
     (void)start_of(e.from);
     (void)start_of(e.to);
-    known_.push_back({.edge = e});
+    const auto [least, common] = closure_precisions(e.peer_of(graph_.self));
+    Known& known = known_.emplace_back(e);
+    known.edge.precision.kappa *= common.kappa;
+    known.edge.precision.tau *= common.tau;
   }
   weaken_odometry();  // in a second look
   reopen();
@@ -65,6 +69,15 @@ const SE3& MemberEdges::start_of(const KeyframeId& id) const {
   if (found == graph_.public_poses.end())
     throw std::invalid_argument("TreeNewton: no robot has published pose " + to_string(id));
   return found->second;
+}
+
+// The smaller and the larger weights that this robot and `peer` report for the closures inside
+// them. Closures between the robots have the larger ones, unless cycles show more noise.
+std::pair<Precision, Precision> MemberEdges::closure_precisions(RobotId peer) {
+  const Precision own = graph_.closure_precision[graph_.self];
+  const Precision other = graph_.closure_precision[peer];
+  return {{std::min(own.kappa, other.kappa), std::min(own.tau, other.tau)},
+          {std::max(own.kappa, other.kappa), std::max(own.tau, other.tau)}};
 }
 
 // Both robots of a pair use the poses and verdicts that are sent, and so decide equally.
@@ -276,6 +289,10 @@ void MemberEdges::weigh_by_noise(double noise_scale) {
     if (!graph_.again)  // the poses now fit the closures that the first look has kept
       open.count_cycles(cycles);
     cycles.factor = estimate_closure_noise(cycles, noise_scale) / noise_scale;
+    const auto [least, common] = closure_precisions(peer);
+    const double noise = std::sqrt(std::min(common.kappa / least.kappa, common.tau / least.tau));
+    if (cycles.factor < noise && shows_factor(cycles, noise_scale, noise * noise_scale))
+      cycles.factor = noise;
     for (const std::size_t k : indices)
       divide(known_[k].edge.precision, cycles.factor * cycles.factor);
   });

@@ -74,6 +74,7 @@ class MemberEdges {
   [[nodiscard]] Corroboration corroboration(std::span<const PoseEdge> closures,
                                             const Corroboration::PoseOf& pose) const;
   void for_cycles(auto&& visit);
+  [[nodiscard]] std::pair<Precision, Precision> closure_precisions(RobotId peer);
   void reopen();
   void classify();
   [[nodiscard]] PairVote vote_on(RobotId peer, const Indices& closures, bool first) const;

@@ -25,6 +25,8 @@ constexpr double kLargestNormalTurn_rad = 0.7;
 constexpr double kShortCycleWeight = 0.5;
 constexpr double kRatioSigma = 0.6931;  // log 2, prior of log sqrt(v_R / v_t)
 constexpr int kSweeps = 4;
+// Smallest variance factor of closures, and of steps together with closures, that a fit considers.
+constexpr double kLeastFactor = 1.0 / 64.0;
 constexpr double kMostBeside = 256.0;  // parking-garage claims 200 times its noise
 // Odometry of recorded graphs is not white, so that ratios of 4 to 8 also appear. They are ignored:
 // ais2klinik in five robots would lose 198 of 1614 true closures with reversed ids.
@@ -143,7 +145,7 @@ double log_posterior_of_claims(const Cycles& all) {
   double most = log_posterior(all, best);
   for (const bool both : {true, false}) {
     Factors next = best;
-    for (double v = 1.0 / 64.0; v <= 4096.0; v *= 2.0) {
+    for (double v = kLeastFactor; v <= 4096.0; v *= 2.0) {
       next[kTwoClosures] = v;
       if (both) next[kClosure] = v;
       const double found = log_posterior(all, next);
@@ -156,8 +158,8 @@ double log_posterior_of_claims(const Cycles& all) {
 }
 
 // A pattern search, coarse to fine: along each factor, and along both factors of odometry or of
-// closures.
-FactorFit fit_factors(const Cycles& all) {
+// closures. `least`: smallest factor of odometry.
+FactorFit fit_factors(const Cycles& all, double least = 1.0) {
   constexpr std::array<Factors, 7> kDirections{{{1.0, 0.0, 0.0, 0.0},
                                                 {0.0, 1.0, 0.0, 0.0},
                                                 {0.0, 0.0, 1.0, 0.0},
@@ -184,7 +186,7 @@ FactorFit fit_factors(const Cycles& all) {
         for (const double step : {ratio * ratio, 1.0 / (ratio * ratio)}) {
           Factors next = fit.factors;
           for (std::size_t f = 0; f < kComponents; ++f) next[f] *= std::pow(step, direction[f]);
-          for (const Component f : {kRotation, kTranslation}) next[f] = std::max(1.0, next[f]);
+          for (const Component f : {kRotation, kTranslation}) next[f] = std::max(least, next[f]);
           if (next != fit.factors) is_better |= try_factors(next);
         }
       if (!is_better) break;
@@ -274,8 +276,9 @@ OdometryNoise estimate_odometry_noise(std::span<const PoseEdge> steps,
   const bool few_are_long = 2 * normal.size() < cycles.size();
   normal.insert(normal.end(), near.begin(), near.end());
   const FactorFit refined = fit_factors({normal, volume, dimension});
-  const FactorFit common = fit_factors({in_common(normal), volume, dimension});
+  FactorFit common = fit_factors({in_common(normal), volume, dimension}, kLeastFactor);
   noise.of_closures = common.log_posterior - refined.log_posterior >= kThousandToOne;
+  for (double& factor : common.factors) factor = std::max(1.0, factor);
   if (noise.of_closures)
     fit = common;
   else if (refined.log_odds >= kThousandToOne)

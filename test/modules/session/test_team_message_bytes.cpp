@@ -63,6 +63,7 @@ MemberPoses some_poses() {
                     .stage = MemberStage::kSolved,
                     .frame = {kPeer2, 8},
                     .step_precision = {123.456, 7.0},
+                    .closure_precision = {0.25, 1.0},
                     .keyframes = {0, 1, 5, 200, 4'000'000'000U},
                     .later_runs = {5, 4'000'000'000U}};
   for (std::size_t k = 0; k < poses.keyframes.size(); ++k)
@@ -237,6 +238,8 @@ TEST_CASE("Invalid poses of a member are refused", "[pose_graph]") {
        {"not finite", [](P& m) { m.T_frame_kf[3].t.z() = static_cast<float>(kInfinity); }},
        {"an invalid rotation", [](P& m) { m.T_frame_kf[3].q.coeffs() *= 1.01F; }},
        {"zero weight", [](P& m) { m.step_precision.tau = 0.0; }},
+       {"closures without weight", [](P& m) { m.closure_precision.kappa = 0.0; }},
+       {"closures better than claimed", [](P& m) { m.closure_precision.tau = 2.0; }},
        {"too much weight", [](P& m) { m.step_precision.kappa = 1e300; }},
        {"a closure of a keyframe with itself",
         [](P& m) { m.verdicts[0].id.from = m.verdicts[0].id.to; }},
