@@ -15,7 +15,6 @@ bool ClosureDecisions::is_rejected(const ClosureId& id) const {
 }
 
 void ClosureDecisions::begin_result(std::span<const RobotId> members) {
-  verdicts_.clear();
   counted_.clear();
   std::erase_if(decided_, [&](const auto& entry) {
     return std::ranges::binary_search(members, entry.first.from.robot) &&
@@ -25,22 +24,20 @@ void ClosureDecisions::begin_result(std::span<const RobotId> members) {
 
 void ClosureDecisions::decide(std::span<const WeighedClosure> verdicts) {
   if (verdicts.empty()) return;
-  for (const auto& [id, kept] : verdicts) decided_[id] = verdicts_[id] = kept;
+  for (const auto& [id, kept] : verdicts) decided_[id] = kept;
   verdicts_due_ = true;
   counted_.clear();
 }
 
 void ClosureDecisions::discard(RobotId robot) {
-  const auto concerns = [&](const auto& entry) { return touches(entry.first, robot); };
-  std::erase_if(decided_, concerns);
-  std::erase_if(verdicts_, concerns);
+  std::erase_if(decided_, [&](const auto& entry) { return touches(entry.first, robot); });
   counted_.clear();
 }
 
 std::optional<ClosureVerdicts> ClosureDecisions::take_verdicts() {
   if (!std::exchange(verdicts_due_, false)) return std::nullopt;
   ClosureVerdicts result;
-  for (const auto& [id, kept] : verdicts_) result.closures.push_back({id, kept});
+  for (const auto& [id, kept] : decided_) result.closures.push_back({id, kept});
   return result;
 }
 

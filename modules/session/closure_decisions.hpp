@@ -28,7 +28,7 @@ class ClosureDecisions {
   /// Discards all decisions on closures with a robot whose keyframe indices have a new meaning.
   void discard(RobotId robot);
 
-  /// All verdicts of the last session, if there are new ones since the last call.
+  /// All verdicts, if there are new ones since the last call.
   [[nodiscard]] std::optional<ClosureVerdicts> take_verdicts();
 
   /// Sets `places` and `contradicted` of an offer of these closures, by the kept ones; by all of
@@ -38,7 +38,6 @@ class ClosureDecisions {
 
  private:
   std::map<ClosureId, bool> decided_;
-  std::map<ClosureId, bool> verdicts_;
   bool verdicts_due_ = false;
   // Offers with `places` and `contradicted`, by the present decisions.
   std::map<std::pair<RobotId, EdgeSetId>, EdgeSetOffer> counted_;

@@ -103,6 +103,7 @@ TEST_CASE("a robot resumed without its team continues from the last solution",
   REQUIRE(settle(network));
   TeamSolution solution;
   solution.trajectory = *network.robots.at(resumed).trajectory;
+  solution.verdicts = network.robots.at(resumed).verdicts;
   for (const RobotId id : kIds)
     if (id != resumed) solution.peers.push_back({id, boot});
   TeamNetwork alone;

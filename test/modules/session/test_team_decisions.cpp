@@ -253,4 +253,42 @@ TEST_CASE("decisions that a team makes without a robot do not outlast its absenc
   check_ends_agree(network);
 }
 
+TEST_CASE("closures to a robot out of reach that no session has kept move no robot",
+          "[pose_graph][decisions]") {
+  TeamProblem problem = problem_of(3);
+  TeamNetwork network;
+  add_four(network, problem);
+  REQUIRE(settle(network));
+  network.kill(9);
+  (void)network.run(10.0);
+  REQUIRE(settle(network));
+  const TeamPoses before = network.trajectories();
+
+  const ClosureId held = first_between(problem, 5, 9);
+  const KeyframeId theirs = held.from.robot == 9 ? held.from : held.to;
+  std::mt19937 rng(1);
+  const SE3 T_false = random_pose(rng, 5.0);
+  const Precision precision = problem.edges.back().precision;
+  std::set<ClosureId> known;
+  for (const PoseEdge& e : problem.edges) known.insert(e.id());
+  for (KeyframeIndex k = 0; k < kSquareKeyframes; ++k)
+    if (const KeyframeId own{5, k}; known.insert(closure_id(own, theirs)).second)
+      problem.edges.push_back({own, theirs, T_false, precision});
+  for (const PoseEdge& e : problem.edges)
+    if (!is_step(e) && std::minmax(e.from.robot, e.to.robot) == std::minmax<RobotId>(5, 9))
+      (void)network.agent(5).add(closure_of(e, &problem));
+  REQUIRE(network.agent(5).add(inlier_set(problem, 5, 9, 2)));
+  KeyframeOdometry next;  // the next session waits for a measurement of a member
+  next.id = {5, kSquareKeyframes};
+  next.covariance = covariance_of(precision);
+  REQUIRE(network.agent(5).add(next));
+  (void)network.run(10.0);
+  REQUIRE(settle(network));
+  constexpr double kSame_m = 1e-6;
+  for (const RobotId robot : {RobotId{2}, RobotId{3}, RobotId{5}})
+    for (std::size_t k = 0; k < kSquareKeyframes; ++k)
+      CHECK((network.trajectories().at(robot)[k].translation() - before.at(robot)[k].translation())
+                .norm() < kSame_m);
+}
+
 }  // namespace km
