@@ -127,8 +127,8 @@ std::optional<FrozenPart> freeze(const AgentState& s, const Session& session) {
   if (!part) return std::nullopt;
   part->in_frame = session.plan.members.front().peer == s.self;
   part->closures_may_be_false = s.expects_false();
-  // A robot out of reach cannot help to tell which closures are false: those that no session has
-  // kept wait for it.
+  // Without a robot out of reach, there is too little evidence on which closures to it are false.
+  // Those that no session has kept wait for it.
   if (s.expects_false())
     std::erase_if(part->graph.to_absent, [&](const PoseEdge& e) {
       const auto decided = s.decisions.decided().find(e.id());
