@@ -27,8 +27,9 @@ constexpr std::size_t kVerdictBytes = 4;
 
 // With the rotation as a quaternion.
 void describe_pose(auto& archive, As<SE3> auto& T) {
-  Eigen::Quaterniond q(T.linear());
-  Eigen::Vector3d t = T.translation();
+  Eigen::Quaterniond q = Eigen::Quaterniond::Identity();
+  Eigen::Vector3d t = Eigen::Vector3d::Zero();
+  if constexpr (!kReads<decltype(archive)>) q = T.linear(), t = T.translation();
   archive(q.coeffs(), t);
   const bool is_pose =
       std::abs(q.norm() - 1.0) <= kUnitTolerance && t.cwiseAbs().maxCoeff() <= kMaxTranslation_m;
