@@ -160,7 +160,7 @@ TEST_CASE("Every journal entry is restored exactly", "[journal]") {
 
   std::vector<JournalEntry> run = some_run();
   run.emplace_back(PoseChanges{
-      3, {{{7, 0}, random_pose(rng), random_covariance(rng, 0.1)}, {{3, 70000}, {}, {}}}});
+      3, {{{7, 0}, random_pose(rng), random_covariance(rng, 0.1)}, {.id = {3, 70000}}}});
   run.emplace_back(ClosureJudgements{{{{{1, 2}, {7, 3}}, true, false}}});
   run.emplace_back(RobotSample{.name = "alpha", .keyframes = 5, .links = {{3, 0.5F}}});
   run.emplace_back(MeshCells{2, {{-1, 2, 1 << 30}}});
