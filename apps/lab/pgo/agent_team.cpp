@@ -27,6 +27,8 @@ constexpr double kTick_s = 0.05;       // period of TeamNode
 constexpr double kDelay_s = 1e-3;
 constexpr double kLatestMeeting_s = 20.0;  // with random times
 constexpr double kMeanDelay_s = 0.03;      // with random times
+constexpr double kOutage_s = 2.0, kLastOutage_s = 40.0;
+constexpr double kAway = 1.0 / 3.0;  // probability that a robot is out of reach
 // Most bytes with which the network states kind, number and receiver of a message of its sender.
 constexpr std::size_t kMessageHead = 8;
 // Longest wait for the next session, beyond PoseGraphConfig::session_wait_s. A team without a
@@ -112,14 +114,7 @@ class AgentTeam {
           {.agent = std::make_unique<TeamAgent>(options.pose_graph, peer(k),
                                                 solver_choice(options.pose_graph, graph.dimension),
                                                 graph.dimension)});
-    LinksReport links{.links = {}, .version = 1};
-    for (std::size_t k = 0; k < members_.size(); ++k) {
-      std::set<RobotId> others;
-      for (std::size_t other = 0; other < members_.size(); ++other)
-        if (other != k) others.insert(static_cast<RobotId>(other));
-      links.links.report(static_cast<RobotId>(k), std::move(others));
-    }
-    for (const Member& member : members_) member.agent->update_links(links);
+    report_links();
   }
 
   AgentTeamRun run() {
@@ -127,6 +122,7 @@ class AgentTeam {
     double last_change_s = 0.0;
     while (now_s_ - last_change_s < quiet_s && now_s_ < kLongest_s) {
       const bool played = play();
+      draw_outages();
       const bool idle = exchange();
       if (played || pending() || !settled()) last_change_s = now_s_;
       if (settled() && changed_) last_change_s = now_s_;
@@ -150,8 +146,10 @@ class AgentTeam {
     std::size_t session_bytes = 0;  // sent
     AgentCost cost = {};
     bool due = true;
+    bool away = false;  // out of reach
   };
   struct Delivery {
+    std::size_t from = 0;
     std::size_t to = 0;
     TeamMessage message;
   };
@@ -166,6 +164,27 @@ class AgentTeam {
   }
   [[nodiscard]] double played_s(KeyframeIndex keyframe) const {
     return options_.keyframes_per_s > 0.0 ? keyframe / options_.keyframes_per_s : 0.0;
+  }
+
+  // Another third of the robots is out of reach.
+  void draw_outages() {
+    if (!options_.outages || now_s_ < next_outage_s_ || next_outage_s_ > kLastOutage_s) return;
+    next_outage_s_ += kOutage_s;
+    for (Member& member : members_)
+      member.away = next_outage_s_ <= kLastOutage_s && random_s(1.0) < kAway;
+    report_links();
+  }
+
+  void report_links() {
+    LinksReport links{.links = {}, .version = ++links_version_};
+    for (std::size_t k = 0; k < members_.size(); ++k) {
+      std::set<RobotId> others;
+      for (std::size_t other = 0; other < members_.size(); ++other)
+        if (other != k && !members_[k].away && !members_[other].away)
+          others.insert(static_cast<RobotId>(other));
+      links.links.report(static_cast<RobotId>(k), std::move(others));
+    }
+    for (const Member& member : members_) member.agent->update_links(links);
   }
 
   // Gives the robots their measurements up to now. True if there were any.
@@ -239,6 +258,10 @@ class AgentTeam {
     for (const Member& member : members_) before_s.push_back(member.cost.cpu_s);
     while (!in_flight_.empty() && in_flight_.begin()->first <= now_s_) {
       const Delivery delivery = in_flight_.extract(in_flight_.begin()).mapped();
+      if (members_[delivery.from].away || members_[delivery.to].away) {
+        in_flight_.emplace(next_outage_s_, delivery);
+        continue;
+      }
       measure(members_[delivery.to],
               [&](TeamAgent& agent) { (void)agent.receive(delivery.message); });
       members_[delivery.to].due = true;
@@ -274,7 +297,8 @@ class AgentTeam {
                                           .to = static_cast<RobotId>(to),
                                           .bytes = bytes});
       if (!decoded.value) throw std::runtime_error("run_agent_team: a message cannot be decoded");
-      in_flight_.emplace(arrival_s(robot, to, message), Delivery{to, std::move(*decoded.value)});
+      in_flight_.emplace(arrival_s(robot, to, message),
+                         Delivery{robot, to, std::move(*decoded.value)});
       const std::size_t sent = kMessageHead + bytes.size();
       members_[robot].session_bytes += std::holds_alternative<TeamStatus>(message) ? 0 : sent;
       members_[robot].cost.sent[message.index()] += sent;
@@ -367,6 +391,8 @@ class AgentTeam {
   std::size_t bytes_ = 0;
   double now_s_ = 0.0;
   double next_tick_s_ = 0.0;
+  double next_outage_s_ = 0.0;
+  std::uint64_t links_version_ = 0;
   bool changed_ = false;
 };
 

@@ -33,6 +33,9 @@ struct AgentTeamOptions {
   /// Seed of random times: robots start and meet within the first 20 s, and messages take 30 ms on
   /// average. 0: robots meet at once, and each message takes 1 ms.
   unsigned seed = 0;
+  /// With a seed: until 40 s, every two seconds another third of the robots, drawn at random, is
+  /// out of reach of all. Messages to and from it wait.
+  bool outages = false;
   TeamMeter meter = {};
 };
 

@@ -99,23 +99,27 @@ std::optional<TeamGraph> graph_of(const LawCase& recorded) {
       .graph;
 }
 
-// Compares a run at once with runs in which robots start and meet at random times.
+// Compares a run at once with runs in which robots start and meet at random times, and are out of
+// reach at random.
 void check_orders(const LawCase& recorded) {
   CAPTURE(recorded.name, recorded.scenario);
   const auto graph = graph_of(recorded);
   if (!graph) return;
   const Answer at_once = answer(*graph, {});
-  const auto check_order = [&](unsigned seed, double keyframes_per_s) {
-    CAPTURE(seed, keyframes_per_s);
-    check_same(at_once, answer(*graph, {.keyframes_per_s = keyframes_per_s, .seed = seed}),
-               recorded.tolerance_m);
+  const auto check_order = [&](unsigned seed, double keyframes_per_s, bool outages) {
+    CAPTURE(seed, keyframes_per_s, outages);
+    check_same(
+        at_once,
+        answer(*graph, {.keyframes_per_s = keyframes_per_s, .seed = seed, .outages = outages}),
+        recorded.tolerance_m);
   };
-  check_order(1, 0.0);
-  check_order(2, 20.0);
+  check_order(1, 0.0, false);
+  check_order(2, 20.0, true);
 }
 
-TEST_CASE("A team ends equally, in whatever order and at whatever rate its robots meet",
-          "[pgo][law]") {
+TEST_CASE(
+    "A team ends equally, in whatever order, at whatever rate and with whatever outages it meets",
+    "[pgo][law]") {
   check_orders(
       GENERATE(LawCase{"cosmo_bench/kth_r3_00_d06_d09_d10_wifi.jrl", 0, "", kOverKilometres_m},
                LawCase{"cosmo_bench/ntu_r3_02_d02_n04_n13_wifi.jrl", 0, "", kOverKilometres_m},
