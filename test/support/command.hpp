@@ -3,10 +3,12 @@
 #include <sys/wait.h>
 
 #include <array>
+#include <catch2/catch.hpp>
 #include <cstdio>
 #include <sstream>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace km {
@@ -43,6 +45,14 @@ inline CommandResult run_command(const std::string& command) {
     result.output.append(buffer.data(), n);
   const int status = pclose(pipe);
   if (WIFEXITED(status)) result.exit_code = WEXITSTATUS(status);
+  return result;
+}
+
+/// The result of a program that must end with exit code 0. Otherwise the test fails and shows its
+/// output.
+inline CommandResult succeeded(CommandResult result) {
+  INFO(result.output);
+  REQUIRE(result.exit_code == 0);
   return result;
 }
 

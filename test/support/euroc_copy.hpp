@@ -1,11 +1,9 @@
 #pragma once
 
 #include <array>
-#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <set>
-#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <utility>

@@ -2,7 +2,6 @@
 
 #include <filesystem>
 #include <opencv2/core.hpp>
-#include <string_view>
 #include <vector>
 
 #include "modules/core/write_file.hpp"

@@ -19,8 +19,7 @@ inline OccupancyGrid load_nav2_map(const std::string& yaml, const std::string& i
   REQUIRE(map["mode"].as<std::string>() == "trinary");
   REQUIRE(map["origin"].size() == 3);
   CHECK(map["origin"][2].as<double>() == 0.0);
-  OccupancyGrid grid;
-  grid.resolution_m = map["resolution"].as<double>();
+  OccupancyGrid grid{.resolution_m = map["resolution"].as<double>(), .cells = {}};
   grid.origin = {map["origin"][0].as<double>(), map["origin"][1].as<double>()};
   std::istringstream stream(image);
   std::string magic;

@@ -26,10 +26,8 @@ inline InlierSet inlier_set(const SplitGraph& graph, RobotId a, RobotId b) {
 }
 
 inline KeyframeOdometry keyframe_odometry(const RelativePose& step) {
-  KeyframeOdometry keyframe;
-  keyframe.id = step.to;
-  keyframe.T_previous_kf = step.T_from_to;
-  keyframe.covariance = step.covariance;
+  KeyframeOdometry keyframe{
+      .id = step.to, .T_previous_kf = step.T_from_to, .covariance = step.covariance};
   return keyframe;
 }
 

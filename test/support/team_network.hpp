@@ -402,10 +402,8 @@ inline void feed_odometry(TeamAgent& agent, RobotId robot, const TeamProblem& pr
   (void)agent.add(first);
   for (const PoseEdge& e : problem.edges) {
     if (!is_step(e) || e.from.robot != robot) continue;
-    KeyframeOdometry keyframe;
-    keyframe.id = e.to;
-    keyframe.T_previous_kf = e.T_from_to;
-    keyframe.covariance = covariance_of(e.precision);
+    KeyframeOdometry keyframe{
+        .id = e.to, .T_previous_kf = e.T_from_to, .covariance = covariance_of(e.precision)};
     (void)agent.add(keyframe);
   }
 }
