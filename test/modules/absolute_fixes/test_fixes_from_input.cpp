@@ -7,7 +7,6 @@
 #include "modules/absolute_fixes/fix_association.hpp"
 #include "modules/absolute_fixes/geodetic.hpp"
 #include "modules/absolute_fixes/node/fixes_node.hpp"
-#include "modules/core/input_file.hpp"
 #include "modules/core/lie.hpp"
 #include "modules/recordings/ros_messages.hpp"
 #include "test/support/temporary_folder.hpp"
@@ -182,8 +181,7 @@ TEST_CASE("the node publishes live fixes", "[absolute_fixes]") {
                  {states, restored, keyframes, fixes,
                   [&](const ReceivedFix& fix) { journaled.push_back(fix.stamp); }});
   for (Stamp t = 0; t <= 4; ++t) {
-    OdometryState state;
-    state.stamp = t * kSecond_ns;
+    OdometryState state{.stamp = t * kSecond_ns};
     state.T_odom_body.translation().x() = static_cast<double>(t);
     node.step(std::make_shared<const OdometryState>(state));
     KeyframeOdometry keyframe;
@@ -221,9 +219,7 @@ TEST_CASE("a fix between images measures the nearest keyframe", "[absolute_fixes
   if (is_recorded) add_fixes_until(20'000'000'000);
   for (Stamp t = 0; t < 10'000'000'000; t += kImage_ns) {
     if (!is_recorded) add_fixes_until(t - 300'000'000);  // live fixes are late
-    OdometryState state;
-    state.stamp = t;
-    state.T_odom_body = T_odom_body(t);
+    OdometryState state{.stamp = t, .T_odom_body = T_odom_body(t)};
     association.add(state);
     if (t % (10 * kImage_ns) != 0) continue;
     KeyframeOdometry keyframe;
@@ -254,8 +250,7 @@ TEST_CASE("a robot that rests for an hour stores a minute", "[absolute_fixes]") 
   if (has_keyframe) association.add(keyframe);
   std::size_t most = 0;
   for (Stamp t = 0; t < kHour_ns; t += kSecond_ns / 20) {
-    OdometryState state;
-    state.stamp = t;
+    OdometryState state{.stamp = t};
     association.add(state);
     if (t % (kSecond_ns / 5) == 0)
       association.add(TimedPosition{t + 7, {seconds_between(0, t), 0.0, 0.0}, 0.1});
@@ -272,8 +267,7 @@ TEST_CASE("a robot that rests for an hour stores a minute", "[absolute_fixes]") 
   association.add(next);
   std::vector<PositionFix> taken;
   for (Stamp t = kHour_ns; t <= kHour_ns + 5 * kSecond_ns; t += kSecond_ns / 20) {
-    OdometryState state;
-    state.stamp = t;
+    OdometryState state{.stamp = t};
     association.add(state);
     for (const PositionFix& fix : association.take(5)) taken.push_back(fix);
   }

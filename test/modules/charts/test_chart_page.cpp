@@ -1,13 +1,10 @@
 #include "modules/charts/chart_page.hpp"
 
 #include <catch2/catch.hpp>
-#include <cmath>
 #include <iostream>
 #include <limits>
 #include <nlohmann/json.hpp>
-#include <stdexcept>
 
-#include "modules/charts/html_page.hpp"
 #include "test/apps/viewer/page_programs.hpp"
 #include "test/support/page_text.hpp"
 #include "test/support/temporary_folder.hpp"

@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "modules/constellations/constellation_match.hpp"
-#include "modules/constellations/constellation_pose.hpp"
 #include "modules/core/lie.hpp"
 #include "test/modules/constellations/scenes.hpp"
 

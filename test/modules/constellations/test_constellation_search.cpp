@@ -1,13 +1,50 @@
 #include <catch2/catch.hpp>
-
+#include <memory>
 #include <random>
 #include <vector>
 
 #include "modules/constellations/constellation_search.hpp"
-#include "test/modules/constellations/object_messages.hpp"
+#include "modules/constellations/node/constellations_node.hpp"
+#include "modules/objects/map_object.hpp"
+#include "test/modules/constellations/scenes.hpp"
+#include "test/runtime/dds/dds_fixture.hpp"
+#include "test/support/inbox.hpp"
 
 namespace km {
 namespace {
+
+// The message of a robot that drove through `scene` along x, in the direction `sign`. Keyframe k
+// is at x = sign * (3 k - 30), heading along the motion. The frame `world` of the robot has the
+// pose T_scene_world. The centres err by `sigma_m`, and the odometry is exact.
+RobotObjects message_of(RobotId robot, const std::vector<TrueObject>& scene,
+                        const SE3& T_scene_world, double sign, double sigma_m, std::mt19937& rng) {
+  RobotObjects message{.robot = robot, .boot = 1, .anchor = robot, .objects = {}};
+  const Eigen::Matrix3d heading =
+      Eigen::AngleAxisd(sign > 0.0 ? 0.0 : std::numbers::pi, Eigen::Vector3d::UnitZ())
+          .toRotationMatrix();
+  const auto pose_of = [&](KeyframeIndex k) {
+    return SE3(T_scene_world.inverse() * make_pose(heading, {sign * (3.0 * k - 30.0), 0.0, 0.0}));
+  };
+  for (const TrueObject& object : scene) {
+    const double way_m = sign * object.center.x() + 30.0;
+    const auto k = static_cast<KeyframeIndex>(std::clamp(way_m / 3.0, 0.0, 20.0));
+    Eigen::Vector3d center = object.center;
+    for (double& c : center) c += sigma_m * normal(rng);
+    const SE3 T_world_box =
+        T_scene_world.inverse() * make_pose(Eigen::Matrix3d::Identity(), center);
+    message.objects.push_back({.label = object.label,
+                               .keyframe = k,
+                               .T_kf_box = pose_of(k).inverse() * T_world_box,
+                               .T_world_kf = pose_of(k),
+                               .size_m = object.size_m,
+                               .surface_m2 = 1.0,
+                               .views = 5});
+  }
+  for (const KeyframeIndex k : {0U, 8U, 18U})
+    message.keyframes.push_back(
+        {{.id = {robot, k}, .T_odom_kf = pose_of(0).inverse() * pose_of(k)}, pose_of(k)});
+  return message;
+}
 
 constexpr RobotId kSelf = 1, kOther = 2;
 constexpr double kNoise_m = 0.1;
@@ -40,8 +77,6 @@ SE3 pose_in(const RobotObjects& message, const KeyframeId& id) {
   return SE3::Identity();
 }
 
-}  // namespace
-
 TEST_CASE("Robots that meet in opposite directions get one closure with the true relative pose",
           "[constellations]") {
   const auto seed = GENERATE(range(0U, 10U));
@@ -68,9 +103,8 @@ TEST_CASE("A closure nearby excludes another one, and one far away does not", "[
   ConstellationSearch search(kSelf);
   search.add(meeting.own, 0.0);
   search.add(meeting.peer, 0.0);
-  Closure known;
-  known.from = meeting.peer.keyframes[1].odometry;
-  known.to = meeting.own.keyframes[1].odometry;
+  Closure known{.from = meeting.peer.keyframes[1].odometry,
+                .to = meeting.own.keyframes[1].odometry};
   std::size_t expected = 0;
   SECTION("nearby") {}
   SECTION("far away") {
@@ -161,4 +195,37 @@ TEST_CASE("A flood of equal objects ends the search without a closure", "[conste
   CHECK(search.is_done());
 }
 
+struct NodeChannels {
+  [[nodiscard]] ConstellationsTopics ends() {
+    return {.own_objects = own,
+            .peer_objects = peers,
+            .closures = closures,
+            .restarts = restarts,
+            .found = found,
+            .outcomes = outcomes};
+  }
+  Topic<RobotObjects> own, peers;
+  Topic<Closure> closures, found;
+  Topic<PeerEvent> restarts;
+  Topic<ClosureOutcome> outcomes;
+  Inbox<Closure> made{found};
+  Inbox<ClosureOutcome> reported{outcomes};
+};
+
+TEST_CASE("The started node finds the place, and is then done", "[node]") {
+  std::mt19937 rng(2);
+  const auto scene = square(24, rng);
+  NodeChannels channels;
+  ConstellationsNode node(1, channels.ends());
+  node.start();
+  CHECK(node.is_done());
+  channels.own.publish(message_of(1, scene, random_upright(rng), 1.0, 0.1, rng));
+  channels.peers.publish(message_of(2, scene, random_upright(rng), -1.0, 0.1, rng));
+  CHECK(eventually([&] { return channels.made.messages().size() == 1; }));
+  CHECK(eventually([&] { return node.is_done(); }));
+  node.stop();
+  CHECK(node.error() == nullptr);
+}
+
+}  // namespace
 }  // namespace km

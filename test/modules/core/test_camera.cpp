@@ -1,7 +1,11 @@
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <random>
 
 #include "modules/core/camera.hpp"
+#include "modules/core/camera_calibration.hpp"
+#include "modules/core/lie.hpp"
+#include "test/support/random_pose.hpp"
 
 namespace km {
 namespace {
@@ -37,6 +41,43 @@ TEST_CASE("A ray that does not point forward has no pixel", "[core]") {
   CHECK(camera.project_ray({0.2, -0.1, 2.0}) == camera.project({0.1, -0.05}));
   CHECK_FALSE(camera.project_ray({0.1, -0.05, 0.0}).has_value());
   CHECK_FALSE(camera.project_ray({0.1, -0.05, -1.0}).has_value());
+}
+
+CameraCalibration some_calibration(std::mt19937& rng) {
+  CameraCalibration calibration{.offset_s = 0.03 * random_vector<1>(rng)(0),
+                                .T_body_rig = retract(SE3::Identity(), 0.3 * random_vector<6>(rng)),
+                                .readout_s = 0.01 * random_vector<1>(rng)(0)};
+  return calibration;
+}
+
+TEST_CASE("local_coordinates_to() is the inverse of retracted()", "[calibration]") {
+  std::mt19937 rng(1);
+  const CameraCalibration calibration = some_calibration(rng);
+  const CalibrationVector delta = 0.1 * random_vector<kCalibrationSize>(rng);
+  CHECK((calibration.local_coordinates_to(calibration.retracted(delta)) - delta).norm() < 1e-12);
+  CHECK(calibration.local_coordinates_to(calibration).norm() < 1e-12);
+}
+
+TEST_CASE("A calibration on top of a correction moves cameras like both in turn", "[calibration]") {
+  std::mt19937 rng(2);
+  const CameraCalibration correction = some_calibration(rng), found = some_calibration(rng);
+  StereoRig in_turn, at_once;
+  for (std::size_t c = 0; c < 2; ++c)
+    in_turn.cameras[c].T_body_cam = at_once.cameras[c].T_body_cam = random_pose(rng);
+  correction.apply_to(in_turn);
+  found.apply_to(in_turn);
+  const CameraCalibration both = found.composed_with(correction);
+  both.apply_to(at_once);
+  for (std::size_t c = 0; c < 2; ++c)
+    CHECK(in_turn.cameras[c].T_body_cam.isApprox(at_once.cameras[c].T_body_cam));
+  CHECK(both.offset_s == Approx(found.offset_s + correction.offset_s));
+  CHECK(both.readout_s == Approx(found.readout_s + correction.readout_s));
+  CHECK(found.local_coordinates_to(both.without(correction)).norm() < 1e-12);
+  // Both have the same covariance.
+  const CalibrationVector delta = 0.1 * random_vector<kCalibrationSize>(rng);
+  CHECK(
+      (both.local_coordinates_to(found.retracted(delta).composed_with(correction)) - delta).norm() <
+      1e-12);
 }
 
 }  // namespace

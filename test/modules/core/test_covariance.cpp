@@ -1,9 +1,15 @@
+#include <Eigen/Core>
+#include <array>
 #include <catch2/catch.hpp>
-
 #include <cmath>
+#include <limits>
+#include <random>
 
 #include "modules/core/covariance.hpp"
+#include "modules/core/covariance_root.hpp"
 #include "modules/core/lie.hpp"
+#include "modules/core/precision.hpp"
+#include "modules/core/symmetric_eigen.hpp"
 #include "test/support/random_pose.hpp"
 
 namespace km {
@@ -73,6 +79,111 @@ TEST_CASE("Covariances of states are usable within bounds and if invertible", "[
   CHECK(is_usable(covariance));
   covariance(9, 1) = covariance(1, 9) = 1.0;
   CHECK_FALSE(is_usable(covariance));  // fully correlated
+}
+
+TEST_CASE("A covariance with lever arms keeps its smallest variances", "[covariance_root]") {
+  // 10 km from the origin, 1 mrad makes 10 m; the step itself is certain to 1 mm and 0.1 mrad.
+  const SE3 T_b_c = make_pose(Eigen::Matrix3d::Identity(), {10000.0, 2000.0, 0.0});
+  UncertainPose T_a_b{.Sigma = 1e-6 * Matrix6::Identity()};
+  UncertainPose step{T_b_c, 1e-6 * Matrix6::Identity()};
+  step.Sigma.topLeftCorner<3, 3>() = 1e-8 * Eigen::Matrix3d::Identity();
+  const Matrix6 Sigma = compose(T_a_b, step).Sigma;
+  const auto received = covariance_of(covariance_root(Sigma));
+  REQUIRE(received);
+  CHECK(is_covariance(*received));
+  // In every direction the variance is right to a thousandth: the eigenvalues of Sigma^-1 *
+  // received are 1.
+  const Matrix6 L = Sigma.llt().matrixL();
+  const Matrix6 whitened = L.inverse() * *received * L.inverse().transpose();
+  CHECK(symmetric_eigen(whitened).values.minCoeff() == Approx(1.0).margin(1e-3));
+  CHECK(symmetric_eigen(whitened).values.maxCoeff() == Approx(1.0).margin(1e-3));
+  // Rounded as it is, the matrix has a negative eigenvalue, or one that is wrong.
+  const Matrix6 rounded = Sigma.cast<float>().cast<double>();
+  const Matrix6 wrong = L.inverse() * rounded * L.inverse().transpose();
+  CHECK(std::abs(symmetric_eigen(wrong).values.minCoeff() - 1.0) > 1e-3);
+}
+
+TEST_CASE("Directions without variance stay without", "[covariance_root]") {
+  CHECK(covariance_of(covariance_root(Matrix6::Zero())) == Matrix6(Matrix6::Zero()));
+  Vector6 direction;
+  direction << 0.0, 2.0, 0.0, 1.0, -1.0, 3.0;
+  const Matrix6 Sigma = direction * direction.transpose();
+  const auto received = covariance_of(covariance_root(Sigma));
+  REQUIRE(received);
+  CHECK(received->isApprox(Sigma, 1e-6));
+}
+
+TEST_CASE("A root that is not finite is refused", "[covariance_root]") {
+  CovarianceRoot root{};
+  root[GENERATE(0U, 9U, 20U)] =
+      GENERATE(std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity());
+  CHECK_FALSE(covariance_of(root));
+}
+
+TEST_CASE("Weights are equal after conversion to a covariance and back", "[precision]") {
+  const Precision there{10000.0, 100.0};
+  const Matrix6 covariance = covariance_of(there);
+  CHECK(covariance(0, 0) == Approx(5e-5));  // [rad^2]
+  CHECK(covariance(5, 5) == Approx(1e-2));  // [m^2]
+
+  const Precision back = precision_of(covariance);
+  CHECK(back.kappa == Approx(there.kappa));
+  CHECK(back.tau == Approx(there.tau));
+}
+
+TEST_CASE("Weights are those of the blocks of the information matrix", "[precision]") {
+  // Each axis of rotation moves one axis of translation by a lever arm of 40 m.
+  const double sigma_rad = 0.01, sigma_m = 0.1, arm_m = 40.0;
+  const double variance_m2 = sigma_m * sigma_m + arm_m * arm_m * sigma_rad * sigma_rad;
+  Matrix6 covariance = Matrix6::Zero();
+  covariance.topLeftCorner<3, 3>().diagonal().setConstant(sigma_rad * sigma_rad);
+  covariance.bottomRightCorner<3, 3>().diagonal().setConstant(variance_m2);
+  covariance.topRightCorner<3, 3>().diagonal().setConstant(arm_m * sigma_rad * sigma_rad);
+  const Precision upper = precision_of(covariance);  // the lower triangle does not count
+  covariance.bottomLeftCorner<3, 3>() = covariance.topRightCorner<3, 3>();
+  const Precision weights = precision_of(covariance);
+  CHECK(weights.kappa == Approx(0.5 * (1e4 + 40.0 * 40.0 * 100.0)));
+  CHECK(weights.tau == Approx(100.0));
+  CHECK(upper.kappa == weights.kappa);
+  CHECK(upper.tau == weights.tau);
+}
+
+TEST_CASE("A singular covariance has the weights of its own blocks", "[precision]") {
+  Matrix6 covariance = Matrix6::Zero();
+  covariance.diagonal() << 0.0, 0.0, 3e-4, 0.01, 0.02, 0.0;  // moves in a plane
+  CHECK(precision_of(covariance).kappa == Approx(5000.0));
+  CHECK(precision_of(covariance).tau == Approx(100.0));
+}
+
+TEST_CASE("Weights that are not positive and finite are refused", "[precision]") {
+  const double infinite = std::numeric_limits<double>::infinity();
+  CHECK_THROWS_AS(precision_of(Matrix6::Zero()), std::invalid_argument);
+  CHECK_THROWS_AS(precision_of(Matrix6::Constant(std::nan(""))), std::invalid_argument);
+  CHECK_THROWS_AS(covariance_of({0.0, 1.0}), std::invalid_argument);
+  CHECK_THROWS_AS(covariance_of({1.0, infinite}), std::invalid_argument);
+}
+
+TEST_CASE("Eigenvalues ascend and belong to orthonormal eigenvectors", "[core]") {
+  Eigen::MatrixXd A(2, 2);
+  A << 2.0, 1.0, 1.0, 2.0;
+  const SymmetricEigen known = symmetric_eigen(A);
+  CHECK(known.values(0) == Approx(1.0));
+  CHECK(known.values(1) == Approx(3.0));
+
+  const Eigen::Index n = GENERATE(1, 6, 70);
+  CAPTURE(n);
+  std::mt19937 rng(1);
+  std::normal_distribution<double> normal;
+  Eigen::MatrixXd B(n, n);
+  for (double& b : B.reshaped()) b = normal(rng);
+  const Eigen::MatrixXd S = B + B.transpose();
+  const SymmetricEigen eigen = symmetric_eigen(S);
+  for (Eigen::Index k = 1; k < n; ++k) CHECK(eigen.values(k - 1) <= eigen.values(k));
+  const double rounding = 1e-13 * static_cast<double>(n);  // relative to the largest value
+  CHECK((eigen.vectors.transpose() * eigen.vectors - Eigen::MatrixXd::Identity(n, n)).norm() <
+        rounding);
+  CHECK((eigen.vectors * eigen.values.asDiagonal() * eigen.vectors.transpose() - S).norm() <
+        rounding * eigen.values.cwiseAbs().maxCoeff());
 }
 
 }  // namespace

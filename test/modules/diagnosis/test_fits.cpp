@@ -262,9 +262,8 @@ std::vector<ImuSample> driven_samples() {
 
 // About right, like the rotations from images.
 InertialFit rough_fit() {
-  InertialFit fit;
-  fit.Q = so3_exp(Eigen::Vector3d(0.01, -0.01, 0.005)) * kDriveMounting;
-  fit.constant = -kDriveMounting * kDriveBias + Eigen::Vector3d(0.003, 0.002, -0.002);
+  InertialFit fit{.Q = so3_exp(Eigen::Vector3d(0.01, -0.01, 0.005)) * kDriveMounting,
+                  .constant = -kDriveMounting * kDriveBias + Eigen::Vector3d(0.003, 0.002, -0.002)};
   return fit;
 }
 

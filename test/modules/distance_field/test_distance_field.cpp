@@ -178,10 +178,7 @@ DepthImage wall_at(std::uint16_t millimetres) {
 
 TEST_CASE("The mapper reports space from which distances to a wall follow", "[distance_field]") {
   const Camera camera{.width = 160, .height = 120, .fx = 80, .fy = 80, .cx = 79.5, .cy = 59.5};
-  SemanticMappingConfig config;
-  config.voxel_size_m = kVoxel_m;
-  config.window_m = 3.0;
-  config.min_views = 1;
+  SemanticMappingConfig config{.voxel_size_m = kVoxel_m, .min_views = 1, .window_m = 3.0};
   SemanticMapper mapper(config, camera);
   mapper.track_space(true);
   DistanceField field(1.0, kVoxel_m);

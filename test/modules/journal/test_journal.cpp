@@ -184,8 +184,7 @@ TEST_CASE("Bytes that are no journal entry are refused", "[journal]") {
   nowhere.v_odom.x() = std::numeric_limits<double>::quiet_NaN();
   CHECK_FALSE(decode_journal_entry(encode_journal_entry(nowhere)).value);
   CHECK_FALSE(decode_journal_entry(std::vector<std::uint8_t>{200}).value);
-  KeyframeOdometry keyframe;
-  keyframe.state_covariance = 1e-4 * StateCovariance::Identity();
+  KeyframeOdometry keyframe{.id = {}, .state_covariance = 1e-4 * StateCovariance::Identity()};
   CHECK(decode_journal_entry(encode_journal_entry(keyframe)).value);
   keyframe.state_covariance = StateCovariance::Zero();  // not is_usable()
   CHECK_FALSE(decode_journal_entry(encode_journal_entry(keyframe)).value);

@@ -11,8 +11,7 @@ namespace {
 constexpr std::size_t kFrame_bytes = 1000;
 
 LinkScript script_of(std::size_t robots, const LinkPlan& link = {}) {
-  LinkScript script;
-  script.robots = robots;
+  LinkScript script{.robots = robots, .links = {}};
   script.links.assign(robots * robots, link);
   return script;
 }
@@ -106,8 +105,7 @@ TEST_CASE("Frames arrive unchanged, after the exact delay, and jitter stays with
 }
 
 TEST_CASE("The share of lost frames is the probability", "[link_emulation]") {
-  LinkPlan link;
-  link.loss = GENERATE(0.0, 0.05, 0.3, 1.0);
+  LinkPlan link{.loss = GENERATE(0.0, 0.05, 0.3, 1.0)};
   const unsigned seed = GENERATE(1, 2, 3);
   CAPTURE(link.loss, seed);
   LinkScript script = script_of(2, link);
@@ -223,8 +221,7 @@ TEST_CASE("A partition separates groups while it lasts", "[link_emulation]") {
 }
 
 TEST_CASE("Robots receive each other within range", "[link_emulation]") {
-  LinkPlan link;
-  link.range_m = 5.0;
+  LinkPlan link{.range_m = 5.0};
   LinkScript script = script_of(2, link);
   // They meet at 10 s, at 1 m/s each from 20 m, and stay there from 12 s on at 4 m.
   script.paths = {{{0.0, {0.0, 0.0, 1.0}}, {12.0, {12.0, 0.0, 1.0}}},
@@ -239,8 +236,7 @@ TEST_CASE("Robots receive each other within range", "[link_emulation]") {
 }
 
 TEST_CASE("A recording that waits moves its robot later", "[link_emulation]") {
-  LinkPlan link;
-  link.range_m = 5.0;
+  LinkPlan link{.range_m = 5.0};
   LinkScript script = script_of(2, link);
   script.rate = 2.0;
   script.paths = {{{0.0, {0.0, 0.0, 0.0}}}, {{0.0, {0.0, 0.0, 0.0}}, {10.0, {10.0, 0.0, 0.0}}}};
@@ -253,8 +249,7 @@ TEST_CASE("A recording that waits moves its robot later", "[link_emulation]") {
 }
 
 TEST_CASE("The loss of a pair's frames is independent of other links", "[link_emulation]") {
-  LinkPlan link;
-  link.loss = 0.5;
+  LinkPlan link{.loss = 0.5};
   const auto fates = [&](bool others) {
     LinkScript script = script_of(3, link);
     script.link(0, 1).outages = {{others ? 0.0 : 40.0, 50.0}};  // other losses for the same frames

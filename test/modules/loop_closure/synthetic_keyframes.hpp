@@ -1,9 +1,7 @@
 #pragma once
 
-#include <cmath>
 #include <cstdint>
 #include <random>
-#include <vector>
 
 #include "modules/core/lie.hpp"
 #include "modules/loop_closure/relative_pose.hpp"

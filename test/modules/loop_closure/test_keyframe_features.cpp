@@ -118,9 +118,7 @@ TEST_CASE("A reduced keyframe has its first keypoints, those with depth before t
 
 TEST_CASE("keypoints without a trusted depth have none", "[loop_closure]") {
   const StereoRig rig = rgbd_rig(test_camera(), 0.08);
-  KeyframeFeaturesConfig config;
-  config.min_depth_m = 3.0;
-  config.max_depth_m = 4.0;
+  KeyframeFeaturesConfig config{.min_depth_m = 3.0, .max_depth_m = 4.0};
   KeyframeFeatureExtractor extractor(rig, config);
   StereoFrame frame{0, checkered(rig.cameras[0]), {}};
   for (const Keypoint& keypoint : extractor.extract(frame).keypoints)
@@ -184,9 +182,9 @@ GrayImage dot_at(const Eigen::Vector2d& bearing, const Camera& camera) {
 // Inverse depth that the matcher finds for a dot at `left` with an inverse depth of `truth` [1/m].
 float found(const StereoRig& rig, const Eigen::Vector2d& left, double truth) {
   const EpipolarMatcher matcher(rig, {.min_depth_m = 0.5, .max_depth_m = 10.0});
-  StereoFrame frame;
-  frame.left = dot_at(left, rig.cameras[0]);
-  frame.right = dot_at(left - Eigen::Vector2d(kRigBaseline_m * truth, 0.0), rig.cameras[1]);
+  StereoFrame frame{
+      .left = dot_at(left, rig.cameras[0]),
+      .right = dot_at(left - Eigen::Vector2d(kRigBaseline_m * truth, 0.0), rig.cameras[1])};
   const Eigen::Vector2f bearing = left.cast<float>();
   return matcher.inverse_depths(frame, {&bearing, 1}).front();
 }

@@ -3,7 +3,6 @@
 #include "modules/loop_closure/node/keyframe_features_node.hpp"
 #include "test/support/onnx_model.hpp"
 #include "test/support/random_pose.hpp"
-#include "test/support/temporary_folder.hpp"
 
 namespace km {
 namespace {

@@ -177,9 +177,7 @@ Scene scene_of_one_robot() {
 }
 
 LoopClosureConfig with_full_keyframes(int count) {
-  LoopClosureConfig config;
-  config.reply_keypoints = 50;
-  config.full_keyframes = count;
+  LoopClosureConfig config{.reply_keypoints = 50, .full_keyframes = count};
   return config;
 }
 

@@ -1,8 +1,10 @@
-#include "modules/loop_closure/request_policy.hpp"
-
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <random>
+
+#include "modules/loop_closure/closure_odds.hpp"
+#include "modules/loop_closure/request_policy.hpp"
 
 namespace km {
 namespace {
@@ -27,9 +29,7 @@ void succeed(RequestPolicy& policy, KeyframeIndex query, KeyframeIndex own) {
 
 TEST_CASE("No keyframe near a closure is requested and the distance grows with successes",
           "[request_policy]") {
-  LoopClosureConfig config;
-  config.max_closure_separation = 3;
-  config.max_request_separation = 0;
+  LoopClosureConfig config{.max_closure_separation = 3, .max_request_separation = 0};
   RequestPolicy policy(config);
   for (KeyframeIndex successes = 1; successes <= 5; ++successes) {
     const KeyframeIndex query = 100 * successes;
@@ -51,8 +51,7 @@ TEST_CASE("No keyframe near a closure is requested and the distance grows with s
 }
 
 TEST_CASE("No keyframe near a requested one is requested", "[request_policy]") {
-  LoopClosureConfig config;
-  config.max_request_separation = 2;
+  LoopClosureConfig config{.max_request_separation = 2};
   RequestPolicy policy(config);
   REQUIRE(policy.decide(candidate(10, 20)) == Decision::kRequest);
   CHECK(policy.decide(candidate(12, 18)) == Decision::kRequest);  // no closure yet
@@ -69,8 +68,7 @@ TEST_CASE("No keyframe near a requested one is requested", "[request_policy]") {
 
 TEST_CASE("A pair that the peer compares is not requested, and none beside it after a closure",
           "[request_policy]") {
-  LoopClosureConfig config;
-  config.max_request_separation = 2;
+  LoopClosureConfig config{.max_request_separation = 2};
   RequestPolicy policy(config);
   policy.add_peer_request(kPeer, 10, 20);
   CHECK(policy.decide(candidate(10, 20)) == Decision::kNearRequest);
@@ -105,8 +103,7 @@ int requests_among(RequestPolicy& policy, KeyframeIndex first, KeyframeIndex las
 
 TEST_CASE("Candidates that fail are requested less and less often, more probable ones are not",
           "[request_policy]") {
-  LoopClosureConfig config;
-  config.max_request_separation = 0;
+  LoopClosureConfig config{.max_request_separation = 0};
   RequestPolicy policy(config);
   // After m failures p is about log(m) / m, so n queries cost about sqrt(n log(n)) requests.
   const int first = requests_among(policy, 0, 100);
@@ -161,6 +158,49 @@ TEST_CASE("A candidate whose probability is not a number is requested as one tha
   for (KeyframeIndex query = 1000; query < 3000; query += 100)
     requests += policy.decide({{kPeer, query}, {kSelf, 7}, std::nan(""), 1}) == Decision::kRequest;
   CHECK(requests <= 1);
+}
+
+LoopCandidate found_with(double similarity, int support) {
+  return {.query = {2, 1}, .match = {1, 1}, .similarity = similarity, .support = support};
+}
+
+double logistic(double x) {
+  return 1.0 / (1.0 + std::exp(-x));
+}
+
+double evidence_of(const LoopCandidate& c) {
+  return 11.7 * c.similarity + 1.1 * c.support;
+}
+
+TEST_CASE("Similarity and support make a closure more probable", "[closure_odds]") {
+  const ClosureOdds odds;
+  CHECK(odds.probability(found_with(12.9 / 11.7, 1)) == Approx(0.5));
+  CHECK(odds.probability(found_with(1.0, 1)) == Approx(logistic(12.8 - 14.0)));
+  CHECK(odds.probability(found_with(1.0, 4)) == Approx(logistic(16.1 - 14.0)));
+  CHECK(odds.probability(found_with(1.0, 9)) == odds.probability(found_with(1.0, 5)));
+}
+
+TEST_CASE("The estimate is the maximum of the posterior distribution", "[closure_odds]") {
+  // Results as in a room: few closures among 40 requests.
+  std::mt19937 engine(11);
+  std::uniform_real_distribution<double> similarity(0.6, 1.1), unit(0.0, 1.0);
+  std::uniform_int_distribution<int> support(1, 5);
+  ClosureOdds odds;
+  std::vector<std::pair<double, bool>> results;
+  for (int i = 0; i < 40; ++i) {
+    const LoopCandidate drawn = found_with(similarity(engine), support(engine));
+    const bool verified = unit(engine) < logistic(evidence_of(drawn) - 15.5);
+    odds.add(drawn, verified);
+    results.emplace_back(evidence_of(drawn), verified);
+  }
+  // Brute force. Candidates are rounded to quarters of a unit, so the two differ a little.
+  double best = 0.0, most = -1e300;
+  for (double d = 8.0; d < 24.0; d += 0.01) {
+    double log_posterior = -0.5 * (d - 14.0) * (d - 14.0) / 4.0;
+    for (const auto& [z, y] : results) log_posterior += std::log(logistic(y ? z - d : d - z));
+    if (log_posterior > most) most = log_posterior, best = d;
+  }
+  CHECK(odds.probability(found_with(1.0, 3)) == Approx(logistic(15.0 - best)).margin(0.03));
 }
 
 }  // namespace

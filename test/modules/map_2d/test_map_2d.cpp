@@ -1,5 +1,4 @@
-#include "modules/map_2d/map_2d.hpp"
-
+#include <yaml-cpp/yaml.h>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
@@ -9,7 +8,10 @@
 #include <utility>
 #include <vector>
 
+#include "modules/map_2d/map_2d.hpp"
+#include "modules/map_2d/map_server_files.hpp"
 #include "test/modules/map_2d/surfaces.hpp"
+#include "test/support/nav2_map.hpp"
 
 namespace km {
 namespace {
@@ -65,8 +67,7 @@ TEST_CASE("A table is an obstacle only for robots that do not fit under it", "[m
   SECTION("without labels") {
     surfaces.without_labels();
   }
-  Map2dConfig low;
-  low.max_height_m = 0.5;
+  Map2dConfig low{.max_height_m = 0.5};
   CHECK(values(map_of(surfaces, low), 2.05, 2.05, 3.45, 2.95) == Values{kFree});
   CHECK(values(map_of(surfaces), 2.05, 2.05, 3.45, 2.95) == Values{kOccupied});
 }
@@ -108,8 +109,7 @@ TEST_CASE("Two floors are free, and the step between them is not", "[map_2d]") {
   CHECK(values(grid, 0.1, 0.1, 4.9, 3.9) == Values{kFree});
   CHECK(values(grid, 5.1, 0.1, 9.9, 3.9) == Values{kFree});
   CHECK(values(grid, 4.95, 0.1, 5.0, 3.9) == Values{kOccupied});
-  Map2dConfig climber;
-  climber.max_step_m = 0.7;
+  Map2dConfig climber{.max_step_m = 0.7};
   if (!surfaces.mesh.labels.empty())
     CHECK(values(map_of(surfaces, climber), 0.1, 0.1, 9.9, 3.9) == Values{kFree});
 }
@@ -226,6 +226,30 @@ TEST_CASE("Without floor there is no map, and a map that is too large is refused
 
   far.mesh.vertices.back().x() = std::numeric_limits<float>::infinity();
   CHECK(make_map_2d(config, {far.mesh, palette()}).status == Map2dStatus::kTooLarge);
+}
+
+TEST_CASE("map_server reads the map that was written", "[map_2d]") {
+  OccupancyGrid grid{0.05, {-1.25, 10.0}, 3, 2, {}};
+  grid.cells = {OccupancyGrid::kFree,     OccupancyGrid::kOccupied, OccupancyGrid::kUnknown,
+                OccupancyGrid::kOccupied, OccupancyGrid::kFree,     OccupancyGrid::kFree};
+  grid.z_m = -0.3;
+  const std::string yaml = map_yaml(grid, "map.pgm");
+  CHECK(YAML::Load(yaml)["image"].as<std::string>() == "map.pgm");
+  CHECK(YAML::Load(yaml)["floor_z"].as<double>() == -0.3);
+  const OccupancyGrid read = load_nav2_map(yaml, map_image(grid));
+  CHECK(read.resolution_m == grid.resolution_m);
+  CHECK(read.origin == grid.origin);
+  CHECK(read.width == 3);
+  CHECK(read.cells == grid.cells);
+  CHECK(map_of_image(map_image(grid)).cells == grid.cells);
+  CHECK(map_of_image(map_image(grid)).width == 3);
+}
+
+TEST_CASE("Bytes that are no image of a map are refused", "[map_2d]") {
+  const char* const image =
+      GENERATE("", "P5", "P5 1 1 255", "P6\n1 1\n255\n.", "P5\n2 1\n255\n.", "P5\n0 0\n255\n",
+               "P5\n-1 -1\n255\n.", "P5\n1 1\n65535\n.", "P5\n99999999 1\n255\n.", "P5 x 1 255\n.");
+  CHECK_THROWS_AS(map_of_image(image), std::invalid_argument);
 }
 
 }  // namespace

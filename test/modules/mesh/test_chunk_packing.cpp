@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <random>
 #include <set>
-#include <span>
 #include <utility>
 #include <vector>
 

@@ -5,7 +5,6 @@
 #include <functional>
 #include <limits>
 #include <memory>
-#include <string>
 #include <utility>
 #include <vector>
 
@@ -58,8 +57,7 @@ struct SentMesh {
 };
 
 MapSharingConfig slow() {
-  MapSharingConfig config;
-  config.max_bytes_per_s = 20000.0;
+  MapSharingConfig config{.max_bytes_per_s = 20000.0};
   return config;
 }
 
@@ -131,8 +129,7 @@ struct TwoViews {
 
 TEST_CASE("Poses take at most a tenth of the bytes, and the newest are sent last", "[node]") {
   SentMesh out;
-  MapSharingConfig config;
-  config.max_bytes_per_s = 1000.0;
+  MapSharingConfig config{.max_bytes_per_s = 1000.0};
   MeshChunksNode node(config, 7, out.topics());
   TwoViews views;
   double now_s = 0.0;

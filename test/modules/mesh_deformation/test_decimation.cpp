@@ -2,7 +2,6 @@
 #include <catch2/catch.hpp>
 #include <limits>
 #include <random>
-#include <set>
 #include <vector>
 
 #include "modules/mesh_deformation/decimation.hpp"

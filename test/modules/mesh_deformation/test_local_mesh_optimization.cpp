@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "modules/core/lie.hpp"
 #include "modules/mesh_deformation/local_mesh_optimization.hpp"
 #include "test/modules/mesh_deformation/corridor.hpp"
 #include "test/support/random_pose.hpp"

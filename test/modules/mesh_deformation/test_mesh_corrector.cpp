@@ -1,12 +1,8 @@
-#include <algorithm>
 #include <catch2/catch.hpp>
 #include <random>
-#include <stdexcept>
 #include <vector>
 
-#include "modules/core/lie.hpp"
 #include "modules/mesh_deformation/mesh_corrector.hpp"
-#include "modules/mesh_deformation/mesh_node.hpp"
 #include "test/modules/mesh_deformation/corridor.hpp"
 #include "test/support/random_pose.hpp"
 
@@ -123,8 +119,7 @@ struct TwoVisits {
 
 TEST_CASE("The newer of two visits that coincide after correction stays", "[mesh_deformation]") {
   TwoVisits visits;
-  MeshDeformationConfig config;
-  config.duplicate_faces = 0;
+  MeshDeformationConfig config{.duplicate_faces = 0};
   CopyLimits limits{.copies = 1};
   SECTION("corrected") {
     MeshCorrector corrector(config, limits);
@@ -172,8 +167,7 @@ TEST_CASE("The newer of two visits that coincide after correction stays", "[mesh
 
 TEST_CASE("Copies stay until a further visit exceeds their share", "[mesh_deformation]") {
   TwoVisits visits;
-  MeshDeformationConfig config;
-  config.duplicate_faces = 0;
+  MeshDeformationConfig config{.duplicate_faces = 0};
   CopyLimits limits{.copies = 1};
   limits.share = 1.0;
   MeshCorrector corrector(config, limits);

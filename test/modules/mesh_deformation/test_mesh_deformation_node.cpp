@@ -1,8 +1,6 @@
 #include <catch2/catch.hpp>
 #include <chrono>
 #include <memory>
-#include <stdexcept>
-#include <string>
 #include <thread>
 #include <vector>
 
@@ -47,8 +45,7 @@ struct Robot {
 };
 
 MeshDeformationConfig every_two_seconds() {
-  MeshDeformationConfig config;
-  config.period_s = 2.0;
+  MeshDeformationConfig config{.period_s = 2.0};
   return config;
 }
 
@@ -170,8 +167,7 @@ TEST_CASE("A last map that cannot be corrected is reported", "[node]") {
 
 TEST_CASE("A mesh is current once it is corrected, also if there is none", "[node]") {
   Robot robot;
-  MeshDeformationConfig config;
-  config.period_s = 0.01;
+  MeshDeformationConfig config{.period_s = 0.01};
   MeshDeformationNode node(config, kSelf, robot.topics());
   const auto becomes_current = [&] {
     const auto end = std::chrono::steady_clock::now() + kPatience;

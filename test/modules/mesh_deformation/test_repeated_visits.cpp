@@ -51,8 +51,7 @@ class Flight {
 
  private:
   static MeshDeformationConfig all_faces() {
-    MeshDeformationConfig config;
-    config.duplicate_faces = 0;
+    MeshDeformationConfig config{.duplicate_faces = 0};
     return config;
   }
   void correct() {

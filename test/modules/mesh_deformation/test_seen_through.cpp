@@ -88,8 +88,7 @@ class TwoPasses {
   }
 
   MeshCorrection run(int seen_through_views) const {
-    MeshDeformationConfig correction;
-    correction.seen_through_views = seen_through_views;
+    MeshDeformationConfig correction{.seen_through_views = seen_through_views};
     const Recording recording = record();
     return MeshCorrector(correction).correct_from_scratch(recording.input(1));
   }
@@ -142,8 +141,7 @@ TEST_CASE("A box that has gone loses its surface, and the wall behind it does no
 TEST_CASE("The mapper may drop a box that two searches for copies find gone",
           "[mesh_deformation]") {
   auto recording = TwoPasses({{kWall, kFloor, kParked}}, {{kWall, kFloor}}).record();
-  MeshDeformationConfig config;
-  config.duplicate_faces = 0;
+  MeshDeformationConfig config{.duplicate_faces = 0};
   MeshCorrector corrector(config, {.share = 0.0});
   REQUIRE(corrector.correct(recording.input(1))->superseded.vertices.empty());
 

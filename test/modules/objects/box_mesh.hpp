@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "modules/mesh/labelled_mesh.hpp"
-#include "modules/objects/map_object.hpp"
 
 namespace km {
 

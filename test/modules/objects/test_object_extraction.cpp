@@ -57,9 +57,7 @@ TEST_CASE("Small or hardly seen surfaces are no objects", "[objects]") {
   map.add_sheet({0, 0, 1}, {0.2, 0, 0}, {0, 0.2, 0}, kChair, {0, 9});  // 0.04 m^2
   map.add_box({{5.0, 0.0, 0.5}, 0.0, {1.0, 1.0, 1.0}}, kTable, {4, 4});
   CHECK(objects_in(map).empty());
-  ObjectsConfig all;
-  all.min_surface_m2 = 0.0;
-  all.min_views = 1;
+  ObjectsConfig all{.min_surface_m2 = 0.0, .min_views = 1};
   CHECK(objects_in(map, all).size() == 2);
 }
 
@@ -80,9 +78,7 @@ TEST_CASE("Objects are the connected parts that a search over all pairs finds", 
   }
   map.mesh.labels.assign(900, kChair);
   map.seen_by.assign(900, {0, 5});
-  ObjectsConfig config;
-  config.gap_m = 0.25;
-  config.min_surface_m2 = 0.0;
+  ObjectsConfig config{.gap_m = 0.25, .min_surface_m2 = 0.0};
   std::vector<int> part(900);
   for (std::size_t i = 0; i < 900; ++i) part[i] = static_cast<int>(i / 3);
   for (bool changed = true; changed;) {

@@ -7,7 +7,6 @@
 #include "modules/core/covariance.hpp"
 #include "modules/core/lie.hpp"
 #include "modules/core/pose_graph.hpp"
-#include "modules/outlier_rejection/cycle_test.hpp"
 #include "test/support/random_pose.hpp"
 
 namespace km {

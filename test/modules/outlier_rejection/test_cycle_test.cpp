@@ -59,9 +59,7 @@ TEST_CASE("Noise scales widen the test as covariances would", "[pcm]") {
   const TwoRobots robots(0, 1, 8, 0.05, rng);
   const Closure i = robots.measure(2, 6, 0.1, rng), k = robots.measure(7, 1, 0.1, rng);
   const auto distance = [&](double odometry, double measured) {
-    PcmConfig config;
-    config.odometry_noise_scale = odometry;
-    config.closure_noise_scale = measured;
+    PcmConfig config{.odometry_noise_scale = odometry, .closure_noise_scale = measured};
     const CycleTest test(config);
     return distance_squared(cycle_through(test.orient(i), test.orient(k)));
   };

@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <random>
-#include <set>
 #include <vector>
 
 #include "modules/outlier_rejection/local_contest.hpp"
@@ -92,8 +91,7 @@ TEST_CASE("The support is the inliers of closures at one place that agree", "[co
   CHECK(contest_of(closures).most_support() == 149.0);
   CHECK(contest_of({}).most_support() == 0.0);
 
-  PcmConfig config;
-  config.min_witnesses = 3;
+  PcmConfig config{.min_witnesses = 3};
   WitnessedPair pair(0, 1, config);
   for (const Closure& closure : closures) (void)pair.add(closure);
   CHECK(pair.support() == 149);

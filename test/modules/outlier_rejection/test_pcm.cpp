@@ -46,8 +46,7 @@ TEST_CASE("PCM keeps the true closures among as many random ones", "[pcm]") {
 TEST_CASE("A pair of keyframes counts once, from whichever side it is measured", "[pcm]") {
   std::mt19937 rng(1);
   const TwoRobots robots(0, 1, 5, 0.01, rng);
-  PcmConfig config;
-  config.min_inliers = 1;
+  PcmConfig config{.min_inliers = 1};
   Pcm pcm(0, 1, config);
   const Closure measured = robots.measure(2, 3, 0.02, rng);
   CHECK(pcm.add(measured) == PcmAddResult::kGrew);
@@ -59,9 +58,7 @@ TEST_CASE("A pair of keyframes counts once, from whichever side it is measured",
 TEST_CASE("Fewer closures than min_inliers are not published", "[pcm]") {
   std::mt19937 rng(1);
   const TwoRobots robots(0, 1, 5, 0.001, rng);
-  PcmConfig config;
-  config.min_inliers = 3;
-  config.confidence = 0.9999;
+  PcmConfig config{.confidence = 0.9999, .min_inliers = 3};
   Pcm pcm(0, 1, config);
   for (std::size_t n = 0; n < 3; ++n) {
     CHECK(pcm.inliers().empty());

@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
-#include <limits>
 #include <random>
 #include <string>
 #include <vector>
@@ -38,13 +37,11 @@ struct Team {
     for (const Closure& closure : some) node.step(closure);
   }
   void keyframe_at(double at_s) {
-    KeyframeOdometry keyframe;
-    keyframe.stamp = nanoseconds(at_s);
+    KeyframeOdometry keyframe{.id = {}, .stamp = nanoseconds(at_s)};
     node.step(keyframe);
   }
   void restart(RobotId robot) {
-    RobotIdentity identity;
-    identity.robot = robot;
+    RobotIdentity identity{.robot = robot, .name = {}};
     node.step(PeerEvent{PeerEventKind::kRestarted, identity, {}});
   }
   // Sizes of the sets that are now published.
@@ -79,10 +76,7 @@ struct Team {
 using Sizes = std::vector<std::size_t>;
 
 PcmConfig tolerant() {
-  PcmConfig config;
-  config.selection = ClosureSelection::kPcm;
-  config.confidence = 0.9999999;
-  config.min_inliers = 3;
+  PcmConfig config{.selection = ClosureSelection::kPcm, .confidence = 0.9999999, .min_inliers = 3};
   return config;
 }
 
@@ -132,8 +126,7 @@ TEST_CASE("All closures of two robots are published once independent ones agree"
 }
 
 TEST_CASE("Robots joined by one place wait for a second one, and it is said", "[node]") {
-  PcmConfig config;
-  config.witness_wait_s = 30.0;
+  PcmConfig config{.witness_wait_s = 30.0};
   Team team(2, config);
   const CapturedLog log;
   const auto closures = team.agreeing(2, 5, 3);  // all neighbours

@@ -1,9 +1,7 @@
 #include <catch2/catch.hpp>
 
 #include <algorithm>
-#include <random>
 #include <set>
-#include <vector>
 
 #include "modules/outlier_rejection/witnessed_pair.hpp"
 #include "test/modules/outlier_rejection/chain.hpp"
@@ -59,8 +57,7 @@ TEST_CASE("A cluster of aliased keyframes does not join two robots, a second pla
 
 TEST_CASE("Along a common stretch there is a witness every fourth keyframe", "[witness]") {
   const Aisles aisles(40);
-  PcmConfig config;
-  config.min_witnesses = 1000;
+  PcmConfig config{.min_witnesses = 1000};
   WitnessedPair pair(0, 1, config);
   for (std::size_t i = 0; i < 12; ++i) (void)pair.add(aisles.at(i, i));
   CHECK(pair.witnesses() == 3);

@@ -2,7 +2,6 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <map>
-#include <numeric>
 #include <random>
 
 #include "modules/place_recognition/bow_database.hpp"

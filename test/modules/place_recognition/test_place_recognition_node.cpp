@@ -1,7 +1,5 @@
-#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <map>
 #include <random>
 #include <set>
 #include <utility>

@@ -3,12 +3,10 @@
 #include <future>
 #include <limits>
 #include <random>
-#include <set>
 #include <vector>
 
 #include "modules/recorded_graph/node/graph_playback_node.hpp"
 #include "test/support/random_pose.hpp"
-#include "test/support/shared_data.hpp"
 
 namespace km {
 namespace {
@@ -64,8 +62,7 @@ TEST_CASE("A played graph chains its odometry with the covariance of the chain",
   std::mt19937 rng(1);
   const RecordedGraph graph = recording(rng);
   Played played;
-  GraphPlaybackConfig config;
-  config.poses_per_second = 4.0;
+  GraphPlaybackConfig config{.poses_per_second = 4.0};
   GraphPlaybackNode node(config, kMax, graph, played.topics());
   play_all(node, graph);
 

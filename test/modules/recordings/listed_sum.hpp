@@ -3,8 +3,6 @@
 #include <zlib.h>
 
 #include <cstdint>
-#include <span>
-#include <string>
 
 #include "modules/core/bytes.hpp"
 #include "test/modules/recordings/bag_contents.hpp"

@@ -2,7 +2,6 @@
 
 #include <fstream>
 #include <span>
-#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>

@@ -111,11 +111,9 @@ TEST_CASE("Viewers receive the pose, diagnostics and mesh of the robot", "[ros_d
                           {"/robot_3/mesh", "sensor_msgs/PointCloud2", RosQos::kLatched},
                           {"/diagnostics", "diagnostic_msgs/DiagnosticArray"},
                           {"/robot_3/mesh_faces", "visualization_msgs/Marker", RosQos::kLatched}});
-  OdometryState state;
-  state.stamp = 5;
+  OdometryState state{.stamp = 5};
   state.T_odom_body.translation() = Eigen::Vector3d(1, 2, 3);
-  KeyframeOdometry keyframe;
-  keyframe.stamp = 5;
+  KeyframeOdometry keyframe{.id = {}, .stamp = 5};
   SE3 T_map_body = SE3::Identity();
   T_map_body.translation() = Eigen::Vector3d(10, 2, 3);
   node.start();

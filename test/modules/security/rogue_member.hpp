@@ -3,7 +3,6 @@
 #include <sodium.h>
 
 #include <catch2/catch.hpp>
-#include <optional>
 
 #include "modules/security/authenticated_encryption.hpp"
 #include "modules/security/credentials.hpp"

@@ -41,8 +41,7 @@ class ToyTeam {
 
   /// Next list of revocations, which contains only these certificates.
   [[nodiscard]] Revocations revoking(const std::vector<Certificate>& certificates) {
-    Revocations list;
-    list.number = next_number_++;
+    Revocations list{.number = next_number_++, .revoked = {}};
     for (const Certificate& one : certificates)
       list.revoked.push_back({one.key, one.robot, one.name});
     sign(list, secret_);

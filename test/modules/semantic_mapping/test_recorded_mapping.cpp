@@ -12,8 +12,7 @@ TEST_CASE("Two halves of a recorded kitchen agree where they overlap", "[semanti
   const auto folder = shared_data("7scenes_redkitchen");
   if (!folder) return;
   RecordedKitchen kitchen(*folder);
-  SemanticMappingConfig config;
-  config.voxel_size_m = 0.05;
+  SemanticMappingConfig config{.voxel_size_m = 0.05};
   SemanticMapper first(config, kitchen.rig().cameras[0]), second(config, kitchen.rig().cameras[0]);
   const std::size_t half = kitchen.frame_count() / 2;
   KeyframeIndex frame = 0;

@@ -1,7 +1,5 @@
 #include <algorithm>
-#include <array>
 #include <catch2/catch.hpp>
-#include <cmath>
 #include <random>
 
 #include "modules/semantic_mapping/voxel_labels.hpp"

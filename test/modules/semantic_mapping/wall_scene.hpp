@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <limits>
 #include <numbers>
-#include <vector>
 
 #include "modules/core/camera.hpp"
 #include "modules/core/frame.hpp"

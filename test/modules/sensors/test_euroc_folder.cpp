@@ -1,6 +1,5 @@
 #include <catch2/catch.hpp>
 
-#include "modules/core/lie.hpp"
 #include "modules/sensors/dataset_reader.hpp"
 #include "modules/sensors/node/open_folder.hpp"
 #include "test/modules/sensors/euroc_folder.hpp"

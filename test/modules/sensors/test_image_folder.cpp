@@ -4,7 +4,6 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <memory>
 
 #include "euroc_folder.hpp"
 #include "modules/sensors/node/open_folder.hpp"

@@ -2,7 +2,6 @@
 
 #include <cmath>
 #include <string>
-#include <vector>
 
 #include "modules/sensors/dataset_reader.hpp"
 #include "modules/sensors/node/rig_calibration.hpp"

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <future>
 #include <stdexcept>
-#include <string>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -35,8 +34,7 @@ class FakeReader final : public DatasetReader {
     }
     auto frame = std::make_shared<StereoFrame>();
     frame->stamp = 1 + nanoseconds(period_s_ * read_++);
-    ImuSample sample;
-    sample.stamp = frame->stamp;
+    ImuSample sample{.stamp = frame->stamp};
     return SensorPacket{std::move(frame), {sample}};
   }
 
@@ -77,8 +75,7 @@ TEST_CASE("Every packet is published in order, then the end", "[sensors]") {
   const PlaybackPace pace =
       GENERATE(PlaybackPace::fastest(), PlaybackPace{1000.0, true}, PlaybackPace{1000.0, false});
   Run run;
-  SensorsConfig config;
-  config.max_lag_s = 1e6;
+  SensorsConfig config{.max_lag_s = 1e6};
   SensorsNode node(config, pace, std::make_unique<FakeReader>(100), run.topics());
   node.start();
   const SensorsEnd end = run.ended.get_future().get();
@@ -101,8 +98,7 @@ TEST_CASE("Images that come too fast are dropped evenly after the map", "[sensor
   std::vector<ShedLoad> loads;
   run.load.subscribe([&](const auto& load) { loads.push_back(*load); });
   run.packets.subscribe([&](const auto&) { std::this_thread::sleep_for(kCost); });
-  SensorsConfig config;
-  config.max_lag_s = 0.1;
+  SensorsConfig config{.max_lag_s = 0.1};
   SensorsNode node(config, {kRate, false}, std::make_unique<FakeReader>(1000), run.topics());
   node.start();
   const SensorsEnd end = run.ended.get_future().get();
@@ -126,8 +122,7 @@ TEST_CASE("A recording that waits loses no image and no frame of the map", "[sen
   int loads = 0;
   run.load.subscribe([&](const auto&) { ++loads; });
   run.packets.subscribe([&](const auto&) { std::this_thread::sleep_for(kCost); });
-  SensorsConfig config;
-  config.max_lag_s = 0.1;
+  SensorsConfig config{.max_lag_s = 0.1};
   SensorsNode node(config, {kRate, true}, std::make_unique<FakeReader>(100), run.topics());
   node.start();
   const SensorsEnd end = run.ended.get_future().get();

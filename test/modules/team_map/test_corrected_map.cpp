@@ -12,7 +12,6 @@
 #include "modules/mesh/node/mesh_chunks_node.hpp"
 #include "modules/mesh/team_mesh.hpp"
 #include "modules/mesh_deformation/mesh_corrector.hpp"
-#include "modules/team_map/team_map.hpp"
 #include "test/modules/mesh_deformation/corridor.hpp"
 #include "test/support/inbox.hpp"
 
@@ -49,8 +48,7 @@ struct CorrectedRobot {
   }
 
   static MapSharingConfig unlimited() {
-    MapSharingConfig config;
-    config.max_bytes_per_s = 1e9;
+    MapSharingConfig config{.max_bytes_per_s = 1e9};
     return config;
   }
 

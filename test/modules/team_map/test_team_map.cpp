@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <map>
-#include <random>
 #include <vector>
 
 #include "modules/mesh/team_mesh.hpp"

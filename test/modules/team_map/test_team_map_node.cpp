@@ -15,8 +15,7 @@ namespace km {
 namespace {
 
 MapSharingConfig fast() {
-  MapSharingConfig config;
-  config.max_bytes_per_s = 2e6;
+  MapSharingConfig config{.max_bytes_per_s = 2e6};
   return config;
 }
 

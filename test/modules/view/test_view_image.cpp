@@ -1,11 +1,12 @@
 #include <catch2/catch.hpp>
-#include <cmath>
 #include <cstdint>
 #include <memory>
 #include <random>
 #include <stdexcept>
 #include <utility>
+#include <vector>
 
+#include "modules/core/distance_color.hpp"
 #include "modules/view/view_content.hpp"
 #include "test/support/image_file.hpp"
 
@@ -34,8 +35,6 @@ Camera camera_of(int width, int height) {
 cv::Mat shown(const ViewImage& image) {
   return decoded(image.jpeg, DecodedPixels::kStored);
 }
-
-}  // namespace
 
 TEST_CASE("Images keep their size or are reduced to the maximum width", "[view]") {
   const ViewImage as_it_is = view_image(image_of(640, 480), camera_of(640, 480));
@@ -85,4 +84,88 @@ TEST_CASE("A noisy image fits into an update", "[view]") {
   CHECK_NOTHROW(encode_view(view_image(image, camera_of(640, 640))));
 }
 
+constexpr std::int8_t kUnknownCell = OccupancyGrid::kUnknown, kFreeCell = OccupancyGrid::kFree,
+                      kOccupiedCell = OccupancyGrid::kOccupied;
+
+using Values = std::vector<std::uint8_t>;
+
+// Brute force: a cell of the reduced map is occupied if any of its cells is, else free if any is.
+TEST_CASE("A large 2D map is reduced until it fits, and no obstacle is lost", "[view]") {
+  std::mt19937 rng(5);
+  OccupancyGrid map{0.05, {0.0, 0.0}, 601, 333, {}};
+  for (int k = 0; k < map.width * map.height; ++k) {
+    const auto draw = std::uniform_int_distribution<int>(0, 99)(rng);
+    map.cells.push_back(draw == 0 ? kOccupiedCell : draw < 20 ? kFreeCell : kUnknownCell);
+  }
+  const auto raster = view_raster(map);
+  REQUIRE(raster);
+  CHECK(is_valid(*raster));
+  CHECK(decode_view(encode_view(*raster)));
+  const int factor = static_cast<int>(std::lround(raster->resolution_m / 0.05F));
+  CHECK(factor > 1);
+  CHECK(static_cast<int>(raster->width) == (map.width + factor - 1) / factor);
+  Values expected(std::size_t{raster->width} * raster->height, ViewRaster::kUnknown);
+  for (int y = 0; y < map.height; ++y)
+    for (int x = 0; x < map.width; ++x) {
+      auto& value = expected[static_cast<std::size_t>(x / factor) +
+                             raster->width * static_cast<std::size_t>(y / factor)];
+      const std::int8_t cell = map.cells[map.index(x, y)];
+      if (cell == kOccupiedCell) value = ViewRaster::kOccupied;
+      if (cell == kFreeCell && value != ViewRaster::kOccupied) value = ViewRaster::kFree;
+    }
+  CHECK(cells_of(*raster) == expected);
+}
+
+TEST_CASE("A slice of the distance field has its distances in the cells of its voxels", "[view]") {
+  constexpr float kVoxel_m = 0.1F;
+  LabelledMesh slice;
+  for (int y = -1; y <= 1; ++y)
+    for (int x = 7; x < 10; ++x) {
+      if (x == 8 && y == 0) continue;
+      slice.vertices.emplace_back(kVoxel_m * static_cast<float>(x),
+                                  kVoxel_m * static_cast<float>(y), 1.2F);
+      slice.colors.push_back(distance_color(static_cast<double>(x - 7) / 2.0));
+    }
+  CHECK(slice.colors[0] == LabelledMesh::Color{0, 0, 255});
+  const auto raster = view_raster(slice, 6);
+  REQUIRE(raster);
+  CHECK(is_valid(*raster));
+  CHECK(raster->kind == RasterKind::kDistances);
+  CHECK(raster->anchor == 6);
+  CHECK(raster->resolution_m == Approx(kVoxel_m));
+  CHECK(raster->origin[0] == Approx(0.65F));
+  CHECK(raster->origin[1] == Approx(-0.15F));
+  CHECK(raster->origin[2] == 1.2F);
+  CHECK(cells_of(*raster) == Values{0, 15, 31, 0, 255, 31, 0, 15, 31});
+
+  slice.colors.pop_back();
+  CHECK_FALSE(view_raster(slice, 6));
+  CHECK_FALSE(view_raster(LabelledMesh{}, 6));
+}
+
+TEST_CASE("Points that are no slice have no raster", "[view]") {
+  LabelledMesh points;
+  points.vertices = {{0, 0, 0}, {1e-3F, 0, 0}, {1e30F, 1e30F, 0}};
+  points.colors.resize(3);
+  CHECK_FALSE(view_raster(points, 0));
+}
+
+TEST_CASE("The largest objects are sent if not all fit, and the others are counted", "[view]") {
+  constexpr std::size_t kObjects = 3000;
+  ObjectList list{.anchor = 2, .objects = {}};
+  for (std::size_t k = 1; k <= kObjects; ++k) {
+    MapObject object{.label = 5, .box = {}, .robots = {1, 40000}};
+    object.box.size_m = Eigen::Vector3d::Constant(0.001 * static_cast<double>(k));
+    list.objects.push_back(object);
+  }
+  const ViewObjects view = view_objects(list);
+  CHECK(view.anchor == 2);
+  CHECK(view.objects.size() > 1000);
+  CHECK(view.objects.size() + view.left_out == kObjects);
+  CHECK(view.objects.front().size_m.x() == Approx(0.001 * kObjects));
+  CHECK(view.objects.back().size_m.x() == Approx(0.001 * (view.left_out + 1.0)));
+  CHECK(decode_view(encode_view(view)));
+}
+
+}  // namespace
 }  // namespace km

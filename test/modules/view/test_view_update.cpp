@@ -26,8 +26,7 @@ bool is_understood(const ViewContent& content) {
 }
 
 TEST_CASE("Texts are encoded in printable ASCII", "[view]") {
-  RobotSample state;
-  state.name = "a\nb\xC3\xA9";
+  RobotSample state{.name = "a\nb\xC3\xA9"};
   const auto decoded = decode_view(encode_view(state));
   REQUIRE(decoded);
   CHECK(std::get<RobotSample>(*decoded).name == "a?b??");

@@ -2,13 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <limits>
 #include <map>
 #include <memory>
 #include <numbers>
 #include <optional>
-#include <set>
 #include <string>
 #include <utility>
 

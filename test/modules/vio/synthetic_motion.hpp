@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cmath>
-#include <map>
 #include <random>
 #include <vector>
 
@@ -47,12 +46,11 @@ struct SyntheticMotion {
 
   [[nodiscard]] OdometryState state(Stamp stamp) const {
     const double t = seconds_between(0, stamp);
-    OdometryState s;
-    s.stamp = stamp;
-    s.T_odom_body = make_pose(rotation(t), position(t));
-    s.v_odom = speed(t);
-    s.gyro_bias = gyro_bias;
-    s.accel_bias = accel_bias;
+    OdometryState s{.stamp = stamp,
+                    .T_odom_body = make_pose(rotation(t), position(t)),
+                    .v_odom = speed(t),
+                    .gyro_bias = gyro_bias,
+                    .accel_bias = accel_bias};
     return s;
   }
 
@@ -117,8 +115,7 @@ class SyntheticWorld {
     if (last < stamp) frame.samples = motion_.samples(last, stamp, kImuStep);
     const SE3 T_odom_body = motion_.state(stamp).T_odom_body;
     for (std::size_t k = 0; k < landmarks_.size(); ++k) {
-      TrackedFeature feature;
-      feature.id = k;
+      TrackedFeature feature{.id = k, .right = {}};
       const auto left = see(0, T_odom_body, landmarks_[k], noise_px);
       if (!left) continue;
       feature.left = *left;

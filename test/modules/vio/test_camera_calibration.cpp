@@ -14,10 +14,9 @@ TEST_CASE("Derivatives of the pose at an image agree with differences", "[vio][c
   const unsigned seed = GENERATE(range(0U, 5U));
   CAPTURE(seed);
   std::mt19937 rng(seed);
-  OdometryState state;
-  state.T_odom_body = retract(SE3::Identity(), random_vector<6>(rng));
-  state.v_odom = random_vector<3>(rng);
-  state.gyro_bias = 0.1 * random_vector<3>(rng);
+  OdometryState state{.T_odom_body = retract(SE3::Identity(), random_vector<6>(rng)),
+                      .v_odom = random_vector<3>(rng),
+                      .gyro_bias = 0.1 * random_vector<3>(rng)};
   const Eigen::Vector3d gyro = random_vector<3>(rng);
   constexpr double kShift_s = 0.03;
   const ImagePose image = ImagePose::at(state, gyro, kShift_s);
@@ -46,9 +45,8 @@ TEST_CASE("Derivatives of a reprojection by the calibration agree with differenc
   window.calibrates = true;
   for (std::size_t c = 0; c < 2; ++c)
     window.rig_views[c] = view_model(synthetic_rig().stereo.cameras[c], 0.7);
-  CameraCalibration calibration;
-  calibration.offset_s = 0.02;
-  calibration.T_body_rig = retract(SE3::Identity(), 0.05 * random_vector<6>(rng));
+  CameraCalibration calibration{
+      .offset_s = 0.02, .T_body_rig = retract(SE3::Identity(), 0.05 * random_vector<6>(rng))};
   calibrate(window, calibration);
   const SyntheticMotion motion;
   WindowFrame& frame = window.frames.emplace_back();
@@ -97,8 +95,7 @@ std::vector<InertialFrame> late_frames(SyntheticWorld& world, Stamp late) {
 UncertainCalibration estimated(const std::vector<InertialFrame>& frames,
                                const SyntheticWorld& world) {
   constexpr std::size_t kStart = 16;
-  VioConfig config;
-  config.gravity_mps2 = kGravity_mps2;
+  VioConfig config{.gravity_mps2 = kGravity_mps2};
   FixedLagSmoother smoother(synthetic_rig(), config);
   REQUIRE(smoother.start(std::span(frames).first(kStart), world.states(kStart)));
   for (std::size_t k = kStart; k < frames.size(); ++k)

@@ -23,12 +23,11 @@ SE3 ahead(double x_m) {
 }
 
 VioConfig some_config() {
-  VioConfig config;
-  config.output_interval_s = 0.3;
-  config.output_distance_m = 0.25;
-  config.output_rest_interval_s = 2.0;
-  config.drift_rotation = 1e-3;
-  config.drift_translation = 1e-2;
+  VioConfig config{.output_interval_s = 0.3,
+                   .output_distance_m = 0.25,
+                   .output_rest_interval_s = 2.0,
+                   .drift_rotation = 1e-3,
+                   .drift_translation = 1e-2};
   return config;
 }
 

@@ -1,11 +1,13 @@
 #include <Eigen/LU>
 #include <catch2/catch.hpp>
-#include <memory>
+#include <limits>
 #include <optional>
+#include <random>
 #include <vector>
 
 #include "modules/core/lie.hpp"
 #include "modules/vio/fixed_lag_smoother.hpp"
+#include "modules/vio/gyro_noise_scale.hpp"
 #include "modules/vio/window_optimizer.hpp"
 #include "synthetic_motion.hpp"
 
@@ -21,11 +23,8 @@ struct Run {
 };
 
 VioConfig gaussian_config() {
-  VioConfig config;
-  config.noise_px = 0.5;
-  config.loss_scale = 1e3;
-  config.outlier_px = 10.0;
-  config.gravity_mps2 = kGravity_mps2;
+  VioConfig config{
+      .noise_px = 0.5, .loss_scale = 1e3, .outlier_px = 10.0, .gravity_mps2 = kGravity_mps2};
   return config;
 }
 
@@ -403,6 +402,36 @@ TEST_CASE("During a long rest the window keeps its keyframes and does not grow",
   CHECK(T->T.translation().norm() < 5e-3);
   // A centimetre is not noticed at rest.
   CHECK(T->Sigma.diagonal().maxCoeff() < 2e-4);
+}
+
+constexpr double kSigma_rad = 1e-3;
+
+// After `seconds` of images, 20 a second, that differ by `sigmas` standard deviations per axis.
+double scale_after(GyroNoiseScale& noise, double sigmas, double seconds) {
+  std::mt19937 rng(1);
+  std::normal_distribution<double> normal(0.0, sigmas * kSigma_rad);
+  for (int k = 0; k < static_cast<int>(20.0 * seconds); ++k) {
+    const double x = normal(rng), y = normal(rng), z = normal(rng);
+    noise.add(std::sqrt(x * x + y * y + z * z), 3.0 * kSigma_rad * kSigma_rad, 0.05);
+  }
+  return noise.scale();
+}
+
+TEST_CASE("The scale of the gyroscope's noise follows the images within bounds", "[vio]") {
+  GyroNoiseScale noise;
+  CHECK(noise.scale() == 1.0);
+  CHECK(scale_after(noise, 0.5, 30.0) == 1.0);
+  CHECK(scale_after(noise, 2.0, 30.0) == Approx(2.0).margin(0.4));
+  CHECK(scale_after(noise, 100.0, 30.0) == Approx(GyroNoiseScale::kMaxScale).margin(1e-3));
+  CHECK(scale_after(noise, 0.5, 30.0) == 1.0);
+}
+
+TEST_CASE("Neither a diverged estimate nor one image changes the noise of the gyroscope", "[vio]") {
+  const double difference_rad = GENERATE(std::numeric_limits<double>::quiet_NaN(), 1.0);
+  GyroNoiseScale noise;
+  noise.add(difference_rad, 3.0 * kSigma_rad * kSigma_rad, 0.05);
+  CHECK(noise.scale() == 1.0);
+  CHECK(scale_after(noise, 2.0, 30.0) == Approx(2.0).margin(0.4));
 }
 
 }  // namespace

@@ -3,7 +3,6 @@
 #include <cmath>
 
 #include "modules/core/lie.hpp"
-#include "modules/images/image_view.hpp"
 #include "modules/vio/patches.hpp"
 #include "textured_plane.hpp"
 

@@ -1,10 +1,7 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
-#include <filesystem>
 #include <numeric>
-#include <set>
 
-#include "modules/core/lie.hpp"
 #include "modules/vio/node/vio_node.hpp"
 #include "recorded_odometry.hpp"
 #include "test/support/shared_data.hpp"

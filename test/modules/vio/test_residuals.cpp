@@ -195,9 +195,7 @@ TEST_CASE("The covariance of preintegration agrees with Monte Carlo", "[vio]") {
   constexpr int kTrials = 3000;
   const SyntheticMotion motion;
   const Stamp end = 300 * kMillisecond, step = 5 * kMillisecond;
-  ImuNoise noise;
-  noise.gyro_noise_density = 2e-3;
-  noise.accel_noise_density = 2e-2;
+  ImuNoise noise{.gyro_noise_density = 2e-3, .accel_noise_density = 2e-2};
   const auto exact = motion.samples(0, end, step);
   ImuPreintegration reference(noise, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
   REQUIRE(reference.add(exact, 0, end));

@@ -5,6 +5,7 @@
 #include <random>
 
 #include "modules/core/covariance.hpp"
+#include "modules/vio/keyframe_rule.hpp"
 #include "modules/vio/vio.hpp"
 #include "synthetic_motion.hpp"
 #include "textured_plane.hpp"
@@ -43,9 +44,8 @@ class Ride {
   explicit Ride(const Glide& glide) : glide_(glide) { rig_.stereo = test_rig(); }
 
   SensorPacket packet(int image) {
-    SensorPacket packet;
-    packet.imu = samples(std::max(image - 1, 0), image);
-    packet.frame = std::make_shared<StereoFrame>(seen(image * kFrameStep));
+    SensorPacket packet{.frame = std::make_shared<StereoFrame>(seen(image * kFrameStep)),
+                        .imu = samples(std::max(image - 1, 0), image)};
     return packet;
   }
   // From image `first` to image `last`, both included.
@@ -60,9 +60,7 @@ class Ride {
   }
 
   Vio vio(double rest_s = VioConfig{}.rest_s) const {
-    VioConfig config;
-    config.gravity_mps2 = kGravity_mps2;
-    config.rest_s = rest_s;
+    VioConfig config{.gravity_mps2 = kGravity_mps2, .rest_s = rest_s};
     return Vio(3, rig_, TrackerConfig{}, config);
   }
   // Detects no rest, so that there is a keyframe every 2 s.
@@ -443,6 +441,33 @@ TEST_CASE("Slow motion does not shorten the trajectory", "[vio][rest]") {
   CHECK(T.translation().norm() ==
         Approx(ride.T_world_body(result.keyframes.back().stamp).translation().norm())
             .margin(kMargin_m));
+}
+
+TEST_CASE("A speed persists for about a second", "[vio]") {
+  CHECK(coasting_s(0.0) == 0.0);
+  CHECK(coasting_s(0.1) == Approx(0.05).epsilon(0.05));  // both ends together cover all of the time
+  CHECK(coasting_s(2.0) < 1.0);
+  CHECK(coasting_s(1e9) == Approx(1.0));
+}
+
+TEST_CASE("The covariance across a new start grows with the time without images and the speed",
+          "[vio]") {
+  const Matrix6 at_once = restart_covariance();
+  CHECK(at_once.isDiagonal());
+  CHECK(at_once(2, 2) == Approx(0.09));
+  CHECK(at_once(3, 3) == Approx(1.0));
+  const Eigen::Vector3d up = Eigen::Vector3d(1.0, 2.0, 2.0) / 3.0;
+  const Matrix6 later = restart_covariance({.lasts_s = 4.0, .speed_mps = 1.0, .up_body = up});
+  CHECK(is_covariance(later));
+  CHECK(up.dot(later.topLeftCorner<3, 3>() * up) == Approx(0.09 + 0.25 * 4.0));
+  const Eigen::Vector3d level = up.unitOrthogonal();
+  CHECK(level.dot(later.topLeftCorner<3, 3>() * level) == Approx(0.09));
+  CHECK(later(4, 4) == Approx(1.0 + 4.0));
+  CHECK(restart_covariance({.lasts_s = 4.0})(4, 4) == Approx(1.0 + 1.0));
+  const Matrix6 anywhere = restart_covariance({.lasts_s = 1e9, .speed_mps = 30.0, .up_body = up});
+  CHECK(is_covariance(anywhere));
+  CHECK(anywhere.diagonal().maxCoeff() <= 1e6);
+  CHECK(up.dot(anywhere.topLeftCorner<3, 3>() * up) < 4.0);
 }
 
 }  // namespace
