@@ -2,7 +2,6 @@
 #include <limits>
 #include <random>
 
-#include "modules/core/lie.hpp"
 #include "runtime/dds/wire_pose.hpp"
 #include "test/support/random_pose.hpp"
 

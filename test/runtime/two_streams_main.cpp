@@ -1,4 +1,3 @@
-#include <cstdlib>
 #include <ostream>
 
 #include "runtime/unblocked_output.hpp"

@@ -21,6 +21,13 @@ std::string data_of(RobotId robot, std::uint64_t boot, std::uint16_t protocol = 
   return to_user_data({robot, "peer", protocol, boot});
 }
 
+// Participant `from` announces itself with `data`, and its statuses arrive.
+void arrive(PeerTable& table, const Guid& from, const std::string& data,
+             const std::string& address = "") {
+  table.participant(from, data, address);
+  table.alive(from);
+}
+
 std::vector<PeerEventKind> kinds(PeerTable& table) {
   std::vector<PeerEventKind> result;
   for (const PeerEvent& event : table.take_events()) result.push_back(event.kind);
@@ -43,8 +50,7 @@ TEST_CASE(
           {{70, 0, PeerEventKind::kReturned},
            {70, 2, PeerEventKind::kResumed},
            {71, 0, PeerEventKind::kRestarted}}));
-  table.participant(guid(2), data_of(7, (incarnation << kResumeBits) + resumes), "udp/10.0.0.7");
-  table.alive(guid(2));
+  arrive(table, guid(2), data_of(7, (incarnation << kResumeBits) + resumes), "udp/10.0.0.7");
   CHECK(kinds(table) == Kinds{kind});
   CHECK(table.peers()[0].state == PeerState::kAlive);
   CHECK(table.peers()[0].addresses == "udp/10.0.0.7");
@@ -87,8 +93,7 @@ TEST_CASE("Reports of other robots count for a robot that is not received, until
     const bool restarted = GENERATE(false, true);
     CAPTURE(restarted);
     const std::uint64_t boot = restarted ? kOtherIncarnation : kIncarnation;
-    table.participant(guid(2), data_of(7, boot), "udp/10.0.0.7");
-    table.alive(guid(2));
+    arrive(table, guid(2), data_of(7, boot), "udp/10.0.0.7");
     CHECK(kinds(table) == Kinds{restarted ? PeerEventKind::kRestarted : PeerEventKind::kReturned});
     report(kIncarnation + 5);
     CHECK(kinds(table).empty());
@@ -131,8 +136,7 @@ const char* admit_all(const RobotIdentity& /*identity*/, std::string_view /*cred
 
 TEST_CASE("A robot that has proven its identity returns without another proof", "[peers]") {
   PeerTable table(kSelf, admit_all);
-  table.participant(guid(2), data_of(7, 70), "");
-  table.alive(guid(2));
+  arrive(table, guid(2), data_of(7, 70));
   CHECK(kinds(table).empty());
   CHECK(table.standing(guid(2)) == Standing::kRival);
   table.prove(guid(2), {7, 70});
@@ -159,19 +163,16 @@ TEST_CASE("A robot that has proven its identity returns without another proof", 
     CHECK(table.forged_announcements() == 1);
     CHECK(table.identity_of(guid(2))->boot == 70);
   }
-  table.participant(guid(2), announced, "");
-  table.alive(guid(2));
+  arrive(table, guid(2), announced);
   CHECK(kinds(table) == Kinds{PeerEventKind::kReturned});
   CHECK(table.standing(guid(2)) == Standing::kAdmitted);
 }
 
 TEST_CASE("An identity under the GUID of a gone participant needs a proof of its own", "[peers]") {
   PeerTable table(kSelf, admit_all);
-  table.participant(guid(2), data_of(7, 70), "");
-  table.alive(guid(2));
+  arrive(table, guid(2), data_of(7, 70));
   table.participant_gone(guid(2));
-  table.participant(guid(2), data_of(9, 90), "");
-  table.alive(guid(2));
+  arrive(table, guid(2), data_of(9, 90));
   CHECK(kinds(table).empty());
   CHECK(table.standing(guid(2)) == Standing::kRival);
 }
@@ -183,8 +184,7 @@ TEST_CASE("A robot that was first announced with forged data joins once it annou
                                       data_of(9, 90), data_of(7, 71), data_of(kSelf.robot, 5));
   CAPTURE(has_keys, forged);
   PeerTable table(kSelf, has_keys ? admit_all : PeerTable::Admit());
-  table.participant(guid(2), forged, "udp/10.0.0.7");
-  table.alive(guid(2));
+  arrive(table, guid(2), forged, "udp/10.0.0.7");
   (void)table.take_events();
   CHECK(table.is_current({7, 70}) == false);
   table.participant(guid(2), data_of(7, 70), "");
@@ -234,8 +234,7 @@ TEST_CASE("A robot is isolated while robots are announced and none is received",
 
 TEST_CASE("A robot without keys ignores one that has keys and the same id", "[peers]") {
   PeerTable table(kSelf);
-  table.participant(guid(2), to_user_data({kSelf.robot, "peer", kProtocolVersion, 70}, "abc"), "");
-  table.alive(guid(2));
+  arrive(table, guid(2), to_user_data({kSelf.robot, "peer", kProtocolVersion, 70}, "abc"));
   table.twin_received(guid(2), 100.0, 2.0);
   CHECK(kinds(table) == Kinds{PeerEventKind::kRefused});
   CHECK(table.standing(guid(2)) == Standing::kOutsider);
@@ -247,8 +246,7 @@ constexpr std::uint64_t kOtherIncarnation = 71U << kResumeBits;
 // Robot 7, received from guid 2, with kBoot.
 PeerTable with_robot() {
   PeerTable table(kSelf);
-  table.participant(guid(2), data_of(7, kBoot), "udp/10.0.0.7");
-  table.alive(guid(2));
+  arrive(table, guid(2), data_of(7, kBoot), "udp/10.0.0.7");
   REQUIRE(kinds(table) == Kinds{PeerEventKind::kJoined});
   return table;
 }
@@ -259,8 +257,7 @@ TEST_CASE("A robot that is started again has its id back once its former self is
       {{kOtherIncarnation, PeerEventKind::kRestarted}, {kBoot + 1, PeerEventKind::kResumed}}));
   PeerTable table = with_robot();
   SECTION("killed and restarted at once") {
-    table.participant(guid(3), data_of(7, boot), "");
-    table.alive(guid(3));
+    arrive(table, guid(3), data_of(7, boot));
     CHECK(table.standing(guid(3)) == Standing::kRival);
     CHECK(kinds(table) == Kinds{PeerEventKind::kRefused});
     table.silent(guid(2));
@@ -276,8 +273,7 @@ TEST_CASE("A robot that is started again has its id back once its former self is
     table.participant_gone(guid(2));
     CHECK(table.standing(guid(2)) == Standing::kAdmitted);  // its messages may still arrive
     CHECK(kinds(table) == Kinds{PeerEventKind::kLeft});
-    table.participant(guid(3), data_of(7, boot), "");
-    table.alive(guid(3));
+    arrive(table, guid(3), data_of(7, boot));
   }
   const Kinds events = kinds(table);
   REQUIRE_FALSE(events.empty());
@@ -301,10 +297,7 @@ TEST_CASE("No participant takes over the id of a present robot", "[peers]") {
   PeerTable table = with_robot();
   // That of the robot itself is no secret.
   const std::uint64_t boot = GENERATE(as<std::uint64_t>{}, kBoot, kBoot + 1, kOtherIncarnation);
-  for (int i = 0; i < 3; ++i) {
-    table.participant(guid(3), data_of(7, boot), "udp/10.0.0.66");
-    table.alive(guid(3));
-  }
+  for (int i = 0; i < 3; ++i) arrive(table, guid(3), data_of(7, boot), "udp/10.0.0.66");
   const auto events = table.take_events();
   REQUIRE(events.size() == 1);
   CHECK(events[0].kind == PeerEventKind::kRefused);
@@ -324,8 +317,7 @@ TEST_CASE("No participant takes over the id of a present robot", "[peers]") {
 TEST_CASE("With keys a former process does not get its id back", "[peers]") {
   PeerTable table(kSelf, admit_all);
   const auto receive = [&](const Guid& from, std::uint64_t boot) {
-    table.participant(from, data_of(7, boot), "udp/10.0.0.66");
-    table.alive(from);
+    arrive(table, from, data_of(7, boot), "udp/10.0.0.66");
     table.prove(from, {7, boot});
   };
   const std::uint64_t former = GENERATE(kBoot, kOtherIncarnation);
@@ -358,8 +350,7 @@ TEST_CASE("With keys a former process does not get its id back", "[peers]") {
 std::vector<PeerEvent> meet_twin(const RobotIdentity& self, const RobotIdentity& twin, double own_s,
                                  double its_s, double seconds) {
   PeerTable table(self);
-  table.participant(guid(2), to_user_data(twin), "udp/10.0.0.66");
-  table.alive(guid(2));
+  arrive(table, guid(2), to_user_data(twin), "udp/10.0.0.66");
   CHECK(table.standing(guid(2)) == Standing::kTwin);
   for (double s = 0.0; s <= seconds; s += 0.5) table.twin_received(guid(2), its_s + s, own_s + s);
   CHECK(table.peers().empty());
@@ -467,8 +458,7 @@ TEST_CASE("Participants outside the team do not take the place of a robot, howev
 TEST_CASE("A new robot takes the place of the one that has been lost for longest", "[peers]") {
   PeerTable table(kSelf);
   const auto receive = [&](std::size_t n, std::uint64_t boot) {
-    table.participant(wide_guid(n), data_of(static_cast<RobotId>(n), boot), "");
-    table.alive(wide_guid(n));
+    arrive(table, wide_guid(n), data_of(static_cast<RobotId>(n), boot));
   };
   const std::size_t end = 100 + PeerTable::kMaxRobots;
   for (std::size_t n = 100; n < end; ++n) receive(n, n);
