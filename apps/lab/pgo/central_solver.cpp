@@ -6,6 +6,7 @@
 
 #include "apps/lab/pgo/team_graph.hpp"
 #include "modules/rbcd/stiefel.hpp"
+#include "modules/rbcd/truncated_newton.hpp"
 
 namespace km {
 namespace {

@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "apps/lab/pgo/certificate.hpp"
-#include "modules/rbcd/truncated_newton.hpp"
 #include "modules/robust/tree_newton.hpp"
 
 namespace km {

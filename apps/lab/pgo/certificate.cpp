@@ -2,7 +2,6 @@
 
 #include <Spectra/SymEigsSolver.h>
 #include <algorithm>
-#include <cmath>
 #include <random>
 
 namespace km {

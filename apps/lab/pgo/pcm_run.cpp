@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <iterator>
 #include <random>
-#include <span>
 #include <stdexcept>
+#include <utility>
 #include <variant>
 
-#include "apps/lab/pgo/greedy_clique.hpp"
-#include "apps/lab/pgo/random_outliers.hpp"
+#include "apps/lab/pgo/scenario.hpp"
 #include "apps/lab/pgo/solvers.hpp"
+#include "modules/outlier_rejection/clique_search.hpp"
 #include "modules/outlier_rejection/cycle_test.hpp"
 #include "modules/outlier_rejection/max_clique.hpp"
 #include "modules/outlier_rejection/pcm.hpp"
@@ -76,6 +76,22 @@ bool agrees_with_odometry(const CycleTest& test, const Closure& closure) {
 }
 
 }  // namespace
+
+void GreedyClique::add(std::span<const std::size_t> neighbours) {
+  const std::size_t added = graph_.add_vertex();
+  for (const std::size_t u : neighbours) graph_.connect(u, added);
+  bound_ = std::max(bound_, std::min(bound_, neighbours.size()) + 1);
+  const bool from_all = starts_ == Starts::kAllVertices;
+  std::size_t least = from_all ? 0 : clique_.size();
+  std::vector<std::size_t> best;
+  for (std::size_t v = from_all ? 0 : added; v <= added; ++v) {
+    std::vector<std::size_t> clique = greedy_extension(graph_, {v}, least);
+    if (clique.empty()) continue;
+    least = clique.size();
+    best = std::move(clique);
+  }
+  if (best.size() > clique_.size()) clique_ = std::move(best);
+}
 
 PcmRun run_pcm(const std::vector<LabelledClosure>& closures, CliqueMethod method,
                const PcmProgress& progress) {

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <optional>
+#include <random>
 #include <string>
 #include <utility>
 #include <vector>
@@ -86,6 +87,22 @@ struct ScenarioGraph {
 /// `optimum` is the truth. Throws as corrupt() does.
 [[nodiscard]] ScenarioGraph as_measured(const TeamGraph& graph, const std::vector<SE3>& optimum,
                                         double share_percent, unsigned seed);
+
+/// Distribution of false closures.
+struct RandomOutlierModel {
+  RobotId robot = 0;
+  std::size_t keyframes = 0;  ///< Number of keyframes of the robot.
+  bool planar = false;        ///< No translation along z, no roll and pitch.
+  double half_side_m = 20.0;  ///< Half the side of the cube (planar: square) of translations.
+  Matrix6 covariance = Matrix6::Identity();  ///< Covariance of every outlier.
+};
+
+/// `count` false closures for tests of outlier rejection. The pairs of non-consecutive keyframes,
+/// the rotations and the translations are uniform. Throws std::invalid_argument for fewer than
+/// three keyframes.
+[[nodiscard]] std::vector<RelativePose> random_outliers(std::size_t count,
+                                                        const RandomOutlierModel& model,
+                                                        std::mt19937& rng);
 
 /// Appends `count` false closures to the edges. Each joins a uniformly drawn pair of poses that do
 /// not follow each other. Its rotation is uniform, and its translation is uniform within

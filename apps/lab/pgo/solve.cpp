@@ -1,14 +1,19 @@
 #include <algorithm>
-#include <fstream>
 #include <iostream>
 #include <limits>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <optional>
+#include <ostream>
+#include <sstream>
 #include <stdexcept>
 
 #include "apps/lab/pgo/commands.hpp"
-#include "apps/lab/pgo/solve_report.hpp"
+#include "apps/lab/pgo/solvers.hpp"
+#include "apps/lab/pgo/truth_score.hpp"
+#include "modules/core/json.hpp"
 #include "modules/core/precision.hpp"
+#include "modules/core/text_table.hpp"
 #include "modules/recorded_graph/g2o_io.hpp"
 
 namespace km {
@@ -55,18 +60,227 @@ once. The certificate proves an upper bound of the gap. For newton without --tru
 table shows the kept closures instead; a message to several robots counts for each of them.
 
 If a JRL file labels false closures, a table shows how many false and true ones were kept. If
-it has true poses, a table shows the ATE: the RMSE [m] of the positions of all robots under
-one rigid alignment, then of each robot under that alignment and under its own. With both,
-the optimum of all closures that are not labelled false is shown for comparison. Priors are
-left out.
+it has true poses, the ATE is shown: the RMSE [m] of the positions of all robots under one
+rigid alignment. With both, the optimum of all closures that are not labelled false is shown
+for comparison. Priors are left out.
 
 Examples:
   kimera_multi_pgo solve sphere2500.g2o --robots 5 --method newton --trust-all --json out.json
   kimera_multi_pgo solve tunnels_8robots --method rbcd --rounds 300
   kimera_multi_pgo solve tunnels_8robots
-  kimera_multi_pgo solve tunnels_8robots --barc 20
   kimera_multi_pgo solve ntu_r3_02_d02_n04_n13_wifi.jrl
   kimera_multi_pgo solve manhattan.g2o --method centralized --output manhattan.tum)";
+
+// Gap relative to the optimum. Without noise the optimum is only rounding error, so kNoCost bounds
+// the divisor.
+double gap(const Solution& solution, const TeamRound& round) {
+  constexpr double kNoCost = 1e-9;
+  const double optimum = solution.comparison->optimum;
+  return (round.cost - optimum) / std::max(optimum, kNoCost);
+}
+
+std::string work_bytes(const TeamWork& work) {
+  return bytes_text(static_cast<double>(work.bytes));
+}
+
+std::string table(const Solution& solution) {
+  const std::vector<TeamRound>& rounds = solution.run.rounds;
+  std::vector<std::vector<std::string>> rows{
+      {"", "rounds", "cost", "gap", "gradient", "sent", "critical s", "CPU s"}};
+  const auto add = [&](const std::string& name, const TeamRound& round) {
+    rows.push_back({name, std::to_string(round.round), rounded(round.cost, 9),
+                    rounded(gap(solution, round), 2), rounded(round.gradient_norm, 2),
+                    work_bytes(round.work), fixed(round.work.critical_path_s, 3),
+                    fixed(round.work.total_cpu_s, 3)});
+  };
+  add("start", rounds.front());
+  for (const double target : {1e-2, 1e-3, 1e-4, 1e-5, 1e-6}) {
+    const auto reached = std::find_if(rounds.begin(), rounds.end(), [&](const TeamRound& round) {
+      return gap(solution, round) < target;
+    });
+    const std::string name = "gap < " + rounded(target, 1);
+    if (reached == rounds.end()) {
+      rows.push_back({name, "-", "", "", "", "", "", ""});
+      break;
+    }
+    add(name, *reached);
+  }
+  add("end", rounds.back());
+  return align_columns(rows);
+}
+
+std::string certificate_text(const Certificate& certificate) {
+  std::string text = certificate.certified ? "certified" : "not certified";
+  text += ": proven that the cost lies above that of any poses by at most " +
+          rounded(std::max(certificate.relative_gap, 1e-12), 2) +
+          " of itself (lambda_min at least " + rounded(certificate.lambda_bound, 3);
+  if (certificate.lambda_min) text += ", estimated " + rounded(*certificate.lambda_min, 3);
+  return text + ")\n";
+}
+
+std::string comparison_text(const Solution& solution) {
+  const OptimumComparison& comparison = *solution.comparison;
+  std::ostringstream text;
+  text << table(solution) << "chordal start in " << fixed(solution.start_s, 3) << " s, "
+       << (comparison.optimum_certified ? "optimum " : "least cost known ")
+       << rounded(comparison.optimum, 9) << ", rounded cost " << rounded(comparison.rounded_cost, 9)
+       << ", rank " << comparison.rank << '\n'
+       << certificate_text(comparison.certificate);
+  return text.str();
+}
+
+struct Count {
+  std::size_t kept = 0, all = 0;
+
+  [[nodiscard]] std::string text() const {
+    return std::to_string(kept) + " of " + std::to_string(all);
+  }
+};
+
+std::string decision_text(const TeamGraph& graph, const Solution& solution) {
+  const Decision& decision = *solution.run.decision;
+  const std::vector<bool> odometry = odometry_edges(graph);
+  Count between, inside, steps;
+  for (std::size_t k = 0; k < decision.kept.size(); ++k) {
+    const BlockEdge& e = graph.edges[k];
+    Count& count = odometry[k]                                  ? steps
+                   : graph.robot_of(e.i) != graph.robot_of(e.j) ? between
+                                                                : inside;
+    ++count.all;
+    if (decision.kept[k]) ++count.kept;
+  }
+  const TeamWork& work = solution.run.rounds.back().work;
+  std::ostringstream text;
+  text << "kept " << between.text() << " closures between robots, " << inside.text()
+       << " inside a robot, " << steps.text() << " steps of odometry\n"
+       << "closures are " << rounded(decision.noise_scale, 3)
+       << " times as noisy as the graph says; kept up to " << rounded(decision.threshold, 3)
+       << " sigma of the graph\n"
+       << solution.run.rounds.back().round << " rounds, " << work_bytes(work)
+       << " sent, by one robot at most " << bytes_text(static_cast<double>(decision.most_sent))
+       << " and to one " << bytes_text(static_cast<double>(decision.most_received))
+       << ", critical path " << fixed(work.critical_path_s, 3) << " s, CPU "
+       << fixed(work.total_cpu_s, 3) << " s\n";
+  if (!decision.decided) text << "not decided: --rounds did not suffice\n";
+  return text.str();
+}
+
+std::vector<std::string> count_row(const std::string& name, const ClosureCounts& counts) {
+  return {name, std::to_string(counts.true_kept), std::to_string(counts.true_lost),
+          std::to_string(counts.false_kept), std::to_string(counts.false_rejected)};
+}
+
+Json counts_json(const ClosureCounts& counts) {
+  return {{"true_kept", counts.true_kept},
+          {"true_lost", counts.true_lost},
+          {"false_kept", counts.false_kept},
+          {"false_rejected", counts.false_rejected}};
+}
+
+Json ate_json(const TeamAte& ate) {
+  return {{"team_m", ate.team_m}, {"parts", ate.parts}};
+}
+
+double ate_ratio(const TruthScore& truth) {
+  return truth.ate->team_m / truth.optimum_of_true->team_m;
+}
+
+// Text with the result, and the rounds, bytes and seconds after which each gap to the optimum was
+// reached. For a method that rejects closures it shows how many were kept.
+std::string solution_text(const TeamGraph& graph, const Solution& solution) {
+  std::ostringstream text;
+  text << solution.method << ": " << graph.poses() << " poses, " << graph.edges.size()
+       << " edges, ";
+  if (!graph.verticals.empty()) text << graph.verticals.size() << " verticals, ";
+  text << graph.robots() << (graph.robots() == 1 ? " robot\n" : " robots\n")
+       << indefinite_text(graph.indefinite_edges)
+       << (solution.comparison ? comparison_text(solution) : decision_text(graph, solution));
+  return text.str();
+}
+
+// Kept closures and the ATE, as far as the data set contains the truth.
+std::string score_text(const TruthScore& truth) {
+  constexpr int kDecimals = 3;
+  std::string text;
+  if (truth.closures)
+    text += align_columns({{"closures", "true kept", "true lost", "false kept", "false rejected"},
+                           count_row("inside a robot", truth.closures->inside),
+                           count_row("between robots", truth.closures->between)});
+  if (!truth.ate) return text;
+  text += "ATE of the team " + fixed(truth.ate->team_m, kDecimals) + " m";
+  if (!truth.optimum_of_true) return text + '\n';
+  text += "; of the optimum of the true closures " +
+          fixed(truth.optimum_of_true->team_m, kDecimals) + " m, ratio " +
+          fixed(ate_ratio(truth), kDecimals) + '\n';
+  if (truth.optimum_of_true->parts > 1)
+    text += "the true closures leave " + std::to_string(truth.optimum_of_true->parts) +
+            " unconnected parts, each aligned by itself\n";
+  if (!truth.certified) text += "the optimum of the true closures is not certified\n";
+  return text;
+}
+
+// Writes one object. rounds[0] is the start; bytes and times are sums up to the round:
+//     {"poses", "edges", "verticals", "indefinite_edges", "robots", "method", "start_cpu_s",
+//     "rounds": [{"cost", "gradient_norm", "bytes", "critical_path_s", "total_cpu_s"}]}.
+// Keys in addition if the solution has a comparison; "lambda_min" only if it was estimated:
+//     "rounded_cost", "relative_gap", "lambda_bound", "lambda_min", "certified", "rank",
+//     "optimum".
+// Keys of newton in addition:
+//     "noise_scale", "barc" [sigma of the graph], "most_sent", "most_received", "decided",
+//     "kept": [indices of edges].
+// Keys in addition if the data set has the truth; "ate_ratio" is that of the two "team_m":
+//     "closures": {"inside", "between": {"true_kept", "true_lost", "false_kept",
+//     "false_rejected"}}, "ate": {"team_m", "parts"}, "optimum_of_true": as "ate",
+//     and "certified"; "ate_ratio".
+void write_solution_json(std::ostream& out, const TeamGraph& graph, const Solution& solution,
+                         const TruthScore& truth) {
+  Json rounds = Json::array();
+  for (const TeamRound& round : solution.run.rounds)
+    rounds.push_back({{"round", round.round},
+                      {"cost", round.cost},
+                      {"gradient_norm", round.gradient_norm},
+                      {"bytes", round.work.bytes},
+                      {"critical_path_s", round.work.critical_path_s},
+                      {"total_cpu_s", round.work.total_cpu_s}});
+  Json json = {{"poses", graph.poses()},
+               {"edges", graph.edges.size()},
+               {"verticals", graph.verticals.size()},
+               {"indefinite_edges", graph.indefinite_edges},
+               {"robots", graph.robots()},
+               {"method", solution.method},
+               {"rounds", std::move(rounds)},
+               {"start_cpu_s", solution.start_s}};
+  if (const auto& comparison = solution.comparison) {
+    const Certificate& certificate = comparison->certificate;
+    json.update({{"rounded_cost", comparison->rounded_cost},
+                 {"relative_gap", certificate.relative_gap},
+                 {"lambda_bound", certificate.lambda_bound},
+                 {"certified", certificate.certified},
+                 {"rank", comparison->rank},
+                 {"optimum", comparison->optimum}});
+    if (certificate.lambda_min) json["lambda_min"] = *certificate.lambda_min;
+  }
+  if (const auto& decision = solution.run.decision) {
+    json.update({{"noise_scale", decision->noise_scale},
+                 {"barc", decision->threshold},
+                 {"most_sent", decision->most_sent},
+                 {"most_received", decision->most_received},
+                 {"decided", decision->decided},
+                 {"kept", Json::array()}});
+    for (std::size_t k = 0; k < decision->kept.size(); ++k)
+      if (decision->kept[k]) json["kept"].push_back(k);
+  }
+  if (truth.closures)
+    json["closures"] = {{"inside", counts_json(truth.closures->inside)},
+                        {"between", counts_json(truth.closures->between)}};
+  if (truth.ate) json["ate"] = ate_json(*truth.ate);
+  if (truth.optimum_of_true) {
+    json["optimum_of_true"] = ate_json(*truth.optimum_of_true);
+    json["optimum_of_true"]["certified"] = truth.certified;
+    json["ate_ratio"] = ate_ratio(truth);
+  }
+  out << json_text(json);
+}
 
 struct SolveCommand {
   GraphInput input;
@@ -77,16 +291,6 @@ struct SolveCommand {
   fs::path output;
 };
 
-// An option that not every method takes, and the methods that take it.
-struct Takers {
-  const char* option;
-  std::vector<std::string> methods;
-};
-
-std::vector<Takers> takers() {
-  return {{"--rank", {"rbcd"}}, {"--over-relaxation", {"rbcd"}}, {"--barc", {"newton"}}};
-}
-
 void define_method(CLI::App& app, SolveCommand& command) {
   SolverOptions& solver = command.solver;
   app.add_option("--method", solver.method, "See below")
@@ -96,38 +300,18 @@ void define_method(CLI::App& app, SolveCommand& command) {
                  "Largest number of rounds; the default is 1000 for newton, as robots have it,\n"
                  "and 100 for the other methods and --trust-all")
       ->check(CLI::Range(0, 1000000));
-  app.add_option("--rank", solver.rank, "rbcd: rank of the relaxation")->check(CLI::Range(3, 10));
   app.add_option("--over-relaxation", solver.over_relaxation,
                  "rbcd: largest step of a robot, relative to that to the minimum of its block")
       ->check(CLI::Range(1.0, 1.99));
-}
-
-void define_newton(CLI::App& app, SolveCommand& command) {
-  SolverOptions& solver = command.solver;
-  app.option_defaults()->group("newton");
-  app.add_flag("--trust-all", solver.trust_all, "Treat all closures as true");
-  app.add_option(
-         "--barc", solver.barc,
-         "Largest residual [sigma] of a closure that is kept, sqrt of its cost; 0: exceeded by\n"
-         "one in a million Gaussian residuals, times the noise scale that the team estimates")
-      ->check(CLI::NonNegativeNumber);
-}
-
-std::string listed(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text;
+  app.add_flag("--trust-all", solver.trust_all, "newton: treat all closures as true");
 }
 
 void check(CLI::App& app, SolveCommand& command) {
   if (command.solver.trust_all && command.solver.method != "newton")
     throw std::runtime_error("--trust-all is for --method newton only");
   command.solver.run.max_rounds = command.rounds.value_or(command.solver.rejects() ? 1000 : 100);
-  const std::string method = command.solver.name();
-  for (const auto& [option, methods] : takers())
-    if (app.count(option) > 0 && std::find(methods.begin(), methods.end(), method) == methods.end())
-      throw std::runtime_error(std::string(option) + " is for --method " + listed(methods) +
-                               " only, not for " + method);
+  if (app.count("--over-relaxation") > 0 && command.solver.method != "rbcd")
+    throw std::runtime_error("--over-relaxation is for --method rbcd only");
   check_output_folder(command.json);
   check_output_folder(command.output);
 }
@@ -172,7 +356,7 @@ void run(CLI::App& app, SolveCommand& command) {
       throw std::runtime_error(command.input.file.string() + ": " + command.solver.name() +
                                " found no finite poses: do steps and weights make sense?");
   const TruthScore truth = score(team, solution.T_world_kf, kept_by(solution));
-  std::cout << left_out_text(team) << solution_text(graph, solution) << score_text(graph, truth);
+  std::cout << left_out_text(team) << solution_text(graph, solution) << score_text(truth);
   write_output(command.json,
                [&](std::ostream& out) { write_solution_json(out, graph, solution, truth); });
   write_output(command.output, [&](std::ostream& out) {
@@ -190,7 +374,6 @@ void add_solve(CLI::App& parent) {
   const auto command = std::make_shared<SolveCommand>();
   command->input.define(app);
   define_method(app, *command);
-  define_newton(app, *command);
   app.option_defaults()->group("Output");
   app.add_option("--json", command->json, "Also write every round to this file, as JSON");
   app.add_option("--output", command->output,

@@ -55,8 +55,7 @@ class CentralTeam : public TeamSolver {
 // The robots' own block descent, with their own stopping rule.
 std::unique_ptr<TeamSolver> rbcd_team(const TeamGraph& graph, const std::vector<SE3>& start,
                                       const SolverOptions& options) {
-  const RbcdOptions rbcd{.rank = options.rank,
-                         .max_rounds = static_cast<std::uint32_t>(options.run.max_rounds),
+  const RbcdOptions rbcd{.max_rounds = static_cast<std::uint32_t>(options.run.max_rounds),
                          .max_over_relaxation = options.over_relaxation};
   return std::make_unique<MemberTeam>(
       graph, kRigidRank, start, [rbcd](SessionGraph part, const TreePlace& place) {
@@ -93,7 +92,6 @@ SolverRun run_trusting(const TeamGraph& graph, const std::vector<SE3>& start,
 // The robots' own code from measurements to published poses, over an ideal network.
 SolverRun run_agents(const TeamGraph& graph, const SolverOptions& options, const TeamMeter& meter) {
   AgentTeamOptions team{.meter = meter};
-  team.pose_graph.barc = options.barc;
   team.pose_graph.max_rounds = options.run.max_rounds;
   team.pcm.witness_wait_s = 0.0;
   AgentTeamRun robots = run_agent_team(graph, team);

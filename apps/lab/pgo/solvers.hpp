@@ -21,11 +21,9 @@ namespace km {
 /// A method, by its name in kMethods, and its parameters.
 struct SolverOptions {
   std::string method = "newton";
-  Eigen::Index rank = 5;  ///< Only for rbcd: rank of the relaxation.
   TeamRunOptions run = {.max_rounds = 100};
   double over_relaxation = 1.95;  ///< rbcd: largest value; 1: as published.
   bool trust_all = false;         ///< newton: all closures are treated as true.
-  double barc = 0.0;              ///< newton: largest residual of an inlier [sigma]; 0: estimated.
 
   [[nodiscard]] bool rejects() const { return method == "newton" && !trust_all; }
   /// The method as given on the command line.

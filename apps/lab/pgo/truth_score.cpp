@@ -3,35 +3,12 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
-#include <span>
 
 #include "apps/lab/pgo/solvers.hpp"
 #include "modules/evaluation/trajectory_error.hpp"
 #include "modules/rbcd/stiefel.hpp"
 
 namespace km {
-namespace {
-
-// A sum of squared position errors.
-struct SquaredErrors {
-  double sum_m2 = 0.0;
-  std::size_t poses = 0;
-
-  void add(const Alignment& alignment, std::span<const PosePair> pairs) {
-    for (const PosePair& pair : pairs)
-      sum_m2 +=
-          (alignment.apply(pair.T_estimate_body).translation() - pair.T_truth_body.translation())
-              .squaredNorm();
-    poses += pairs.size();
-  }
-  [[nodiscard]] double rmse_m() const {
-    return poses == 0 ? std::numeric_limits<double>::quiet_NaN()
-                      : std::sqrt(sum_m2 / static_cast<double>(poses));
-  }
-};
-
-}  // namespace
-
 std::vector<ConnectedPart> true_parts(const LabelledTeamGraph& team) {
   std::vector<bool> keep_edge = team.truth.is_false;
   keep_edge.flip();
@@ -69,34 +46,24 @@ LabelCounts count_closures(const LabelledTeamGraph& team, const std::vector<bool
 }
 
 TeamAte ate_of(const LabelledTeamGraph& team, const std::vector<SolvedPart>& parts) {
-  const std::size_t robots = team.graph.robots();
-  SquaredErrors all;
-  std::vector<SquaredErrors> in_team(robots), alone(robots);
+  double sum_m2 = 0.0;
+  std::size_t poses = 0;
   for (const SolvedPart& part : parts) {
-    std::vector<std::vector<PosePair>> of_robot(robots);
     std::vector<PosePair> pairs;
-    for (std::size_t i = 0; i < part.poses.size(); ++i) {
-      const auto& truth = team.truth.T_world_kf[part.poses[i]];
-      if (!truth) continue;
-      pairs.push_back({.T_truth_body = *truth, .T_estimate_body = part.T_world_kf[i]});
-      of_robot[team.graph.robot_of(static_cast<Eigen::Index>(part.poses[i]))].push_back(
-          pairs.back());
-    }
+    for (std::size_t i = 0; i < part.poses.size(); ++i)
+      if (const auto& truth = team.truth.T_world_kf[part.poses[i]])
+        pairs.push_back({.T_truth_body = *truth, .T_estimate_body = part.T_world_kf[i]});
     if (pairs.empty()) continue;
     const Alignment alignment = align(pairs, false);
-    all.add(alignment, pairs);
-    for (std::size_t k = 0; k < robots; ++k) {
-      if (of_robot[k].empty()) continue;
-      in_team[k].add(alignment, of_robot[k]);
-      alone[k].add(align(of_robot[k], false), of_robot[k]);
-    }
+    for (const PosePair& pair : pairs)
+      sum_m2 +=
+          (alignment.apply(pair.T_estimate_body).translation() - pair.T_truth_body.translation())
+              .squaredNorm();
+    poses += pairs.size();
   }
-  TeamAte ate{.team_m = all.rmse_m(), .in_team_m = {}, .alone_m = {}, .parts = parts.size()};
-  for (std::size_t k = 0; k < robots; ++k) {
-    ate.in_team_m.push_back(in_team[k].rmse_m());
-    ate.alone_m.push_back(alone[k].rmse_m());
-  }
-  return ate;
+  return {.team_m = poses > 0 ? std::sqrt(sum_m2 / static_cast<double>(poses))
+                              : std::numeric_limits<double>::quiet_NaN(),
+          .parts = parts.size()};
 }
 
 TruthScore score(const LabelledTeamGraph& team, const std::vector<SE3>& T_world_kf,

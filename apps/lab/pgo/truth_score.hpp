@@ -19,10 +19,8 @@ struct ClosureCounts {
 
 /// Root mean square of the position errors [m] of a team.
 struct TeamAte {
-  double team_m = 0.0;            ///< All poses under one rigid alignment.
-  std::vector<double> in_team_m;  ///< [k]: poses of robot k under that alignment.
-  std::vector<double> alone_m;    ///< [k]: poses of robot k under their own alignment.
-  std::size_t parts = 0;          ///< Connected parts, each aligned separately; 1: one frame.
+  double team_m = 0.0;    ///< All poses under one rigid alignment.
+  std::size_t parts = 0;  ///< Connected parts, each aligned separately; 1: one frame.
 };
 
 /// Poses of a connected part of a graph, in a frame of their own.

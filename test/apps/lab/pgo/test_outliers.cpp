@@ -39,11 +39,9 @@ std::string laps_g2o() {
 TEST_CASE("outliers compares methods in a table and JSON", "[outliers]") {
   const TemporaryFolder folder;
   const std::string graph = folder.write("laps.g2o", laps_g2o()).string();
-  const CommandResult result =
+  const CommandResult result = succeeded(
       run_command(kOutliersTool + graph + " --robots 2 --shares 12.5,25 --seeds 1,2 --json " +
-                  (folder.path() / "out.json").string());
-  CAPTURE(result.output);
-  REQUIRE(result.exit_code == 0);
+                  (folder.path() / "out.json").string()));
   CHECK_THAT(result.output, Contains("20 poses, 2 robots") && Contains("which is certified") &&
                                 Contains("robots    25 %  4 / 4") &&
                                 Contains("robots  12.5 %  2 / 2"));
@@ -68,11 +66,9 @@ TEST_CASE("outliers runs a scenario with the given share and robots", "[outliers
         << " 5.6712818 9.8229523 0 0 0 0.7660444 0.6427876 400 0 0 0 0 0 400 0 0 0 0 400 0 0 0 900 "
            "0 0 900 0 900\n";
   const std::string graph = folder.write("laps.g2o", text.str()).string();
-  const CommandResult result = run_command(
+  const CommandResult result = succeeded(run_command(
       kOutliersTool + graph + " --scenario three-folders --robots 3 --seeds 4 " +
-      "--shares 10 --methods trust-all,reference --json " + (folder.path() / "out.json").string());
-  CAPTURE(result.output);
-  REQUIRE(result.exit_code == 0);
+      "--shares 10 --methods trust-all,reference --json " + (folder.path() / "out.json").string()));
   CHECK_THAT(result.output, Contains("three-folders: 40 poses, 3 robots"));
   const Json json = Json::parse(folder.read("out.json"));
   CHECK(json["results"][0]["false_closures"] == 83);

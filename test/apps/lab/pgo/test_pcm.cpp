@@ -3,9 +3,8 @@
 #include <random>
 #include <string>
 
-#include "apps/lab/pgo/greedy_clique.hpp"
 #include "apps/lab/pgo/pcm_run.hpp"
-#include "apps/lab/pgo/random_outliers.hpp"
+#include "apps/lab/pgo/scenario.hpp"
 #include "modules/outlier_rejection/pcm.hpp"
 #include "test/modules/outlier_rejection/chain.hpp"
 #include "test/modules/outlier_rejection/random_graph.hpp"
@@ -36,10 +35,8 @@ TEST_CASE("pcm prints a table and writes JSON", "[pcm]") {
   const TemporaryFolder folder;
   const std::string graph =
       folder.write("chain.g2o", chain_g2o(20, {{0, 5}, {2, 9}, {3, 15}})).string();
-  const auto result = run_command(kPcmTool + graph + " --search exact batch --json " +
-                                  (folder.path() / "out.json").string());
-  CAPTURE(result.output);
-  REQUIRE(result.exit_code == 0);
+  const auto result = succeeded(run_command(kPcmTool + graph + " --search exact batch --json " +
+                                            (folder.path() / "out.json").string()));
   CHECK_THAT(result.output, Contains("vertices  clique") &&
                                 Contains("exact search: 3 consistent") &&
                                 Contains("batch search: 3 consistent"));
@@ -138,8 +135,7 @@ TEST_CASE("Closures without a usable covariance are refused by name", "[pcm]") {
 TEST_CASE("With 1000 outliers the clique of Manhattan consists of true closures", "[pcm]") {
   const auto file = shared_data("pose_graphs/2d/manhattan.g2o");
   if (!file) return;
-  ClosureChoice selection;
-  selection.outliers = 1000;
+  ClosureChoice selection{.outliers = 1000};
   const PcmRun run = run_pcm(read_closures(*file, selection).closures);
   // The test against odometry is lenient if odometry is uncertain, but drops no more than the 1 %
   // of true closures that its confidence allows.

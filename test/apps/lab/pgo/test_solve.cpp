@@ -56,10 +56,8 @@ TEST_CASE("Every method runs from the command line and prints its result", "[pgo
   const std::string method = GENERATE("local", "dgs", "rbcd", "newton --trust-all", "centralized",
                                       "rbcd --over-relaxation 1");
   CAPTURE(method);
-  const CommandResult result = run_command(kSolveTool + graph.string() + " --robots 2 --method " +
-                                           method + " --json " + json.string());
-  CAPTURE(result.output);
-  REQUIRE(result.exit_code == 0);
+  const CommandResult result = succeeded(run_command(
+      kSolveTool + graph.string() + " --robots 2 --method " + method + " --json " + json.string()));
   CHECK_THAT(result.output, Contains("8 poses, 10 edges, 2 robots"));
   const std::string written = folder.read("out.json");
   for (const char* key :
@@ -99,10 +97,8 @@ TEST_CASE("A graph without noise is certified and has no gap", "[pgo]") {
   const auto graph = folder.write("exact.g2o", "EDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\n");
   const auto json = folder.path() / "out.json";
   const CommandResult result =
-      run_command(kSolveTool + graph.string() + " --robots 2 --keep-steps --method rbcd --json " +
-                  json.string());
-  CAPTURE(result.output);
-  CHECK(result.exit_code == 0);
+      succeeded(run_command(kSolveTool + graph.string() +
+                            " --robots 2 --keep-steps --method rbcd --json " + json.string()));
   CHECK_THAT(result.output, !Contains("nan") && Contains("\ncertified"));
   CHECK_THAT(folder.read("out.json"), !Contains("nan") && Contains("\"certified\": true"));
 }
@@ -120,9 +116,6 @@ TEST_CASE("newton decides on closures and reports their noise", "[pgo]") {
     CHECK_THAT(folder.read("out.json"),
                Contains("\"decided\": true") && Contains("\"noise_scale\":"));
   }
-  const CommandResult strict =
-      run_command(kSolveTool + square + " --robots 2 --barc 0.001 --json " + json.string());
-  CHECK_THAT(strict.output, Contains("kept 0 of 4 closures between robots"));
 }
 
 TEST_CASE("solve refuses unusable input and options with the reason", "[pgo]") {
@@ -137,8 +130,6 @@ TEST_CASE("solve refuses unusable input and options with the reason", "[pgo]") {
   const auto [pattern, message] = GENERATE(table<std::string, std::string>(
       {{"FILE --robots 9", "8 poses, which cannot be divided among 9 robots"},
        {"FILE --method dgs --over-relaxation 1.5", "--over-relaxation is for"},
-       {"FILE --method newton --trust-all --barc 5", "--barc is for --method newton only, not"},
-       {"FILE --method rbcd --barc 5", "--barc is for --method newton only, not for rbcd"},
        {"FILE --method rbcd --trust-all", "--trust-all is for --method newton only"},
        {"FILE --json /nowhere/out.json", "there is no folder /nowhere"},
        {"FILE --json PLACE", "it is a folder"},
@@ -160,10 +151,8 @@ TEST_CASE("solve refuses unusable input and options with the reason", "[pgo]") {
 TEST_CASE("The cost of a planar graph is that of the plane", "[pgo]") {
   const auto file = shared_data("pose_graphs/2d/intel.g2o");
   if (!file) return;
-  const CommandResult result =
-      run_command(kSolveTool + file->string() + " --robots 5 --keep-steps --method centralized");
-  CAPTURE(result.output);
-  CHECK(result.exit_code == 0);
+  const CommandResult result = succeeded(
+      run_command(kSolveTool + file->string() + " --robots 5 --keep-steps --method centralized"));
   // Optimum of SE-Sync. The staircase certifies when the remaining gap is below 4e-8 of the cost.
   std::smatch optimum;
   REQUIRE(std::regex_search(result.output, optimum, std::regex("optimum ([0-9.]+)")));
@@ -180,10 +169,8 @@ TEST_CASE("Verticals of the file are used, reported and written", "[pgo][vertica
   const std::string method = GENERATE("newton --trust-all", "rbcd", "centralized", "local");
   CAPTURE(method);
   const std::string options = graph.string() + " --robots 2 --rounds 300 --method " + method;
-  const CommandResult result = run_command(kSolveTool + options + " --json " + json.string() +
-                                           " --output " + solved.string());
-  CAPTURE(result.output);
-  REQUIRE(result.exit_code == 0);
+  const CommandResult result = succeeded(run_command(
+      kSolveTool + options + " --json " + json.string() + " --output " + solved.string()));
   CHECK_THAT(result.output, Contains("8 poses, 10 edges, 7 verticals, 2 robots"));
   CHECK_THAT(folder.read("out.json"), Contains("\"verticals\": 7"));
   const G2oGraph written = read_g2o(solved);

@@ -69,9 +69,6 @@ TEST_CASE("The ATE of positions scaled by 1.1 equals its closed form", "[truth]"
   // 2).
   const double from_mean = 0.64 + 0.04 + 1.44 + 0.64 + 0.04 + 3 * 0.64 + 2 * 1.44;
   CHECK(ate.team_m == Approx(0.1 * std::sqrt(from_mean / 5.0)));
-  CHECK(ate.alone_m[0] == Approx(0.1 * std::sqrt(2.0 / 3.0)));
-  CHECK(ate.alone_m[1] == Approx(0.1 * 0.5));
-  CHECK(ate.in_team_m[0] == Approx(0.1 * std::sqrt((0.64 + 0.04 + 1.44 + 3 * 0.64) / 3.0)));
   CHECK(ate.parts == 1);
 }
 
@@ -88,12 +85,9 @@ TEST_CASE("Each part is aligned separately, and poses without truth do not count
   };
   const TeamAte ate = ate_of(team, {slice(0, 3), slice(3, 5)});
   CHECK(ate.parts == 2);
-  CHECK(ate.in_team_m[0] == Approx(ate.alone_m[0]));
   CHECK(ate.team_m == Approx(0.1 * std::sqrt((2.0 + 0.5) / 5.0)));
   team.truth.T_world_kf[3] = team.truth.T_world_kf[4] = std::nullopt;
-  const TeamAte of_a = ate_of(team, {whole});
-  CHECK(of_a.team_m == Approx(0.1 * std::sqrt(2.0 / 3.0)));
-  CHECK(std::isnan(of_a.alone_m[1]));
+  CHECK(ate_of(team, {whole}).team_m == Approx(0.1 * std::sqrt(2.0 / 3.0)));
 }
 
 TEST_CASE("Without the edges between two robots a team's graph has two parts", "[truth]") {
@@ -114,17 +108,14 @@ TEST_CASE("Without the edges between two robots a team's graph has two parts", "
 TEST_CASE("solve compares its result with the ground truth of a JRL file", "[pgo][truth]") {
   const TemporaryFolder folder;
   const auto file = folder.write("small.jrl", SmallJrl().text());
-  const CommandResult result = run_command(kPgoTool + "solve " + file.string() + " --json " +
-                                           (folder.path() / "out.json").string());
-  CAPTURE(result.output);
-  REQUIRE(result.exit_code == 0);
+  const CommandResult result = succeeded(run_command(
+      kPgoTool + "solve " + file.string() + " --json " + (folder.path() / "out.json").string()));
   CHECK_THAT(result.output, Contains("5 poses, 6 edges, 2 robots") &&
                                 Contains("left out: 2 priors, 1 exact copies") &&
                                 Contains("closures") && Contains("inside a robot") &&
-                                Contains("robot 1 in team"));
+                                Contains("; of the optimum of the true closures 0.000 m"));
   const auto json = nlohmann::json::parse(folder.read("out.json"));
   CHECK(json["closures"]["inside"]["true_kept"] == 1);
-  CHECK(json["ate"]["robots"].size() == 2);
   CHECK(json["optimum_of_true"]["certified"] == true);
   CHECK(json["optimum_of_true"]["team_m"].get<double>() < 1e-6);
   CHECK(json.contains("ate_ratio"));
@@ -149,10 +140,8 @@ TEST_CASE("solve refuses a number of robots that a JRL file does not have", "[pg
 TEST_CASE("outliers leaves out the closures that a JRL file labels as false", "[outliers][truth]") {
   const TemporaryFolder folder;
   const auto file = folder.write("small.jrl", SmallJrl().text());
-  const CommandResult result =
-      run_command(kPgoTool + "outliers " + file.string() + " --shares 100 --methods trust-all");
-  CAPTURE(result.output);
-  CHECK(result.exit_code == 0);
+  const CommandResult result = succeeded(
+      run_command(kPgoTool + "outliers " + file.string() + " --shares 100 --methods trust-all"));
   CHECK_THAT(result.output, Contains("5 poses, 2 robots"));
 }
 
