@@ -102,7 +102,6 @@ std::string notes_on(const std::vector<RobotSpan>& spans) {
 struct ClosuresCommand {
   std::vector<fs::path> truths, results;
   fs::path dataset, json;
-  ClosureTruthOptions options;
 
   void define(CLI::App& app) {
     app.add_option("--truth", truths,
@@ -115,21 +114,6 @@ struct ClosuresCommand {
         ->required();
     app.add_option("--dataset", dataset, "EuRoC/ASL folder: its left camera is the robots'")
         ->required();
-    app.add_option("--max-translation", options.max_translation_m,
-                   "A larger error is false unless the covariance explains it [m]")
-        ->check(CLI::PositiveNumber)
-        ->capture_default_str();
-    app.add_option("--max-rotation", options.max_rotation_deg,
-                   "A larger error is false unless the covariance explains it [deg]")
-        ->check(CLI::PositiveNumber)
-        ->capture_default_str();
-    app.add_option("--min-overlap", options.min_overlap, "Share of the image that is seen by both")
-        ->check(CLI::Range(0.01, 1.0))
-        ->capture_default_str();
-    app.add_option("--default-depth", options.default_depth_m,
-                   "Depth of the scene where a keyframe does not know it [m]")
-        ->check(CLI::PositiveNumber)
-        ->capture_default_str();
     app.add_option("--json", json, "Also write the numbers to this file, as JSON");
   }
 
@@ -147,8 +131,7 @@ struct ClosuresCommand {
       append(closures, found.closures);
     }
     const SensorRig rig = read_euroc_rig(find_mav0(dataset));
-    const ClosureScores scores =
-        score_closures(keyframes, closures, rig.stereo.cameras[0], options);
+    const ClosureScores scores = score_closures(keyframes, closures, rig.stereo.cameras[0]);
     std::cout << to_table(scores) << notes_on(spans);
     write_json_output(json, scores);
   }
@@ -158,10 +141,10 @@ constexpr const char* kClosuresDetails =
     R"(Loop closures of a finished run against the truth, per stage: their number, the share
 of true ones (precision), and the share of the possible ones that was found (recall)
 
-A candidate is true if both keyframes see the same place: --min-overlap of either's image, at
-the median depth that the keyframe sees, lies in the other's. A verified closure and an inlier
-are false if the measured pose errs by more than --max-translation or --max-rotation and by more
-than its covariance explains (99.9 %).
+A candidate is true if both keyframes see the same place: 30 % of either's image, at the median
+depth that the keyframe sees, lies in the other's. A verified closure and an inlier are false if
+the measured pose errs by more than 0.5 m or 5 degrees and by more than its covariance explains
+(99.9 %).
 Recall counts pairs of keyframes of two robots that see the same place, and, as a system needs
 only one match per keyframe, keyframes that are part of such a pair.
 

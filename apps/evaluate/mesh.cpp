@@ -83,7 +83,7 @@ std::vector<SeenPoint> seen_points(const LabelledMesh& world,
 struct MeshCommand {
   std::filesystem::path truth, palette, json;
   std::vector<std::filesystem::path> seen_by;
-  std::vector<std::filesystem::path> estimates, before, trajectories, true_trajectories;
+  std::vector<std::filesystem::path> estimates, trajectories, true_trajectories;
   MeshErrorOptions options;
 
   void define(CLI::App& app) {
@@ -91,8 +91,6 @@ struct MeshCommand {
     app.add_option("--estimate", estimates,
                    "Estimated meshes (PLY) in one common frame, one file per robot")
         ->required();
-    app.add_option("--before", before,
-                   "The meshes before a correction (PLY), in the order of --estimate");
     app.add_option("--trajectory", trajectories,
                    "Estimated poses of the robots in the frame of the meshes, TUM or EuRoC CSV");
     app.add_option("--trajectory-truth", true_trajectories,
@@ -100,22 +98,7 @@ struct MeshCommand {
     app.add_option("--samples-per-m2", options.samples_per_m2, "Samples per square metre")
         ->check(CLI::PositiveNumber)
         ->capture_default_str();
-    app.add_option("--max-samples", options.max_samples,
-                   "Largest number for the estimate, and for the truth: beyond it the density is "
-                   "reduced, with a note")
-        ->check(CLI::PositiveNumber)
-        ->capture_default_str();
-    app.add_option("--seed", options.seed, "Seed of the samples")->capture_default_str();
     app.add_flag("!--no-icp", options.icp, "Compare the meshes where they are");
-    app.add_option(
-           "--crop", options.crop_m,
-           "True points further from the estimate are not judged [m]; errors count up to it")
-        ->check(CLI::PositiveNumber)
-        ->capture_default_str();
-    app.add_option("--max-distance", options.label_distance_m,
-                   "Labels are judged up to this distance [m]")
-        ->check(CLI::PositiveNumber)
-        ->capture_default_str();
     app.add_option("--palette", palette,
                    "Names of the labels (CSV); default: label_palette.csv beside the truth");
     app.add_option(
@@ -135,12 +118,6 @@ struct MeshCommand {
     throw std::invalid_argument(problem + "\nnote: " + kPlacing);
   }
 
-  void print(const MeshReport& report, const LabelPalette& names) const {
-    std::cout << to_table(report, names);
-    if (trajectories.empty() && report.moved_m > kLargeMove_m)
-      std::cout << "note: " << kPlacing << '\n';
-  }
-
   void run() {
     check_output_folder(json);
     const std::size_t truths = true_trajectories.size();
@@ -154,33 +131,26 @@ struct MeshCommand {
     };
     progress("reading", 0.0);
     const LabelledMesh world = read_mesh(truth);
-    const MeshFiles after(estimates), former(before);
+    const MeshFiles files(estimates);
     std::vector<MeshInput> all = {{truth.string(), world}};
-    for (const MeshFiles* files : {&after, &former})
-      for (const MeshInput& input : files->inputs) all.push_back(input);
+    for (const MeshInput& input : files.inputs) all.push_back(input);
     const LabelPalette names = read_palette(palette, truth, all);
-    if (before.empty()) {
-      const MeshReport report =
-          placed([&] { return mesh_error(world, after.inputs, options, progress); });
-      print(report, names);
-      Json numbers = to_json(report, names);
-      if (!seen_by.empty()) {
-        progress("what cameras saw", 0.0);
-        LabelledMesh map;
-        for (const MeshInput& input : after.inputs) map.append(input.mesh);
-        map.transform(report.registration.T_truth_estimate);
-        const MapQuality quality = map_quality(world, map, seen_points(world, seen_by), names);
-        std::cout << '\n' << to_table(quality, names);
-        numbers["quality"] = to_json(quality, names);
-      }
-      write_json_output(json, numbers);
-    } else {
-      const MeshChange change = placed(
-          [&] { return mesh_change(world, former.inputs, after.inputs, options, progress); });
-      print(change.after, names);
-      std::cout << '\n' << to_table(change);
-      write_json_output(json, to_json(change, names));
+    const MeshReport report =
+        placed([&] { return mesh_error(world, files.inputs, options, progress); });
+    std::cout << to_table(report, names);
+    if (trajectories.empty() && report.moved_m > kLargeMove_m)
+      std::cout << "note: " << kPlacing << '\n';
+    Json numbers = to_json(report, names);
+    if (!seen_by.empty()) {
+      progress("what cameras saw", 0.0);
+      LabelledMesh map;
+      for (const MeshInput& input : files.inputs) map.append(input.mesh);
+      map.transform(report.registration.T_truth_estimate);
+      const MapQuality quality = map_quality(world, map, seen_points(world, seen_by), names);
+      std::cout << '\n' << to_table(quality, names);
+      numbers["quality"] = to_json(quality, names);
     }
+    write_json_output(json, numbers);
   }
 };
 
@@ -190,26 +160,20 @@ constexpr const char* kMeshDetails =
 Both are sampled evenly, the estimates are moved by ONE rigid transform (ICP) onto the truth,
 and distances go from each sample to the nearest one on the other side. Three tables:
   each true point         "mean" is the mesh error of the Kimera-Multi paper. A true world is
-                          larger than its visible part: only points within --crop of the
+                          larger than its visible part: only points within 0.5 m of the
                           estimate are judged; "covered" is their share
   only those in front     without those past the rim of the estimate or behind it, which no
                           robot can have seen: ground below cars, backs of walls
-  each estimated point    distances above --crop count as --crop; "covered" is the rest
+  each estimated point    distances above 0.5 m count as 0.5 m; "covered" is the rest
 Samples of equal surfaces are still 0.5 / sqrt(density) apart, 16 mm at 1000 per square metre;
 "surface" is the mean without that floor, to the triangles nearby. Labels are judged where
-the other side is nearer than --max-distance; unknown counts as not right.
+the other side is nearer than 0.2 m; unknown counts as not right.
 
 A robot's mesh lies in the frame of its trajectory. If that frame is not that of the truth, --trajectory
 and --trajectory-truth place it before ICP.
 
-With --before, both states of the meshes are judged on the true points that either of them
-shows, after one registration of both together: surface that a correction loses counts as far
-as --crop.
-
 Examples:
   kimera_multi_evaluate mesh --truth city/world.ply --estimate mesh.ply --json mesh.json
-  kimera_multi_evaluate mesh --truth city/world.ply \
-      --before results/robot*/mesh.ply --estimate results/robot*/mesh_optimized.ply
   kimera_multi_evaluate mesh --truth city/world.ply \
       --estimate results/robot0/mesh_optimized.ply results/robot1/mesh_optimized.ply \
       --trajectory results/robot0/optimized.tum results/robot1/optimized.tum \

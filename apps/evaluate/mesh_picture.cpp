@@ -7,6 +7,8 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "apps/evaluate/surface_image.hpp"
+
 namespace km {
 namespace {
 

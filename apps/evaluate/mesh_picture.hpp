@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "apps/evaluate/picture_view.hpp"
-#include "apps/evaluate/surface_image.hpp"
 #include "modules/core/label_palette.hpp"
 #include "modules/mesh/labelled_mesh.hpp"
 

@@ -12,22 +12,17 @@
 namespace km {
 namespace {
 
+constexpr double kMinOverlap = 0.25;  // smallest intersection over union of a match
+constexpr double kMapped_m2 = 0.2;    // mapped surface from which a true object counts
+
 struct ObjectsCommand {
   std::filesystem::path truth, estimate, json;
   std::vector<std::filesystem::path> meshes, trajectories, true_trajectories;
-  double min_overlap = 0.25;
-  double mapped_m2 = 0.2;
 
   void define(CLI::App& app) {
     app.add_option("--truth", truth, "The true objects (objects.json)")->required();
     app.add_option("--estimate", estimate, "The objects of a robot (objects.json)")->required();
     app.add_option("--mesh", meshes, "Meshes of all robots in the frame of the objects");
-    app.add_option("--mapped", mapped_m2, "Mapped surface from which a true object counts [m^2]")
-        ->check(CLI::NonNegativeNumber)
-        ->capture_default_str();
-    app.add_option("--min-overlap", min_overlap, "Smallest intersection over union of a match")
-        ->check(CLI::Range(0.0, 1.0))
-        ->capture_default_str();
     app.add_option("--trajectory", trajectories,
                    "Estimated poses of the robots in the frame of the objects, TUM or EuRoC CSV");
     app.add_option("--trajectory-truth", true_trajectories, "Their true poses: one file for each");
@@ -41,7 +36,7 @@ struct ObjectsCommand {
     LabelledMesh all = read_meshes(meshes);
     all.transform(T_truth_estimate);
     std::vector<bool> counts;
-    for (const double area : mapped_surfaces_m2(all, objects)) counts.push_back(area >= mapped_m2);
+    for (const double area : mapped_surfaces_m2(all, objects)) counts.push_back(area >= kMapped_m2);
     return counts;
   }
 
@@ -53,11 +48,11 @@ struct ObjectsCommand {
     for (NamedObject& object : estimates)
       object.box = upright_box(T_truth_estimate * object.box.pose(), object.box.size_m);
     const ObjectScores scores =
-        score_objects(true_objects, estimates, mapped(true_objects, T_truth_estimate), min_overlap);
-    std::cout << "matches with an intersection over union of at least " << fixed(min_overlap, 2)
+        score_objects(true_objects, estimates, mapped(true_objects, T_truth_estimate), kMinOverlap);
+    std::cout << "matches with an intersection over union of at least " << fixed(kMinOverlap, 2)
               << ":\n"
               << to_table(scores);
-    write_json_output(json, {{"min_overlap", min_overlap}, {"classes", to_json(scores)}});
+    write_json_output(json, {{"min_overlap", kMinOverlap}, {"classes", to_json(scores)}});
   }
 };
 
@@ -65,10 +60,10 @@ constexpr const char* kObjectsDetails =
     R"(Objects of a map against the true ones: precision, recall and overlap of the boxes
 
 An object is right if a true one of its class overlaps with it: the volume that both boxes
-share, divided by that of their union (IoU), is at least --min-overlap. "IoU" is the mean of
+share, divided by that of their union (IoU), is at least 0.25. "IoU" is the mean of
 the matches. A robot sees most objects from one side only, so boxes are too small. With --mesh
 only true objects count in "true" and "found" of whose surface, above the ground, at least
---mapped is in the meshes, whatever its label; without it all do.
+0.2 m^2 is in the meshes, whatever its label; without it all do.
 
 The simulator writes the true objects to objects.json. Objects of a robot lie in the frame of
 its optimised poses; --trajectory and --trajectory-truth place them in the true world.

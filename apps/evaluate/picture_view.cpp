@@ -33,9 +33,7 @@ PictureView filled(const Eigen::AlignedBox3d& extent, const Eigen::Matrix3d& R_c
   Eigen::AlignedBox3d box;
   for (int i = 0; i < 8; ++i)
     box.extend(R_cam_world * extent.corner(static_cast<Eigen::AlignedBox3d::CornerType>(i)));
-  PictureView view;
-  view.width = width;
-  view.height = height;
+  PictureView view{.width = width, .height = height};
   const Eigen::Vector3d size = kMargin * box.sizes().cwiseMax(1e-3);
   view.scale = std::min(width / size.x(), height / size.y());
   const Eigen::Vector3d centre = box.center();

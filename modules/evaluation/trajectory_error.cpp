@@ -6,7 +6,6 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
-#include <utility>
 
 #include "modules/core/text_table.hpp"
 
@@ -16,9 +15,10 @@ namespace {
 constexpr std::size_t kLengths = 4;
 constexpr double kMinLength_m = 0.01;
 
-SE3 scaled(SE3 T, double scale) {
-  T.translation() *= scale;
-  return T;
+// The estimated motion from i to j in the frame of the true one, see segment_errors().
+SE3 relative_error(const PosePair& i, const PosePair& j) {
+  const SE3 T_i_j = i.T_truth_body.inverse() * j.T_truth_body;
+  return T_i_j.inverse() * (i.T_estimate_body.inverse() * j.T_estimate_body);
 }
 
 // True path from the first pair to each [m].
@@ -43,7 +43,7 @@ std::vector<double> segment_lengths(double path_m) {
   return lengths;
 }
 
-SegmentErrors segment_errors(std::span<const PosePair> pairs, double scale) {
+SegmentErrors segment_errors(std::span<const PosePair> pairs) {
   SegmentErrors errors;
   const std::vector<double> at_m = distances(pairs);
   for (const double length_m : segment_lengths(at_m.empty() ? 0.0 : at_m.back())) {
@@ -53,10 +53,7 @@ SegmentErrors segment_errors(std::span<const PosePair> pairs, double scale) {
       while (j < pairs.size() && at_m[j] - at_m[i] < length_m) ++j;
       if (j == pairs.size()) break;
       const double path_m = at_m[j] - at_m[i];
-      const SE3 T_i_j = pairs[i].T_truth_body.inverse() * pairs[j].T_truth_body;
-      const SE3 T_i_j_estimate =
-          scaled(pairs[i].T_estimate_body.inverse() * pairs[j].T_estimate_body, scale);
-      const SE3 error = T_i_j.inverse() * T_i_j_estimate;
+      const SE3 error = relative_error(pairs[i], pairs[j]);
       errors.translation_percent.push_back(100.0 * error.translation().norm() / path_m);
       errors.rotation_deg_per_m.push_back(kDegrees * angle_of(error.linear()) / path_m);
       used = true;
@@ -71,6 +68,7 @@ namespace {
 constexpr std::size_t kMinPairs = 3;
 constexpr double kMaxCoverageGap_s = 2.0;  // largest interval between poses that is covered
 constexpr double kSurroundings_m = 5.0;
+constexpr double kDelta_s = 1.0;  // time over which relative errors are taken
 
 void append(std::vector<double>& to, const std::vector<double>& from) {
   to.insert(to.end(), from.begin(), from.end());
@@ -129,23 +127,19 @@ void add_absolute_errors(std::span<const PosePair> pairs, const Alignment& align
   }
 }
 
-void add_relative_errors(std::span<const PosePair> pairs, const Alignment& alignment,
-                         double delta_s, Errors& errors) {
-  const double tolerance_s = 0.1 * delta_s;
-  // Tolerance at the end of the trajectory, as a share of delta_s.
+void add_relative_errors(std::span<const PosePair> pairs, Errors& errors) {
+  constexpr double kTolerance_s = 0.1 * kDelta_s;
+  // Tolerance at the end of the trajectory, as a share of kDelta_s.
   constexpr double kJitter = 0.01;
   std::size_t j = 0;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
-    if (seconds_between(pairs[i].stamp, pairs.back().stamp) < (1.0 - kJitter) * delta_s) break;
+    if (seconds_between(pairs[i].stamp, pairs.back().stamp) < (1.0 - kJitter) * kDelta_s) break;
     const auto off_s = [&](std::size_t k) {
-      return std::abs(seconds_between(pairs[i].stamp, pairs[k].stamp) - delta_s);
+      return std::abs(seconds_between(pairs[i].stamp, pairs[k].stamp) - kDelta_s);
     };
     while (j + 1 < pairs.size() && off_s(j + 1) <= off_s(j)) ++j;
-    if (j <= i || off_s(j) > tolerance_s) continue;
-    const SE3 T_i_j = pairs[i].T_truth_body.inverse() * pairs[j].T_truth_body;
-    const SE3 T_i_j_estimate = alignment.apply(pairs[i].T_estimate_body).inverse() *
-                               alignment.apply(pairs[j].T_estimate_body);
-    const SE3 error = T_i_j.inverse() * T_i_j_estimate;
+    if (j <= i || off_s(j) > kTolerance_s) continue;
+    const SE3 error = relative_error(pairs[i], pairs[j]);
     errors.rpe_translation_m.push_back(error.translation().norm());
     errors.rpe_rotation_deg.push_back(kDegrees * angle_of(error.linear()));
   }
@@ -165,7 +159,9 @@ std::vector<PosePair> associate(const TrajectoryInput& input, std::size_t least)
 }  // namespace
 
 SE3 Alignment::apply(const SE3& T_estimate_body) const {
-  return T_truth_estimate * scaled(T_estimate_body, scale);
+  SE3 T = T_estimate_body;
+  T.translation() *= scale;
+  return T_truth_estimate * T;
 }
 
 Alignment align(std::span<const PosePair> pairs, bool with_scale) {
@@ -186,10 +182,7 @@ Alignment align(std::span<const PosePair> pairs, bool with_scale) {
   return alignment;
 }
 
-TeamError trajectory_error(std::span<const TrajectoryInput> inputs,
-                           const TrajectoryErrorOptions& options) {
-  if (!(options.rpe_delta_s > 0.0))
-    throw std::invalid_argument("trajectory_error: rpe_delta_s is not positive");
+TeamError trajectory_error(std::span<const TrajectoryInput> inputs) {
   if (inputs.empty()) throw std::invalid_argument("trajectory_error: no estimate");
   std::vector<std::vector<PosePair>> pairs;
   std::vector<PosePair> all;
@@ -199,13 +192,13 @@ TeamError trajectory_error(std::span<const TrajectoryInput> inputs,
   }
 
   TeamError team;
-  team.alignment = align(all, options.with_scale);
+  team.alignment = align(all, false);
   Errors joint;
   for (std::size_t r = 0; r < inputs.size(); ++r) {
     Errors errors;
     add_absolute_errors(pairs[r], team.alignment, errors);
-    add_relative_errors(pairs[r], team.alignment, options.rpe_delta_s, errors);
-    errors.segments = segment_errors(pairs[r], team.alignment.scale);
+    add_relative_errors(pairs[r], errors);
+    errors.segments = segment_errors(pairs[r]);
     const TimeWindow window = window_of(inputs[r]);
     errors.poses = inputs[r].estimate.size();
     errors.covered_s = covered_seconds(inputs[r].estimate, window, kMaxCoverageGap_s);
@@ -273,8 +266,7 @@ Json to_json(const Statistics& statistics) {
 Json to_json(const Alignment& alignment) {
   const Eigen::Vector3d t = alignment.T_truth_estimate.translation();
   const Eigen::Quaterniond q(alignment.T_truth_estimate.linear());
-  return {{"scale", alignment.scale},
-          {"translation_m", {t.x(), t.y(), t.z()}},
+  return {{"translation_m", {t.x(), t.y(), t.z()}},
           {"rotation_xyzw", {q.x(), q.y(), q.z(), q.w()}}};
 }
 
@@ -282,14 +274,14 @@ Json to_json(const Alignment& alignment) {
 
 std::string to_table(const TeamError& team) {
   std::vector<std::vector<std::string>> rows = {
-      {"", "", "position", "error [m]", "", "", "rotation", "relative,", "per delta"},
+      {"", "", "position", "error [m]", "", "", "rotation", "relative,", "per second"},
       {"estimate", "pairs", "rmse", "mean", "median", "max", "rmse[deg]", "rmse[m]", "rmse[deg]",
        "covered"}};
   for (const TrajectoryError& robot : team.robots) rows.push_back(table_row(robot));
   if (team.robots.size() > 1) rows.push_back(table_row(team.joint));
   std::string text = align_columns(rows);
   if (std::any_of(team.robots.begin(), team.robots.end(), lacks_relative))
-    text += "-: no two compared poses lie one delta apart, so there is no relative error\n";
+    text += "-: no two compared poses lie a second apart, so there is no relative error\n";
   return text;
 }
 

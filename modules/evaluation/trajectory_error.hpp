@@ -31,8 +31,8 @@ struct SegmentErrors {
 ///
 /// This follows the odometry benchmark of Geiger et al., "Are we ready for Autonomous Driving?",
 /// CVPR 2012, Sec. 2.5. The benchmark starts at every tenth frame and divides by the nominal
-/// length. `scale` multiplies the positions of the estimate. O(n) per length.
-[[nodiscard]] SegmentErrors segment_errors(std::span<const PosePair> pairs, double scale = 1.0);
+/// length. O(n) per length.
+[[nodiscard]] SegmentErrors segment_errors(std::span<const PosePair> pairs);
 
 /// p_truth = scale * T_truth_estimate.linear() * p_estimate + T_truth_estimate.translation().
 struct Alignment {
@@ -50,12 +50,6 @@ struct Alignment {
 /// std::invalid_argument if `with_scale` and either side does not move.
 [[nodiscard]] Alignment align(std::span<const PosePair> pairs, bool with_scale);
 
-/// Options of trajectory_error().
-struct TrajectoryErrorOptions {
-  bool with_scale = false;   ///< Align by a similarity instead of a rigid transform.
-  double rpe_delta_s = 1.0;  ///< Time over which relative errors are taken.
-};
-
 /// One estimate with its truth; both ascending and outliving the call.
 struct TrajectoryInput {
   std::string name;
@@ -70,7 +64,7 @@ struct TrajectoryError {
   std::size_t poses = 0;         ///< Number of poses of the estimate.
   Statistics position_m;         ///< Absolute trajectory error; count: pairs compared.
   Statistics rotation_deg;       ///< Angle to the truth after the same alignment.
-  Statistics rpe_translation_m;  ///< Relative pose error over rpe_delta_s.
+  Statistics rpe_translation_m;  ///< Relative pose error over a second.
   Statistics rpe_rotation_deg;
   std::vector<double> segment_lengths_m;  ///< Lengths of the segments for drift.
   Statistics drift_percent;               ///< Relative position error in percent of the distance.
@@ -85,19 +79,17 @@ struct TeamError {
   std::vector<TrajectoryError> robots;  ///< In the order of the inputs.
 };
 
-/// Aligns all estimates by one transform and compares each with its truth.
+/// Aligns all estimates by one rigid transform and compares each with its truth.
 ///
 /// Absolute error: distance between the aligned and the true position, at every pair of
-/// associate(). Relative error: for pairs i, j with j nearest to rpe_delta_s after i, within a
-/// tenth of it, (T_truth_i^-1 T_truth_j)^-1 (T_estimate_i^-1 T_estimate_j), with the estimate's
-/// scale corrected. Drift: segment_errors() over lengths that fit the path; the team's drift is
-/// that of all robots. Completeness: covered time of the estimate divided by the window; the team's
-/// is the ratio of the sums.
+/// associate(). Relative error: for pairs i, j with j nearest to a second after i, within a tenth
+/// of it, (T_truth_i^-1 T_truth_j)^-1 (T_estimate_i^-1 T_estimate_j). Drift: segment_errors() over
+/// lengths that fit the path; the team's drift is that of all robots. Completeness: covered time of
+/// the estimate divided by the window; the team's is the ratio of the sums.
 ///
 /// Throws std::invalid_argument with the name of the estimate if it shares fewer than three poses
-/// with its truth. Throws it also if there is no input and if rpe_delta_s is not positive.
-[[nodiscard]] TeamError trajectory_error(std::span<const TrajectoryInput> inputs,
-                                         const TrajectoryErrorOptions& options = {});
+/// with its truth. Throws it also if there is no input.
+[[nodiscard]] TeamError trajectory_error(std::span<const TrajectoryInput> inputs);
 
 /// The rigid transform T_truth_estimate that best moves the surroundings of the robots to their
 /// true position. It minimises the squared distance between six points around each estimated pose,
@@ -114,7 +106,7 @@ struct TeamError {
 /// "-", with a note below the table.
 [[nodiscard]] std::string to_table(const TeamError& team);
 
-/// The errors as one JSON object: {alignment: {scale, translation_m, rotation_xyzw}, robots:
+/// The errors as one JSON object: {alignment: {translation_m, rotation_xyzw}, robots:
 /// [{name, poses, pairs, position_m: {rmse, ...}, ...}], joint: {...}}. Statistics of an empty
 /// sample have count 0 and null for the rest.
 void to_json(Json& json, const TeamError& team);

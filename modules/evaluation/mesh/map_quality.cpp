@@ -10,9 +10,9 @@
 #include <unordered_map>
 
 #include "modules/core/geometry.hpp"
+#include "modules/core/quantile.hpp"
 #include "modules/core/text_table.hpp"
 #include "modules/evaluation/mesh/sampled_surface.hpp"
-#include "modules/evaluation/statistics.hpp"
 
 namespace km {
 namespace {

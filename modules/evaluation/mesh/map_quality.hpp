@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <span>
 #include <string>
-#include <vector>
 
 #include "modules/core/json.hpp"
 #include "modules/core/label_palette.hpp"

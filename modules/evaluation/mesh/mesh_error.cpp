@@ -10,8 +10,8 @@
 #include <utility>
 
 #include "modules/core/config.hpp"
+#include "modules/core/quantile.hpp"
 #include "modules/core/text_table.hpp"
-#include "modules/evaluation/statistics.hpp"
 
 namespace km {
 namespace {
@@ -24,8 +24,7 @@ double share_within(const std::vector<float>& values, float limit) {
 
 // O(n).
 DistanceSummary summary_of(std::vector<float> distances_m) {
-  DistanceSummary summary;
-  summary.count = distances_m.size();
+  DistanceSummary summary{.count = distances_m.size()};
   if (distances_m.empty()) {
     const double none = std::numeric_limits<double>::quiet_NaN();
     return {0, none, none, none, none, none};

@@ -148,28 +148,6 @@ std::string to_table(const MeshReport& report, const LabelPalette& palette) {
   return out.str();
 }
 
-std::string to_table(const MeshChange& change) {
-  Rows rows = {{"state", "estimate", "in front", "surface", "labels", "way back", "surface",
-                "labels", "covered"}};
-  const std::vector<const MeshError*> before = rows_of(change.before),
-                                      after = rows_of(change.after);
-  const auto add = [&](const char* state, const MeshError& mesh) {
-    rows.push_back(
-        {state, mesh.name, millimetres(mesh.seen.point.mean_m),
-         millimetres(mesh.seen.surface.mean_m), percent(mesh.seen.labels.total().accuracy()),
-         millimetres(mesh.estimate.point.mean_m), millimetres(mesh.estimate.surface.mean_m),
-         percent(mesh.estimate.labels.total().accuracy()), percent(mesh.seen_coverage)});
-  };
-  for (std::size_t k = 0; k < after.size(); ++k) {
-    add("before", *before[k]);
-    add("after", *after[k]);
-  }
-  return "Means in mm. \"In front\" is from the true points that either state has in front to the "
-         "nearest\nestimated one, \"way back\" from each estimated point to the nearest true "
-         "one:\n" +
-         align_columns(rows);
-}
-
 Json to_json(const MeshReport& report, const LabelPalette& palette) {
   Json robots = Json::array();
   for (const MeshError& robot : report.robots)
@@ -179,10 +157,6 @@ Json to_json(const MeshReport& report, const LabelPalette& palette) {
           {"robots", std::move(robots)},
           {"merged", to_json(report.merged, report.has_labels, palette)},
           {"notes", report.notes}};
-}
-
-Json to_json(const MeshChange& change, const LabelPalette& palette) {
-  return {{"before", to_json(change.before, palette)}, {"after", to_json(change.after, palette)}};
 }
 
 }  // namespace km

@@ -1,6 +1,5 @@
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <filesystem>
 #include <string>
 
 #include "test/modules/sensors/euroc_folder.hpp"
@@ -37,26 +36,16 @@ TEST_CASE("trajectory prints a table and writes JSON and a plot", "[evaluate]") 
   const Files files;
   const std::string json = (files.folder.path() / "out.json").string();
   const std::string plot = (files.folder.path() / "out.html").string();
-  const auto result = run_command(kTool + "trajectory --truth " + files.truth + " --estimate " +
-                                  files.a + ' ' + files.b + " --json " + json + " --plot " + plot);
-  CAPTURE(result.output);
-  REQUIRE(result.exit_code == 0);
+  const auto result =
+      succeeded(run_command(kTool + "trajectory --truth " + files.truth + " --estimate " + files.a +
+                            ' ' + files.b + " --json " + json + " --plot " + plot));
   CHECK_THAT(result.output, Catch::Contains("a/optimized") && Catch::Contains("b/optimized") &&
-                                Catch::Contains("\nteam"));
+                                Catch::Contains("\nteam") && Catch::Contains(" 50.0%"));
   CHECK_THAT(files.folder.read("out.json"), Catch::Contains("\"joint\""));
   const Json plots = data_of_page(files.folder.read("out.html"), "plots")["charts"];
   REQUIRE(plots.size() == 1);
   CHECK(plots[0]["map"] == true);
   CHECK(plots[0]["series"].size() == 3);
-}
-
-TEST_CASE("trajectory judges a window, in seconds or stamps", "[evaluate]") {
-  const Files files;
-  const std::string command =
-      kTool + "trajectory --truth " + files.truth + " --estimate " + files.a;
-  CHECK_THAT(run_command(command).output, Catch::Contains(" 50.0%"));
-  CHECK_THAT(run_command(command + " --from 5 --to 15").output, Catch::Contains(" 50.0%"));
-  CHECK_THAT(run_command(command + " --to 10").output, Catch::Contains("100.0%"));
 }
 
 TEST_CASE("Several truths belong to the estimates one by one", "[evaluate]") {
@@ -86,13 +75,9 @@ TEST_CASE("closures judges the folders of a run", "[evaluate]") {
   const std::string json = (files.folder.path() / "closures.json").string();
   const std::string command = kTool + "closures --dataset " + recording.root().string() +
                               " --truth " + files.truth + " --json " + json + " --results ";
-  const auto result = run_command(command + a + ' ' + b);
-  CAPTURE(result.output);
-  REQUIRE(result.exit_code == 0);
+  const auto result = succeeded(run_command(command + a + ' ' + b));
   CHECK_THAT(result.output, Catch::Contains("inliers          2     1              1      50.0%"));
   CHECK_THAT(files.folder.read("closures.json"), Catch::Contains("\"pair_recall\": 1"));
-  CHECK_THAT(run_command(command + a + ' ' + b + " --max-translation 1").output,
-             Catch::Contains("inliers          2     2              0     100.0%"));
   CHECK_THAT(result.output,
              Catch::Contains("note: " + files.truth + " is taken for the true poses of robot 1 (" +
                              a + ") and of robot 2 (" + b + ") at the same times"));
@@ -112,7 +97,6 @@ TEST_CASE("Bad input is refused and named", "[evaluate]") {
       {"trajectory --truth /none" + rest, "kimera_multi_evaluate: /none: no such file\n"},
       {"trajectory --truth " + bad + rest, "bad.tum line 2: 1 fields, expected 8"},
       {good + rest + " --plot x.svg", "x.svg: --plot writes *.html"},
-      {good + rest + " --from 10 --to 5", "--from is not before --to"},
       {good + " --truth " + files.b + rest, "give one --truth"},
       {"closures --dataset . --truth " + files.truth + " --results /none",
        "kimera_multi_evaluate: /none/keyframes.csv: no such file\n"},

@@ -9,7 +9,6 @@
 #include "modules/mesh/mesh_file.hpp"
 #include "test/modules/evaluation/mesh/shapes.hpp"
 #include "test/support/command.hpp"
-#include "test/support/image_file.hpp"
 #include "test/support/temporary_folder.hpp"
 
 namespace km {
@@ -66,9 +65,7 @@ TEST_CASE("mesh judges each robot and all together", "[evaluate]") {
   const std::string command =
       "mesh --samples-per-m2 100 --truth world.ply --estimate a/mesh.ply b/mesh.ply --json "
       "out.json";
-  const auto result = run(command);
-  CAPTURE(result.output);
-  REQUIRE(result.exit_code == 0);
+  const auto result = succeeded(run(command));
   CHECK_THAT(result.output, Contains("\na/mesh ") && Contains("\nb/mesh ") &&
                                 Contains("\nmerged ") && Contains("\nnorth "));
   CHECK_THAT(run.folder.read("out.json"), Contains("\"truth_to_estimate\"") &&
@@ -88,9 +85,7 @@ TEST_CASE("mesh starts registration at the transform of the trajectories", "[eva
   CHECK_THAT(lost.output,
              Contains("are both in one frame?") && Contains("--trajectory and --trajectory-truth"));
   const auto placed =
-      run(command + " --trajectory moved.tum --trajectory-truth truth.tum --no-icp");
-  CAPTURE(placed.output);
-  CHECK(placed.exit_code == 0);
+      succeeded(run(command + " --trajectory moved.tum --trajectory-truth truth.tum --no-icp"));
   CHECK_THAT(placed.output, Contains("[-50.0000, "));
   CHECK_THAT(run(command + " --trajectory-truth truth.tum").output,
              Contains("give one --trajectory-truth for all --trajectory"));
@@ -99,11 +94,9 @@ TEST_CASE("mesh starts registration at the transform of the trajectories", "[eva
 TEST_CASE("render draws one picture per view", "[evaluate]") {
   const Meshes run;
   run.folder.write("path.tum", "1 1 1 1 0 0 0 1\n2 3 2 1 0 0 0 1\n");
-  const auto result =
+  const auto result = succeeded(
       run("render --mesh world.ply --size 320x240 --view top --view 2,1,1,45,0 --output out.png "
-          "--trajectory path.tum");
-  CAPTURE(result.output);
-  REQUIRE(result.exit_code == 0);
+          "--trajectory path.tum"));
   CHECK(result.output == "out.png\nout_2.png\n");
   const cv::Mat3b top = run.picture("out.png");
   CHECK(top.cols == 320);
@@ -123,9 +116,8 @@ TEST_CASE("render stands a map upright by a reference trajectory", "[evaluate]")
   run.folder.write("optimized.tum",
                    "1 1 1 -1 0 0.70710678 0 0.70710678\n2 1 2 -3 0 0.70710678 0 0.70710678\n");
   const auto top = [&](const std::string& arguments) {
-    const auto result = run("render --size 320x240 --color shade --output out.png " + arguments);
-    CAPTURE(result.output);
-    REQUIRE(result.exit_code == 0);
+    const auto result =
+        succeeded(run("render --size 320x240 --color shade --output out.png " + arguments));
     return run.picture("out.png").rowRange(0, 240).clone();
   };
   const cv::Mat3b expected = top("--mesh world.ply --trajectory odometry.tum");
@@ -148,7 +140,7 @@ TEST_CASE("mesh and render refuse input by name", "[evaluate]") {
       {mesh + "b/mesh.ply --palette few.csv", "world.ply: label 2 is not in few.csv"},
       {mesh + "b/mesh.ply --palette /none.csv", "/none.csv: no such file"},
       {mesh + "a/mesh.ply", "a/mesh: no faces, so no surface to compare"},
-      {mesh + "b/mesh.ply --crop 0", "--crop"},
+      {mesh + "b/mesh.ply --samples-per-m2 0", "--samples-per-m2"},
       {render + "out.jpg", "out.jpg: pictures are PNG"},
       {render + "/none/out.png", "/none/out.png: cannot be written"},
       {drawn + " --size 10x10", "--size"},
@@ -173,9 +165,8 @@ TEST_CASE("objects compares objects in the frame of the truth", "[evaluate]") {
   run.folder.write("moved.tum", poses_at(50));
   const std::string command = "objects --truth true.json --estimate objects.json";
   CHECK_THAT(run(command).output, Contains("all       1      0    0.00"));
-  const auto placed = run(command + " --trajectory moved.tum --trajectory-truth truth.tum");
-  CAPTURE(placed.output);
-  CHECK(placed.exit_code == 0);
+  const auto placed =
+      succeeded(run(command + " --trajectory moved.tum --trajectory-truth truth.tum"));
   CHECK_THAT(placed.output, Contains("all       1      1    1.00"));
   CHECK_THAT(run(command + " --mesh world.ply").output,  // the chair is not in it
              Contains("all       0      0    0.00"));

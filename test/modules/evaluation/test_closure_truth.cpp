@@ -163,8 +163,7 @@ TEST_CASE("True pairs are counted by the angle between the viewing directions", 
                                                {{1, 0}, at(0.0, 0.0, 10.0), 4.0},
                                                {{1, 1}, side, 4.0},
                                                {{1, 2}, opposite, 4.0}};
-  ClosureTruthOptions options;
-  options.min_overlap = 0.1;
+  ClosureTruthOptions options{.min_overlap = 0.1};
   const std::vector<ClosureRecord> closures = {
       closure({0, 0}, {1, 0}, kInlier, at(0.0, 0.0, 10.0)),
       closure({0, 0}, {1, 1}, kVerified, side),  // true, but not kept

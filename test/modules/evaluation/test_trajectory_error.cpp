@@ -1,4 +1,5 @@
 #include <catch2/catch.hpp>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <random>
@@ -6,15 +7,35 @@
 #include <vector>
 
 #include "modules/core/lie.hpp"
+#include "modules/core/stamped_pose.hpp"
+#include "modules/evaluation/association.hpp"
 #include "modules/evaluation/trajectory_error.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
-#include "test/modules/evaluation/trajectories.hpp"
 #include "test/support/page_text.hpp"
 #include "test/support/random_pose.hpp"
 #include "test/support/shared_data.hpp"
 
 namespace km {
 namespace {
+
+constexpr Stamp kSecond = 1'000'000'000;
+
+// `count` poses at `rate_hz` from `from_s` on; pose(t_s) returns each.
+template <typename Pose>
+std::vector<StampedPose> sample(double from_s, double rate_hz, int count, const Pose& pose) {
+  std::vector<StampedPose> poses;
+  for (int i = 0; i < count; ++i) {
+    const double t_s = from_s + i / rate_hz;
+    poses.push_back({static_cast<Stamp>(t_s * 1e9 + 0.5), pose(t_s)});
+  }
+  return poses;
+}
+
+// A smooth curve without symmetries.
+SE3 curve(double t_s) {
+  return make_pose(so3_exp({0.3 * std::sin(t_s), 0.2 * std::cos(0.7 * t_s), 0.5 * t_s}),
+                   {std::sin(t_s), std::cos(0.8 * t_s) + 0.1 * t_s, 0.3 * std::sin(1.7 * t_s)});
+}
 
 std::vector<StampedPose> moved(std::vector<StampedPose> poses, const SE3& T, double scale = 1.0) {
   for (StampedPose& pose : poses) {
@@ -24,10 +45,15 @@ std::vector<StampedPose> moved(std::vector<StampedPose> poses, const SE3& T, dou
   return poses;
 }
 
-TeamError error_of(const std::vector<StampedPose>& truth, const std::vector<StampedPose>& estimate,
-                   const TrajectoryErrorOptions& options = {}) {
+TeamError error_of(const std::vector<StampedPose>& truth,
+                   const std::vector<StampedPose>& estimate) {
   const TrajectoryInput input{"robot", truth, estimate, {}};
-  return trajectory_error({&input, 1}, options);
+  return trajectory_error({&input, 1});
+}
+
+// The factor that best scales an estimate to the truth.
+double scale_of(const std::vector<StampedPose>& truth, const std::vector<StampedPose>& estimate) {
+  return align(associate(truth, estimate, {truth.front().stamp, truth.back().stamp}), true).scale;
 }
 
 // Corners of a square in the plane, visited in turn.
@@ -64,17 +90,11 @@ TEST_CASE("A moved copy of the truth has no error", "[evaluation]") {
   CHECK(rigid.joint.rpe_translation_m.max < 1e-9);
   CHECK((rigid.alignment.T_truth_estimate * T).isApprox(SE3::Identity(), 1e-9));
   CHECK(rigid.joint.completeness == Approx(1.0));
-
-  TrajectoryErrorOptions options;
-  options.with_scale = true;
-  const TeamError similar = error_of(truth, moved(truth, T, 0.25), options);
-  CHECK(similar.alignment.scale == Approx(4.0));
-  CHECK(similar.joint.position_m.max < 1e-9);
-  CHECK(similar.joint.rpe_translation_m.max < 1e-9);
+  CHECK(scale_of(truth, moved(truth, T, 0.25)) == Approx(4.0));
   CHECK(error_of(truth, moved(truth, T, 0.25)).joint.position_m.rmse > 0.1);
 }
 
-TEST_CASE("Relative errors are the drift over the delta", "[evaluation]") {
+TEST_CASE("Relative errors are the drift over a second", "[evaluation]") {
   // 1 m/s with 2 % too much speed, and a rotation of 0.01 rad/s too much.
   const auto truth = sample(0.0, 10.0, 101, [](double t_s) {
     return make_pose(Eigen::Matrix3d::Identity(), {t_s, 0.0, 0.0});
@@ -85,16 +105,12 @@ TEST_CASE("Relative errors are the drift over the delta", "[evaluation]") {
   const auto turned = sample(0.0, 10.0, 101, [](double t_s) {
     return make_pose(so3_exp({0.0, 0.0, 0.01 * t_s}), {t_s, 0.0, 0.0});
   });
-  TrajectoryErrorOptions options;
-  options.rpe_delta_s = GENERATE(1.0, 2.5);
-  const TeamError speed = error_of(truth, fast, options);
-  CHECK(speed.joint.rpe_translation_m.rmse == Approx(0.02 * options.rpe_delta_s));
-  CHECK(speed.joint.rpe_translation_m.count ==
-        static_cast<std::size_t>(101 - std::lround(10.0 * options.rpe_delta_s)));
+  const TeamError speed = error_of(truth, fast);
+  CHECK(speed.joint.rpe_translation_m.rmse == Approx(0.02));
+  CHECK(speed.joint.rpe_translation_m.count == 91);
   CHECK(speed.joint.rpe_rotation_deg.max < 1e-4);
-  const TeamError turn = error_of(truth, turned, options);
-  CHECK(turn.joint.rpe_rotation_deg.rmse ==
-        Approx(0.01 * options.rpe_delta_s * 180.0 / std::numbers::pi).epsilon(1e-6));
+  CHECK(error_of(truth, turned).joint.rpe_rotation_deg.rmse ==
+        Approx(kDegrees * 0.01).epsilon(1e-6));
 }
 
 TEST_CASE("One alignment for a team shows the distance between its robots", "[evaluation]") {
@@ -135,13 +151,8 @@ TEST_CASE("Trajectories that cannot be compared are refused by name", "[evaluati
   CHECK_THROWS_AS(error_of(truth, {}), std::invalid_argument);
   CHECK_THROWS_AS(error_of({}, truth), std::invalid_argument);
   CHECK_THROWS_AS(trajectory_error({}), std::invalid_argument);
-  TrajectoryErrorOptions options;
-  options.rpe_delta_s = 0.0;
-  CHECK_THROWS_AS(error_of(truth, truth, options), std::invalid_argument);
-  options = {};
-  options.with_scale = true;
   const auto still = sample(0.0, 10.0, 100, [](double) { return SE3::Identity(); });
-  CHECK_THROWS_WITH(error_of(truth, still, options), Catch::Contains("do not vary"));
+  CHECK_THROWS_WITH(scale_of(truth, still), Catch::Contains("do not vary"));
   CHECK(error_of(truth, still).joint.position_m.rmse > 0.1);
 }
 
@@ -158,11 +169,7 @@ TEST_CASE("The error of a real estimate agrees with an independent computation",
   CHECK(rigid.joint.position_m.mean == Approx(0.0120269).margin(1e-7));
   CHECK(rigid.joint.position_m.median == Approx(0.0110964).margin(1e-7));
   CHECK(rigid.joint.position_m.max == Approx(0.0352146).margin(1e-7));
-  TrajectoryErrorOptions options;
-  options.with_scale = true;
-  const TeamError similar = error_of(truth, estimate, options);
-  CHECK(similar.alignment.scale == Approx(1.0078026).margin(1e-7));
-  CHECK(similar.joint.position_m.rmse == Approx(0.0133902).margin(1e-7));
+  CHECK(scale_of(truth, estimate) == Approx(1.0078026).margin(1e-7));
 }
 
 // `count` pairs of a truth and an estimate.
@@ -201,8 +208,6 @@ TEST_CASE("Drift has the error of the scale, and of the rotation per metre, in a
     CHECK(errors.translation_percent[i] == Approx(100.0 * std::abs(scale - 1.0)).margin(1e-9));
     CHECK(errors.rotation_deg_per_m[i] == Approx(kDegrees * turn / step_m).epsilon(1e-6));
   }
-  for (const double percent : segment_errors(pairs, 1.0 / scale).translation_percent)
-    CHECK(percent == Approx(0.0).margin(1e-9));
 }
 
 constexpr Stamp kStep = 100'000'000;
@@ -226,22 +231,57 @@ TEST_CASE("Surroundings are aligned on a straight path and for a single pose",
   CHECK((found.matrix() - T_truth_estimate.matrix()).norm() < 1e-9);
 }
 
-const std::vector<StampedPose> kTruePoses = sample(0.0, 20.0, 100, curve);
-const std::vector<TrajectoryInput> kInputs = {{"alpha", kTruePoses, kTruePoses, {}},
-                                              {"b<&>eta", kTruePoses, kTruePoses, {}}};
-
 TEST_CASE("Missing relative errors are not perfect errors", "[evaluation]") {
-  TrajectoryErrorOptions options;
-  options.rpe_delta_s = 100.0;  // the poses span 20 s
-  const TeamError none = trajectory_error(kInputs, options);
+  const auto poses = sample(0.0, 20.0, 10, curve);  // half a second
+  const std::vector<TrajectoryInput> inputs = {{"alpha", poses, poses, {}},
+                                               {"b<&>eta", poses, poses, {}}};
+  const TeamError none = trajectory_error(inputs);
   CHECK(none.joint.rpe_translation_m.count == 0);
   const std::string table = to_table(none);
-  CHECK(occurrences(table, "          -          -   100.0%\n") == 3);
-  CHECK(occurrences(table, "\n-: no two compared poses lie one delta apart") == 1);
-  CHECK(occurrences(to_table(trajectory_error(kInputs)), "no two compared poses") == 0);
+  CHECK(occurrences(table, "          -           -   100.0%\n") == 3);
+  CHECK(occurrences(table, "\n-: no two compared poses lie a second apart") == 1);
+  const auto longer = sample(0.0, 20.0, 100, curve);
+  CHECK(occurrences(to_table(error_of(longer, longer)), "no two compared poses") == 0);
   const std::string text = json_text(none.joint);
   CHECK(occurrences(text, ": null") == 8);  // four figures of translation, four of rotation
   CHECK_THAT(text, !Catch::Contains("nan"));
+}
+
+constexpr TimeWindow kAlways = {std::numeric_limits<Stamp>::min(),
+                                std::numeric_limits<Stamp>::max() - 1};
+
+// Constant velocity and angular rate: interpolation has no error.
+SE3 screw(double t_s) {
+  return make_pose(so3_exp({0.0, 0.0, 0.5 * t_s}), {2.0 * t_s, 1.0, 0.0});
+}
+
+TEST_CASE("Across a gap and outside the trajectory only a near pose counts", "[evaluation]") {
+  const auto poses = sample(0.0, 1.0, 3, screw);
+  CHECK_FALSE(pose_at(poses, kSecond * 3 / 2, 0.9, 0.1));
+  CHECK(pose_at(poses, kSecond * 3 / 2, 1.0, 0.1));
+  const auto near_second = pose_at(poses, kSecond + kSecond / 20, 0.9, 0.1);
+  REQUIRE(near_second);
+  CHECK(near_second->isApprox(screw(1.0), 1e-12));
+  const auto near_third = pose_at(poses, 2 * kSecond - kSecond / 20, 0.9, 0.1);
+  REQUIRE(near_third);
+  CHECK(near_third->isApprox(screw(2.0), 1e-12));
+  CHECK(pose_at(poses, -1000, 0.1, 0.01));
+  CHECK_FALSE(pose_at(poses, -kSecond / 10, 0.1, 0.01));
+  CHECK(pose_at(poses, 2 * kSecond + 1000, 0.1, 0.01));
+  CHECK_FALSE(pose_at(poses, 3 * kSecond, 0.1, 0.01));
+  CHECK_FALSE(pose_at({}, 0, 0.1, 0.01));
+}
+
+TEST_CASE("Covered time is that between neighbours without a gap inside the window",
+          "[evaluation]") {
+  auto poses = sample(1.0, 10.0, 11, screw);        // 1 to 2 s
+  const auto later = sample(5.0, 10.0, 11, screw);  // 5 to 6 s
+  poses.insert(poses.end(), later.begin(), later.end());
+  CHECK(covered_seconds(poses, kAlways, 0.5) == Approx(2.0));
+  CHECK(covered_seconds(poses, kAlways, 3.0) == Approx(5.0));
+  CHECK(covered_seconds(poses, {3 * kSecond / 2, 11 * kSecond / 2}, 0.5) == Approx(1.0));
+  CHECK(covered_seconds(poses, {3 * kSecond, 4 * kSecond}, 0.5) == 0.0);
+  CHECK(covered_seconds({}, kAlways, 0.5) == 0.0);
 }
 
 }  // namespace

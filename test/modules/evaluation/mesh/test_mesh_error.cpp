@@ -1,21 +1,22 @@
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <opencv2/core/utility.hpp>
+#include <random>
 #include <vector>
 
 #include "modules/evaluation/mesh/mesh_error.hpp"
 #include "modules/evaluation/mesh/mesh_report.hpp"
+#include "modules/evaluation/mesh/sampled_surface.hpp"
 #include "test/modules/evaluation/mesh/shapes.hpp"
 
 namespace km {
 namespace {
 
 MeshErrorOptions in_place(std::uint32_t seed = 1) {
-  MeshErrorOptions options;
-  options.icp = false;
-  options.seed = seed;
+  MeshErrorOptions options{.seed = seed, .icp = false};
   return options;
 }
 
@@ -35,8 +36,6 @@ double mean_distance(double h, double density) {
 std::string json_of(const MeshReport& report) {
   return json_text(to_json(report, {}));
 }
-
-}  // namespace
 
 TEST_CASE("Two parallel planes have the error of their distance", "[mesh_error]") {
   const double h = GENERATE(0.0, 0.01, 0.03, 0.08);
@@ -196,8 +195,7 @@ TEST_CASE("The same arguments give the same report on any number of threads", "[
   const std::string four = json_of(compare(room(), estimate, {}));
   cv::setNumThreads(threads);
   CHECK(one == four);
-  MeshErrorOptions other;
-  other.seed = 2;
+  MeshErrorOptions other{.seed = 2};
   CHECK(one != json_of(compare(room(), estimate, other)));
 }
 
@@ -266,12 +264,58 @@ TEST_CASE("Meshes that cannot be compared are refused by name", "[mesh_error]") 
   for (const auto& [mesh, message] : refused)
     CHECK_THROWS_WITH(compare(good, mesh, {}), Catch::Contains(message));
   CHECK_THROWS_WITH(compare({}, good, {}), Catch::StartsWith("truth: no faces"));
-  MeshErrorOptions options;
-  options.crop_m = -1.0;
+  MeshErrorOptions options{.crop_m = -1.0};
   CHECK_THROWS_WITH(compare(good, good, options), Catch::StartsWith("a reach of -1"));
   CHECK_THROWS_AS(mesh_error(good, {}, {}), std::invalid_argument);
   const std::vector<MeshInput> one = {{"a", good}}, two = {{"a", good}, {"b", good}};
   CHECK_THROWS_WITH(mesh_change(good, one, two), Catch::Contains("1 meshes before and 2 after"));
 }
 
+TEST_CASE("A mesh ends at an edge of one face with shared and with separate vertices",
+          "[mesh_error]") {
+  const bool shared = GENERATE(true, false);
+  LabelledMesh mesh = square(3.0F, 0.0F, 3);
+  if (!shared) {
+    LabelledMesh soup;
+    for (const auto& face : mesh.faces) {
+      const auto first = static_cast<std::uint32_t>(soup.vertices.size());
+      for (const std::uint32_t corner : face) soup.vertices.push_back(mesh.vertices[corner]);
+      soup.faces.push_back({first, first + 1, first + 2});
+    }
+    mesh = soup;
+  }
+  const SurfaceSamples samples = sample_surface(mesh, 1000.0, 1);
+  const NearestSurface nearest(mesh, samples);
+  for (const float x : {0.1F, 1.0F, 1.5F, 2.9F})  // also at edges and corners of faces
+    CHECK_FALSE(nearest.find({x, 1.0F, 0.2F}, 1.0)->past_boundary);
+  CHECK(nearest.find({3.1F, 1.0F, 0.2F}, 1.0)->past_boundary);
+  CHECK(nearest.find({3.1F, 3.1F, 0.0F}, 1.0)->past_boundary);
+  CHECK(nearest.find({3.3F, 3.4F, 0.0F}, 1.0)->surface_m == Approx(0.5F));
+}
+
+TEST_CASE("The nearest sample is that of brute force", "[mesh_error]") {
+  const unsigned seed = GENERATE(1U, 2U, 3U);
+  CAPTURE(seed);
+  const LabelledMesh mesh = room();
+  const SurfaceSamples samples = sample_surface(mesh, 20.0, seed);
+  const NearestSurface nearest(mesh, samples);
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<float> uniform(-1.0F, 5.0F);
+  for (int i = 0; i < 200; ++i) {
+    const float x = uniform(random), y = uniform(random), z = uniform(random);
+    const Eigen::Vector3f point(x, y, z);
+    float best = std::numeric_limits<float>::infinity();
+    for (const Eigen::Vector3f& sample : samples.points)
+      best = std::min(best, (sample - point).norm());
+    const auto found = nearest.find(point, 10.0);
+    REQUIRE(found);
+    CHECK(found->distance_m == Approx(best).epsilon(1e-5));
+    CHECK(found->surface_m <= found->distance_m);
+    CHECK_FALSE(nearest.find(point, 0.99 * static_cast<double>(best)));
+    CHECK(nearest.find(point, 1.01 * static_cast<double>(best)));
+  }
+  CHECK_FALSE(NearestSurface({}, {}).find({0, 0, 0}, 10.0));
+}
+
+}  // namespace
 }  // namespace km

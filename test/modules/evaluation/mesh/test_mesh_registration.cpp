@@ -14,8 +14,7 @@ namespace {
 MeshReport report_of(const LabelledMesh& truth, const LabelledMesh& estimate,
                      const SE3& guess = SE3::Identity()) {
   const std::vector<MeshInput> inputs = {{"estimate", estimate}};
-  MeshErrorOptions options;
-  options.T_truth_estimate = guess;
+  MeshErrorOptions options{.T_truth_estimate = guess};
   return mesh_error(truth, inputs, options);
 }
 
