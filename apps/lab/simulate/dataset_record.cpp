@@ -18,8 +18,7 @@ constexpr const char* kRecordFile = "simulation.json";
 
 DatasetRecord read_record(const fs::path& file) try {
   const Json root = Json::parse(std::ifstream(file));
-  DatasetRecord record;
-  record.generator = root.at("generator").get<std::string>();
+  DatasetRecord record{.generator = root.at("generator").get<std::string>(), .parameters = {}};
   for (const auto& [name, value] : root.at("parameters").items())
     record.parameters.emplace_back(name, value.get<std::string>());
   record.complete = root.at("complete").get<bool>();

@@ -5,7 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <optional>
+#include <limits>
 #include <stdexcept>
 
 #include "apps/lab/simulation/motion/default_rig.hpp"
@@ -16,21 +16,19 @@
 #include "apps/lab/simulation/world/seeded_random.hpp"
 #include "apps/lab/simulation/world/world.hpp"
 #include "modules/core/text_rows.hpp"
+#include "modules/evaluation/input_row.hpp"
 
 namespace km {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kMaxNormError = 0.01;  // largest error of the norm of a quaternion
-
 // Text of a file, decompressed if it is gzipped (zlib passes other files through), and its check
 // sum.
 struct Table {
-  fs::path file;
-  std::string text;
+  std::string file, text;
 
-  explicit Table(const fs::path& path) : file(path) {
+  explicit Table(const fs::path& path) : file(path.string()) {
     const gzFile stream = gzopen(path.c_str(), "rb");
     if (stream == nullptr) throw std::runtime_error(path.string() + ": cannot be read");
     std::vector<char> buffer(1 << 16);
@@ -46,67 +44,34 @@ struct Table {
     const uLong sum = crc32_z(0, reinterpret_cast<const Bytef*>(text.data()), text.size());
     std::array<char, 16> digits{};
     std::snprintf(digits.data(), digits.size(), "%08lx", sum);
-    return file.filename().string() + " (crc32 " + digits.data() + ')';
-  }
-
-  [[noreturn]] void fail(const TextRow& row, const std::string& why) const {
-    throw std::runtime_error(file.string() + " line " + std::to_string(row.line) + ": " + why);
+    return fs::path(file).filename().string() + " (crc32 " + digits.data() + ')';
   }
 };
 
-// A number in field `i`; fields beyond the last count as 0 if they may be missing.
-double number(const Table& table, const TextRow& row, std::size_t i, bool required = true) {
-  if (i >= row.fields.size()) {
-    if (!required) return 0.0;
-    table.fail(row, "has only " + std::to_string(row.fields.size()) + " fields");
-  }
-  const auto value = parse_double(row.fields[i]);
-  if (!value || !std::isfinite(*value))
-    table.fail(row, "'" + std::string(row.fields[i]) + "' is not a number");
-  return *value;
+Stamp stamp_of(const InputRow& row) {
+  return row.integer(0, std::numeric_limits<Stamp>::max());
 }
 
-Eigen::Vector3d vector(const Table& table, const TextRow& row, std::size_t i,
-                       bool required = true) {
-  const double x = number(table, row, i, required);
-  const double y = number(table, row, i + 1, required);
-  const double z = number(table, row, i + 2, required);
-  return {x, y, z};
+// Zero if the row has no such fields.
+Eigen::Vector3d vector(const InputRow& row, std::size_t i) {
+  if (row.size() < i + 3) return Eigen::Vector3d::Zero();
+  return {row.number(i), row.number(i + 1), row.number(i + 2)};
 }
 
-Eigen::Quaterniond rotation(const Table& table, const TextRow& row, double w,
-                            const Eigen::Vector3d& v) {
-  const Eigen::Quaterniond q(w, v.x(), v.y(), v.z());
-  if (std::abs(q.norm() - 1.0) > kMaxNormError)
-    table.fail(row, "the quaternion's norm is " + std::to_string(q.norm()));
-  return q.normalized();
-}
-
-// EuRoC: t[ns], p, q_wxyz, v, b_g, b_a.
-TrueState euroc_state(const Table& table, const TextRow& row) {
-  const auto stamp = parse_int64(row.fields.front());
-  if (!stamp) table.fail(row, std::string(row.fields.front()) + " is not a stamp in nanoseconds");
-  const auto q = rotation(table, row, number(table, row, 4), vector(table, row, 5));
-  return {*stamp, make_pose(q.toRotationMatrix(), vector(table, row, 1)),
-          vector(table, row, 8, false), vector(table, row, 11, false),
-          vector(table, row, 14, false)};
-}
-
-bool is_header(const TextRow& row) {
-  return !parse_double(row.fields.front());
-}
-
-template <typename Row, typename Parse>
-std::vector<Row> read_rows(const Table& table, const Parse& parse) {
+// Rows of at least `fields` fields.
+template <typename Row>
+std::vector<Row> read_rows(const Table& table, std::size_t fields, const auto& parse) {
   std::vector<Row> rows;
-  for (const TextRow& row : split_rows(table.text)) {
-    if (rows.empty() && is_header(row)) continue;
+  for (const TextRow& text : split_rows(table.text)) {
+    if (rows.empty() && !parse_double(text.fields.front())) continue;  // a header
+    const InputRow row(table.file, text);
+    if (row.size() < fields) row.fail("has only " + std::to_string(row.size()) + " fields");
     const Row parsed = parse(row);
     if (!rows.empty() && parsed.stamp < rows.back().stamp)
-      table.fail(row, "comes before the row above it");
+      row.fail("comes before the row above it");
     if (rows.empty() || parsed.stamp > rows.back().stamp) rows.push_back(parsed);
   }
-  if (rows.size() < 2) throw std::runtime_error(table.file.string() + ": holds no data");
+  if (rows.size() < 2) throw std::runtime_error(table.file + ": holds no data");
   return rows;
 }
 
@@ -116,12 +81,13 @@ RecordedFlight read_recorded_flight(const fs::path& truth, const fs::path& imu) 
   const Table states(truth);
   const Table samples(imu);
   RecordedFlight flight;
-  flight.truth =
-      read_rows<TrueState>(states, [&](const TextRow& row) { return euroc_state(states, row); });
-  flight.imu = read_rows<ImuSample>(samples, [&](const TextRow& row) {
-    const auto stamp = parse_int64(row.fields.front());
-    if (!stamp) samples.fail(row, "does not begin with a stamp in nanoseconds");
-    return ImuSample{*stamp, vector(samples, row, 1), vector(samples, row, 4)};
+  // EuRoC: t[ns], p, q_wxyz, v, b_g, b_a.
+  flight.truth = read_rows<TrueState>(states, 8, [](const InputRow& row) {
+    return TrueState{stamp_of(row), row.pose(1, true), vector(row, 8), vector(row, 11),
+                     vector(row, 14)};
+  });
+  flight.imu = read_rows<ImuSample>(samples, 7, [](const InputRow& row) {
+    return ImuSample{stamp_of(row), vector(row, 1), vector(row, 4)};
   });
   flight.fingerprint = states.fingerprint() + ", " + samples.fingerprint();
   if (flight.imu.back().stamp <= flight.truth.front().stamp ||
@@ -160,19 +126,16 @@ Route route_of(const World& world, std::size_t robot, bool opposite) {
 std::unique_ptr<const BodyTrajectory> drive(const World& world, std::size_t robot, bool opposite,
                                             std::uint64_t seed, double duration_s) {
   const Route route = route_of(world, robot, opposite);
-  VehicleOptions vehicle;
-  vehicle.seed = seed;
-  vehicle.duration_s = duration_s;
+  VehicleOptions vehicle{.seed = seed, .duration_s = duration_s};
   return std::make_unique<SplineTrajectory>(
       make_vehicle_trajectory(route, world.ground_height, vehicle));
 }
 
 std::unique_ptr<const BodyTrajectory> fly(const World& world, std::uint64_t seed,
                                           double duration_s) {
-  FlightOptions flight;
-  flight.seed = seed;
-  flight.duration_s = duration_s;
-  flight.R_vehicle_body = vehicle_from_body(RigKind::kFlying);
+  FlightOptions flight{.seed = seed,
+                       .duration_s = duration_s,
+                       .R_vehicle_body = vehicle_from_body(RigKind::kFlying)};
   return std::make_unique<SplineTrajectory>(make_flight_trajectory(world.flight_volume, flight));
 }
 

@@ -44,9 +44,8 @@ World make_world(const SimulationOptions& options) {
 }
 
 DepthSensorOptions depth_sensor(const SensorRig& rig) {
-  DepthSensorOptions options;
-  options.focal_px = rig.stereo.cameras[0].fx;
-  options.baseline_m = rig.stereo.baseline_m();
+  DepthSensorOptions options{.focal_px = rig.stereo.cameras[0].fx,
+                             .baseline_m = rig.stereo.baseline_m()};
   return options;
 }
 
@@ -158,8 +157,7 @@ class RobotCameras {
  private:
   [[nodiscard]] Shot shot(std::size_t i, ImageChannel channel) const {
     const BodyMotion motion = scenario_.motion(scenario_.images[i]);
-    Shot shot;
-    shot.exposure = exposures_.at(i);
+    Shot shot{.exposure = exposures_.at(i), .lights = {}};
     shot.body_velocity << motion.angular_velocity_body,
         motion.T_world_body.linear().transpose() * motion.velocity_world;
     const std::uint64_t camera =
@@ -402,9 +400,8 @@ class Simulation {
 }  // namespace
 
 void simulate(const SimulationOptions& options) {
-  DatasetRecord record;
-  record.generator = "kimera_multi_simulate " + built_version();
-  record.parameters = parameters(options);
+  DatasetRecord record{.generator = "kimera_multi_simulate " + built_version(),
+                       .parameters = parameters(options)};
   std::vector<RecordedFlight> flights;
   for (std::size_t i = 0; i < options.truths.size(); ++i) {
     flights.push_back(read_recorded_flight(options.truths[i], options.imus[i]));

@@ -1,10 +1,6 @@
 #include "apps/lab/simulation/motion/imu_simulator.hpp"
 
-#include <algorithm>
 #include <cmath>
-#include <limits>
-#include <stdexcept>
-#include <string>
 
 #include "apps/lab/simulation/world/seeded_random.hpp"
 

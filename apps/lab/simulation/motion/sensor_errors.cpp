@@ -44,9 +44,9 @@ Eigen::Vector3d InertialErrors::sway(double t_s) const {
 InertialErrors draw_inertial_errors(const InertialErrorConfig& config, std::uint64_t seed) {
   checked(config);
   SeededRandom random(seed);
-  InertialErrors errors;
-  errors.gyro_matrix = scaled_and_tilted(config.gyro_scale, config.misalignment_rad, random);
-  errors.accel_matrix = scaled_and_tilted(config.accel_scale, config.misalignment_rad, random);
+  InertialErrors errors{
+      .gyro_matrix = scaled_and_tilted(config.gyro_scale, config.misalignment_rad, random),
+      .accel_matrix = scaled_and_tilted(config.accel_scale, config.misalignment_rad, random)};
   errors.gyro_vibration.setConstant(config.vibration_gyro_rps);
   errors.accel_vibration.setConstant(config.vibration_accel_mps2);
   for (double& phase : errors.phase) phase = 2.0 * std::numbers::pi * random.unit();

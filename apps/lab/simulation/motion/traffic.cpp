@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <optional>
 
 #include "apps/lab/simulation/motion/vehicle_trajectory.hpp"
 #include "apps/lab/simulation/world/objects.hpp"
@@ -137,12 +136,11 @@ class TrafficPlanner {
     Route route = world_.routes[static_cast<std::size_t>(
         random_.below(static_cast<int>(world_.routes.size())))];
     if (random_.chance(0.6)) route = opposite_route(route);
-    VehicleOptions vehicle;
-    vehicle.seed = static_cast<std::uint64_t>(random_.below(1 << 30));
-    vehicle.duration_s = duration_s_ + 1.0 + 2.0 * kMargin_s;
-    vehicle.start_m = 300.0 * random_.unit();
-    vehicle.standstill_s = 0.0;
-    vehicle.rig_height_m = 0.0;
+    VehicleOptions vehicle{.seed = static_cast<std::uint64_t>(random_.below(1 << 30)),
+                           .duration_s = duration_s_ + 1.0 + 2.0 * kMargin_s,
+                           .start_m = 300.0 * random_.unit(),
+                           .standstill_s = 0.0,
+                           .rig_height_m = 0.0};
     return std::make_unique<SplineTrajectory>(
         make_vehicle_trajectory(route, world_.ground_height, vehicle));
   }

@@ -1,7 +1,6 @@
 #include "apps/lab/simulation/rendering/ray_tracer.hpp"
 
 #include <cstring>
-#include <limits>
 #include <stdexcept>
 #include <string>
 

@@ -9,7 +9,6 @@
 #include "apps/lab/simulation/rendering/shot.hpp"
 #include "apps/lab/simulation/world/world.hpp"
 #include "modules/core/camera.hpp"
-#include "modules/core/frame.hpp"
 #include "modules/core/geometry.hpp"
 
 namespace km {

@@ -2,7 +2,6 @@
 
 #include <Eigen/Core>
 #include <cstdint>
-#include <random>
 #include <vector>
 
 #include "apps/lab/simulation/rendering/lens_clutter.hpp"

@@ -2,8 +2,6 @@
 
 #include <Eigen/Core>
 #include <cstddef>
-#include <cstdint>
-#include <utility>
 #include <vector>
 
 #include "apps/lab/simulation/world/seeded_random.hpp"

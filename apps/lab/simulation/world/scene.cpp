@@ -50,15 +50,14 @@ Vector2f planar_uv(const Vector3f& p, const Vector3f& n) {
 MaterialId Scene::paint(SurfaceClass label, Recipe recipe, const Vector3f& tint, float scale,
                         float specular, float glow) {
   const RecipeTraits& traits = traits_of(recipe);
-  Material material;
-  material.label = label;
-  material.tint = tint;
-  material.base = texture(recipe);
-  material.detail = texture(traits.detail);
-  material.base_period_m = scale * traits.period_m;
-  material.detail_period_m = scale * traits.detail_period_m;
-  material.specular = specular;
-  material.glow = glow;
+  Material material{.label = label,
+                    .tint = tint,
+                    .base = texture(recipe),
+                    .detail = texture(traits.detail),
+                    .base_period_m = scale * traits.period_m,
+                    .detail_period_m = scale * traits.detail_period_m,
+                    .specular = specular,
+                    .glow = glow};
 
   const auto known = std::ranges::find(materials_, material);
   const auto index = static_cast<MaterialId>(known - materials_.begin());

@@ -1,19 +1,22 @@
 #include <yaml-cpp/yaml.h>
-
+#include <zlib.h>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <filesystem>
 #include <map>
 #include <string>
 
+#include "apps/lab/simulate/dataset_record.hpp"
+#include "apps/lab/simulate/robot_scenario.hpp"
 #include "modules/sensors/node/open_folder.hpp"
 #include "test/support/command.hpp"
+#include "test/support/shared_data.hpp"
 #include "test/support/temporary_folder.hpp"
-
-// kimera_multi_simulate as a program, on the smallest possible recordings.
 
 namespace km {
 namespace {
+
+// kimera_multi_simulate as a program, on the smallest possible recordings.
 
 namespace fs = std::filesystem;
 
@@ -53,15 +56,11 @@ void check_equal(const std::map<std::string, std::string>& a,
   }
 }
 
-}  // namespace
-
 TEST_CASE("The ordinary reader reads a recording, and missing images are made again",
           "[simulate]") {
   const TemporaryFolder folder;
   const fs::path output = folder.path() / "r";
-  const auto result = simulate(kSmall, output);
-  CAPTURE(result.output);
-  REQUIRE(result.exit_code == 0);
+  const auto result = succeeded(simulate(kSmall, output));
   FolderReader reader = open_folder(output / "robot1");
   std::size_t frames = 0;
   std::size_t samples = 0;
@@ -119,4 +118,104 @@ TEST_CASE("At the hardest level the reader reads the recording, with any number 
   CHECK(std::abs(focal_px / (458.654 * 64 / 752) - 1.0) == Approx(0.005).epsilon(1e-3));
 }
 
+const std::string kEuroc =
+    "#timestamp,px,...\n"
+    "1000,1,2,3,0.5,0.5,-0.5,0.5,4,5,6,7,8,9,10,11,12\n"
+    "1000,1,2,3,0.5,0.5,-0.5,0.5,4,5,6,7,8,9,10,11,12\n"  // as published: a stamp twice
+    "2000,1,2,4,0.5,0.5,-0.5,0.5,4,5,6,7,8,9,10,11,12\n";
+const std::string kImu = "#t,gyro,accel\n900,1,2,3,4,5,6\n1900,1,2,3,4,5,7\n";
+
+fs::path write_gzip(const TemporaryFolder& folder, const std::string& name,
+                    const std::string& text) {
+  const fs::path path = folder.path() / name;
+  const gzFile file = gzopen(path.c_str(), "wb");
+  gzwrite(file, text.data(), static_cast<unsigned>(text.size()));
+  gzclose(file);
+  return path;
+}
+
+std::string refusal_of_flight(const std::string& truth, const std::string& imu) {
+  const TemporaryFolder folder;
+  const auto t = folder.write("truth.csv", truth);
+  const auto i = folder.write("imu.csv", imu);
+  try {
+    (void)read_recorded_flight(t, i);
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+  return {};
+}
+
+TEST_CASE("Recorded states and samples are read, gzipped or not", "[simulate]") {
+  const TemporaryFolder folder;
+  const bool zipped = GENERATE(false, true);
+  const auto truth =
+      zipped ? write_gzip(folder, "t.csv.gz", kEuroc) : folder.write("t.csv", kEuroc);
+  const auto imu = zipped ? write_gzip(folder, "i.csv.gz", kImu) : folder.write("i.csv", kImu);
+  const RecordedFlight flight = read_recorded_flight(truth, imu);
+  REQUIRE(flight.truth.size() == 2);
+  const TrueState& state = flight.truth[1];
+  CHECK(state.stamp == 2000);
+  CHECK(state.T_world_body.translation() == Eigen::Vector3d(1, 2, 4));
+  const Eigen::Quaterniond q(0.5, 0.5, -0.5, 0.5);
+  CHECK((state.T_world_body.linear() - q.toRotationMatrix()).norm() < 1e-15);
+  CHECK(state.velocity_world == Eigen::Vector3d(4, 5, 6));
+  CHECK(state.accel_bias == Eigen::Vector3d(10, 11, 12));
+  REQUIRE(flight.imu.size() == 2);
+  CHECK(flight.imu[1].accel == Eigen::Vector3d(4, 5, 7));
+  CHECK_THAT(flight.fingerprint, Catch::Contains(truth.filename().string()));
+}
+
+TEST_CASE("Recordings that cannot be used are refused by file and line", "[simulate]") {
+  CHECK_THAT(refusal_of_flight(kEuroc + "3000,1,2,x,1,0,0,0\n", kImu),
+             Catch::Contains("truth.csv line 5: x is not a finite number"));
+  CHECK_THAT(refusal_of_flight(kEuroc + "3000,1,2,3,9,0,0,0\n", kImu),
+             Catch::Contains("line 5") && Catch::Contains("norm"));
+  CHECK_THAT(refusal_of_flight(kEuroc + "1500,1,2,3,1,0,0,0\n", kImu), Catch::Contains("line 5"));
+  CHECK_THAT(refusal_of_flight(kEuroc, kImu + "2900,1,2\n"),
+             Catch::Contains("imu.csv line 4: has only 3 fields"));
+  CHECK_THAT(refusal_of_flight("", kImu), Catch::Contains("truth.csv: holds no data"));
+  CHECK_THAT(refusal_of_flight(kEuroc, "9000,1,2,3,4,5,6\n9900,1,2,3,4,5,7\n"),
+             Catch::Contains("do not overlap in time"));
+}
+
+const DatasetRecord kWanted = {"simulator 1", {{"world", "city"}, {"seed", "1"}}, false};
+
+std::string refusal(const fs::path& folder, const DatasetRecord& wanted = kWanted) {
+  try {
+    (void)open_dataset(folder, wanted);
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+  return {};
+}
+
+TEST_CASE("A folder with other content or parameters is refused", "[simulate]") {
+  const TemporaryFolder folder;
+  SECTION("files of others") {
+    folder.write("thesis.tex", "");
+    CHECK_THAT(refusal(folder.path()),
+               Catch::Contains("not made by this program") && Catch::Contains("another --output"));
+    CHECK(std::distance(fs::directory_iterator(folder.path()), {}) == 1);
+  }
+  SECTION("other parameters") {
+    CHECK(refusal(folder.path()).empty());
+    DatasetRecord other = kWanted;
+    other.parameters = {{"world", "city"}, {"seed", "2"}, {"labels", "yes"}};
+    CHECK_THAT(refusal(folder.path(), other),
+               Catch::Contains("seed: 1 there, 2 asked for") &&
+                   Catch::Contains("labels: none there, yes asked") &&
+                   Catch::Contains("another --output"));
+  }
+  SECTION("a damaged record") {
+    folder.write("simulation.json", GENERATE("{\"generator\": ", "", "[1, 2]", "{\"a\": \"x\"}"));
+    CHECK_THAT(refusal(folder.path()), Catch::Contains("simulation.json: cannot be understood"));
+  }
+  SECTION("a place that cannot be written") {
+    const fs::path below_file = folder.write("file", "") / "recordings";
+    CHECK_THAT(refusal(below_file), Catch::Contains(below_file.string()));
+  }
+}
+
+}  // namespace
 }  // namespace km

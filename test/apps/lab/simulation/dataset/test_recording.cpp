@@ -19,13 +19,8 @@ namespace {
 namespace fs = std::filesystem;
 
 Camera some_camera(double shift_m) {
-  Camera camera;
-  camera.width = 376;
-  camera.height = 240;
-  camera.fx = 229.327;
-  camera.fy = 228.648;
-  camera.cx = 183.6075;
-  camera.cy = 124.1875;
+  Camera camera{
+      .width = 376, .height = 240, .fx = 229.327, .fy = 228.648, .cx = 183.6075, .cy = 124.1875};
   camera.lens =
       Lens(LensModel::kRadialTangential, {-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05});
   camera.T_body_cam = make_pose(so3_exp(Eigen::Vector3d(0.1, -1.2, 0.7)), {shift_m, -0.06, 1e-9});
@@ -48,8 +43,7 @@ TEST_CASE("The reader gets the calibration that was written", "[simulation][data
   const TemporaryFolder folder;
   const RecordingLayout layout(folder.path());
   const Camera left = some_camera(0.0), right = some_camera(0.11);
-  ImuNoise noise;
-  noise.gyro_noise_density = 1.6968e-04;
+  ImuNoise noise{.gyro_noise_density = 1.6968e-04};
   noise.accel_random_walk = 0.1 + 0.2;  // needs all digits
   write_whole_file(layout.calibration(ImageChannel::kLeft), camera_yaml(left, 20.0, "left"));
   write_whole_file(layout.calibration(ImageChannel::kRight), camera_yaml(right, 20.0, "right"));

@@ -21,8 +21,7 @@ namespace {
 const Eigen::AlignedBox3d kRoom(Eigen::Vector3d(-3.0, -2.5, 0.2), Eigen::Vector3d(3.0, 2.5, 3.0));
 
 TEST_CASE("A flight stays in its volume and is as lively as it should be", "[motion]") {
-  FlightOptions options;
-  options.seed = GENERATE(1U, 2U, 3U, 4U);
+  FlightOptions options{.seed = GENERATE(1U, 2U, 3U, 4U)};
   CAPTURE(options.seed);
   options.duration_s = 100.0;
   const SplineTrajectory flight = make_flight_trajectory(kRoom, options);
@@ -101,8 +100,7 @@ DriveSummary summarise(const BodyTrajectory& drive, const Route& route) {
 }
 
 TEST_CASE("A vehicle on level ground keeps to the limits and to its route", "[motion]") {
-  VehicleOptions options;
-  options.seed = GENERATE(1U, 2U, 3U, 4U, 5U);
+  VehicleOptions options{.seed = GENERATE(1U, 2U, 3U, 4U, 5U)};
   CAPTURE(options.seed);
   options.rig_height_m = 0.0;  // the point on the ground, for which the limits hold
   options.start_m = 25.0 * static_cast<double>(options.seed);
@@ -145,8 +143,7 @@ struct Recording {
 };
 
 Recording record(double rate_hz, double position_noise_m, double rotation_noise_rad) {
-  FlightOptions options;
-  options.duration_s = 30.0;
+  FlightOptions options{.duration_s = 30.0};
   Recording recording{
       make_flight_trajectory({Eigen::Vector3d(-3, -3, 0), Eigen::Vector3d(3, 3, 3)}, options), {}};
   GaussianRandom random{SeededRandom(6)};

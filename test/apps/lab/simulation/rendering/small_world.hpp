@@ -2,8 +2,6 @@
 
 #include <Eigen/Core>
 #include <cstdint>
-#include <numbers>
-#include <vector>
 
 #include "apps/lab/simulation/rendering/renderer.hpp"
 #include "apps/lab/simulation/world/scene.hpp"
@@ -27,12 +25,11 @@ class Builder {
   static Texture uniform_texture(float albedo) { return {1, {Eigen::Vector3f::Constant(albedo)}}; }
 
   MaterialId material(SurfaceClass label, float albedo, std::uint16_t base = 0) {
-    Material material;
-    material.label = label;
-    material.tint = Eigen::Vector3f::Constant(albedo);
-    material.base = base;
-    material.detail = 1;
-    material.base_period_m = 1.0F;
+    Material material{.label = label,
+                      .tint = Eigen::Vector3f::Constant(albedo),
+                      .base = base,
+                      .detail = 1,
+                      .base_period_m = 1.0F};
     world_.materials.push_back(material);
     return static_cast<MaterialId>(world_.materials.size() - 1);
   }
@@ -69,13 +66,12 @@ inline float at(const RenderedView& view, int x, int y) {
 
 /// Camera that looks along the body's +x with its image upright (body: x forward, z up).
 inline Camera forward_camera(int width, int height, double focal_px) {
-  Camera camera;
-  camera.width = width;
-  camera.height = height;
-  camera.fx = focal_px;
-  camera.fy = focal_px;
-  camera.cx = 0.5 * (width - 1);
-  camera.cy = 0.5 * (height - 1);
+  Camera camera{.width = width,
+                .height = height,
+                .fx = focal_px,
+                .fy = focal_px,
+                .cx = 0.5 * (width - 1),
+                .cy = 0.5 * (height - 1)};
   Eigen::Matrix3d R_body_cam;
   R_body_cam << 0, 0, 1, -1, 0, 0, 0, -1, 0;
   camera.T_body_cam.linear() = R_body_cam;

@@ -173,8 +173,7 @@ TEST_CASE("A rolling shutter shears a vertical edge by rate * focal length * tim
   const World world = edge_world();
   const Renderer renderer(world);
   const Camera camera = forward_camera(120, 80, 100.0);
-  SensorEffectsConfig config;
-  config.rolling_shutter_s = 0.04;
+  SensorEffectsConfig config{.rolling_shutter_s = 0.04};
   const double rate_rps = GENERATE(1.5, -1.5);
   std::vector<SE3> poses;
   for (int row = 0; row < camera.height; ++row)
@@ -236,9 +235,7 @@ TEST_CASE("A moved car is at its pose in the images of labels and depth",
 }
 
 TEST_CASE("Passages multiply the light by the factor or its inverse", "[simulation][exposure]") {
-  SensorEffectsConfig config;
-  config.passage_light = 8.0;
-  config.passage_every_s = 10.0;
+  SensorEffectsConfig config{.passage_light = 8.0, .passage_every_s = 10.0};
   const LightPassages light(config, 200.0, 5);
   int bright = 0, dark = 0, none = 0;
   for (double t_s = 0.0; t_s < 200.0; t_s += 0.01) {
@@ -259,8 +256,7 @@ TEST_CASE("Passages multiply the light by the factor or its inverse", "[simulati
 TEST_CASE("A light before the lens lifts the whole image, one behind it does not",
           "[simulation][clutter]") {
   const PixelRays rays(forward_camera(120, 80, 100.0));
-  SensorEffectsConfig config;
-  config.glare = 0.5;
+  SensorEffectsConfig config{.glare = 0.5};
   const SensorEffects effects(rays, config);
   const RenderedView view = flat_view(rays.camera(), 0.2F);
   Shot exposed = shot(1.0);
