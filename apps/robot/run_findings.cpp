@@ -201,8 +201,8 @@ class FindingsOfRun {
           "a program in the network sends packets in the name of robots: they meet late or never",
           "find the program; in a team without keys it can also send measurements (--security)");
     for (const auto& [name, why] : run_.unmet_peers)
-      add(kWarning, "network.unmet", name + " was never met: " + why, "its messages were not used",
-          "kimera_multi_doctor --network examines the network");
+      add(kWarning, "network.unmet", (name + " was never met: ").append(why),
+          "its messages were not used", "kimera_multi_doctor --network examines the network");
     for (const auto& [name, seconds] : run_.lost_peers)
       add(kWarning, "link.lost",
           name + " was not received in the last " + fixed(seconds, 1) + " s of the run",

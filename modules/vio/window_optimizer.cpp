@@ -203,15 +203,15 @@ void WindowEquations::add_observation(const WindowObservation& o, const Eigen::V
                                 image_linearization_[o.frame].T_odom_body, p_odom, term))
       continue;
     const double w = cauchy_weight(term.r.squaredNorm(), window_.loss_scale);
-    const Eigen::Matrix<double, 6, 2> wJ_T = w * term.J_pose.transpose();
-    A.noalias() += wJ_T * term.J_pose;
-    a.noalias() += wJ_T * term.r;
-    coupling.W.noalias() += wJ_T * term.J_point;
+    const Eigen::Matrix<double, 6, 2> J_w = w * term.J_pose.transpose();
+    A.noalias() += J_w * term.J_pose;
+    a.noalias() += J_w * term.r;
+    coupling.W.noalias() += J_w * term.J_point;
     point.V.noalias() += w * term.J_point.transpose() * term.J_point;
     point.b.noalias() += w * term.J_point.transpose() * term.r;
     if (!window_.calibrates) continue;
     const Eigen::Vector2d J_readout = view.weight * o.by_readout[c];
-    images_H_.block<1, 6>(last, at) += (wJ_T * J_readout).transpose();
+    images_H_.block<1, 6>(last, at) += (J_w * J_readout).transpose();
     images_H_(last, last) += w * J_readout.squaredNorm();
     images_g_(last) += w * J_readout.dot(term.r);
     point.by_readout.noalias() += w * term.J_point.transpose() * J_readout;
