@@ -1,9 +1,11 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <random>
+#include <string>
 
 #include "modules/core/camera.hpp"
 #include "modules/core/camera_calibration.hpp"
+#include "modules/core/image_size.hpp"
 #include "modules/core/lie.hpp"
 #include "test/support/random_pose.hpp"
 
@@ -78,6 +80,22 @@ TEST_CASE("A calibration on top of a correction moves cameras like both in turn"
   CHECK(
       (both.local_coordinates_to(found.retracted(delta).composed_with(correction)) - delta).norm() <
       1e-12);
+}
+
+TEST_CASE("PNG and JPEG files contain their size", "[core]") {
+  const std::string png("\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\2\xF0\0\0\1\xE0", 24);
+  CHECK(stated_image_size(png) == ImageSize{752, 480});
+  CHECK_FALSE(stated_image_size(png.substr(0, 23)));
+  // A comment of two bytes, a fill byte, then the frame header of a progressive file.
+  const std::string jpeg("\xFF\xD8\xFF\xFE\0\4ab\xFF\xFF\xC2\0\x11\x08\1\xE0\2\xF0\3", 19);
+  CHECK(stated_image_size(jpeg) == ImageSize{752, 480});
+  CHECK_FALSE(stated_image_size(jpeg.substr(0, 16)));
+}
+
+TEST_CASE("A file without a size in its header has no size", "[core]") {
+  CHECK_FALSE(stated_image_size(""));
+  CHECK_FALSE(stated_image_size("BM"));
+  CHECK_FALSE(stated_image_size("\xFF\xD8"));
 }
 
 }  // namespace
