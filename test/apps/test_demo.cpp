@@ -74,10 +74,8 @@ TEST_CASE("The demo joins three robots of a simulated world into one frame", "[d
   constexpr std::size_t kFrames = 80;  // 8 s at 10 Hz
   constexpr double kMaxError_m = 0.3;  // robots in frames of their own are a metre off and more
   const TemporaryFolder folder;
-  const auto demo = run_command("apps/demo --short --rate max --programs " KM_BIN_DIR " --output " +
-                                folder.path().string());
-  CAPTURE(demo.output);
-  REQUIRE(demo.exit_code == 0);
+  const auto demo = succeeded(run_command(
+      "apps/demo --short --rate max --programs " KM_BIN_DIR " --output " + folder.path().string()));
   keep_demo_world(folder.path() / "world_short");
   CHECK_THAT(demo.output, Catch::Contains("240 of 240 frames, 100 %") &&
                               Catch::Contains("8 s of recording each, as fast as this") &&
@@ -159,9 +157,7 @@ struct StubbedDemo {
 TEST_CASE("The demo builds and draws a map of a recording with --map only", "[demo]") {
   const StubbedDemo demo;
   const std::string settings = "--set mapping.mode=metric";
-  const CommandResult without = demo.run("");
-  CAPTURE(without.output);
-  CHECK(without.exit_code == 0);
+  const CommandResult without = succeeded(demo.run(""));
   CHECK_THAT(without.output, !Catch::Contains(settings) && !Catch::Contains("team_mesh.png"));
 
   const CommandResult none = demo.run("--map");
@@ -178,9 +174,7 @@ TEST_CASE("The demo builds and draws a map of a recording with --map only", "[de
   demo.add("team", "echo \"$*\"; cd '" + out +
                        "' && mkdir -p robot0 && : >team_mesh.ply && echo 5 1 2 3 0 0 0 1 "
                        ">robot0/optimized.tum");
-  const CommandResult with = demo.run("--map");
-  CAPTURE(with.output);
-  CHECK(with.exit_code == 0);
+  const CommandResult with = succeeded(demo.run("--map"));
   CHECK_THAT(with.output, Catch::Contains("/out/team.json -- " + settings + '\n') &&
                               Catch::Contains("team_mesh.png ") &&
                               Catch::Contains("team_mesh.ply "));
@@ -201,9 +195,7 @@ TEST_CASE("The demo lets robots be watched with --view only", "[demo]") {
   const CommandResult without = demo.run("");
   CHECK(without.exit_code == 0);
   CHECK_THAT(without.output, !Catch::Contains("--view"));
-  const CommandResult with = demo.run("--view");
-  CAPTURE(with.output);
-  CHECK(with.exit_code == 0);
+  const CommandResult with = succeeded(demo.run("--view"));
   CHECK_THAT(with.output, Catch::Contains("To watch the team, open http://here") &&
                               Catch::Contains("/kimera_multi_team --config") &&
                               Catch::Contains(" --view\n"));

@@ -7,7 +7,6 @@
 
 #include "apps/robot/inspect.hpp"
 #include "modules/core/input_file.hpp"
-#include "modules/recordings/open_bag.hpp"
 #include "modules/recordings/ros_messages.hpp"
 #include "test/support/corrupted_input.hpp"
 #include "test/support/shared_data.hpp"

@@ -128,9 +128,7 @@ TEST_CASE("In a chain every robot waits for the one at the end, and then all go"
 }
 
 RunEnd usual_end() {
-  RunEnd end;
-  end.robot = 7;
-  end.departure = "all present robots have settled";
+  RunEnd end{.robot = 7, .result = {}, .departure = "all present robots have settled"};
   end.images = ImageCounts{.listed = 100, .read = 90, .skipped = 6, .with_pose = 88};
   return end;
 }

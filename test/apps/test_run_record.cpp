@@ -77,9 +77,7 @@ TEST_CASE("live poses follow the last keyframe that was optimised when the image
     return make_pose(Eigen::Matrix3d::Identity(), {x, y, 0.0});
   };
   const auto state = [&](Stamp stamp, double x) {
-    OdometryState made;
-    made.stamp = stamp;
-    made.T_odom_body = at(x);
+    OdometryState made{.stamp = stamp, .T_odom_body = at(x)};
     return made;
   };
   const auto keyframe = [&](KeyframeIndex index, Stamp stamp) {

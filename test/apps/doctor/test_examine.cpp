@@ -305,10 +305,10 @@ TEST_CASE("On loopback alone the finding depends on whether the host has another
 
 TEST_CASE("The doctor finds a robot on its domain, and its address on another one", "[doctor]") {
   std::random_device device;
-  DdsConfig config;
-  config.domain = static_cast<int>(device() % 90);
-  config.team = "test-" + std::to_string(device());
-  config.interface = "lo";
+  DdsConfig config{.domain = static_cast<int>(device() % 90),
+                   .team = "test-" + std::to_string(device()),
+                   .interface = "lo",
+                   .peers = {}};
   const Process peer({KM_BIN_DIR "/test_dds_peer", "7", "", "dds.team=" + config.team,
                       "dds.domain=" + std::to_string(config.domain), "dds.interface=lo",
                       "dds.spdp_interval_s=0.2"});

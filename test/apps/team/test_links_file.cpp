@@ -1,7 +1,6 @@
 #include "apps/team/links_file.hpp"
 
 #include <catch2/catch.hpp>
-#include <cmath>
 #include <limits>
 
 #include "test/support/corrupted_input.hpp"

@@ -3,7 +3,6 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/team/report_page.hpp"
-#include "apps/team/team_report.hpp"
 #include "test/apps/viewer/page_programs.hpp"
 #include "test/apps/viewer/small_run.hpp"
 #include "test/support/command.hpp"

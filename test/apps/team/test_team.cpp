@@ -1,7 +1,6 @@
 #include <catch2/catch.hpp>
 #include <csignal>
 #include <filesystem>
-#include <fstream>
 #include <iostream>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -71,10 +70,8 @@ TEST_CASE("The time of the recording is read from the status line of a robot", "
 TEST_CASE("A team runs its robots, shows their lines and prints the table", "[team]") {
   const ScriptedTeam team("exit 0");
   const std::string json = (team.folder.path() / "out/team.json").string();
-  const auto result =
-      run_command(team.command + " --rate max --domain 5 --json " + json + " -- --set a.b=1");
-  CAPTURE(result.output);
-  CHECK(result.exit_code == 0);
+  const auto result = succeeded(
+      run_command(team.command + " --rate max --domain 5 --json " + json + " -- --set a.b=1"));
   CHECK_THAT(result.output, Catch::Contains("alice | status of alice: --robot 1 --name alice"));
   CHECK_THAT(result.output, Catch::Contains("--rate max --domain 5"));
   CHECK_THAT(result.output, Catch::Contains("--set a.b=1"));
@@ -144,9 +141,7 @@ TEST_CASE("An interrupt is passed on once and the table still printed", "[team]"
       "while [ $name = alice ] && [ ! -e \"$out/../bob/ready\" ]; do :; done\n"
       "[ $name = alice ] && kill -INT $PPID\n"
       "while :; do sleep 0.05; done");
-  const auto result = run_command("exec " + team.command);
-  CAPTURE(result.output);
-  CHECK(result.exit_code == 0);
+  const auto result = succeeded(run_command("exec " + team.command));
   CHECK_THAT(result.output,
              Catch::Contains("alice interrupted") && Catch::Contains("bob   | bob interrupted"));
   CHECK_THAT(result.output, Catch::Contains("team, one frame"));
@@ -274,9 +269,7 @@ TEST_CASE("A report starts no robot and fails if one of the run did", "[team]") 
   CHECK_THAT(half.output, Catch::Contains("bob failed"));
 
   team.folder.write("out/bob/summary.json", json_text(finished_summary()));
-  const CommandResult whole = run_command(command);
-  CAPTURE(whole.output);
-  CHECK(whole.exit_code == 0);
+  const CommandResult whole = succeeded(run_command(command));
   CHECK_THAT(whole.output, Catch::Contains("finished") && !Catch::Contains("DDS domain") &&
                                !Catch::Contains("status of"));
 }

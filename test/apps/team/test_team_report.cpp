@@ -4,7 +4,6 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "modules/core/text_table.hpp"
 #include "modules/mesh/mesh_file.hpp"
 #include "test/modules/sensors/euroc_folder.hpp"
 #include "test/support/temporary_folder.hpp"

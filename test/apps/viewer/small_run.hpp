@@ -145,11 +145,10 @@ class SmallRun {
 
   static void add_keyframe(const KeyframeId& id, Events& events) {
     const double time_s = 4.0 * id.index;
-    KeyframeOdometry odometry;
-    odometry.id = id;
-    odometry.stamp = 500'000'000'000 + nanoseconds(time_s);
-    odometry.T_odom_kf = at(time_s, 0.0);
-    odometry.T_previous_kf = at(id.index == 0 ? 0.0 : 4.0, 0.0);
+    KeyframeOdometry odometry{.id = id,
+                              .stamp = 500'000'000'000 + nanoseconds(time_s),
+                              .T_odom_kf = at(time_s, 0.0),
+                              .T_previous_kf = at(id.index == 0 ? 0.0 : 4.0, 0.0)};
     Keyframe keyframe;
     keyframe.odometry = {id, odometry.T_odom_kf, Matrix6::Identity()};
     keyframe.stamp = odometry.stamp;

@@ -161,9 +161,7 @@ TEST_CASE("Other hosts need the token", "[page_server]") {
 }
 
 ViewUpdate state_of(const std::string& name) {
-  RobotSample state;
-  state.name = name;
-  return {3, 1, 0, state};
+  return {3, 1, 0, RobotSample{.name = name}};
 }
 
 TEST_CASE("A page receives the hello message, all past messages, and new ones", "[page_server]") {
