@@ -79,8 +79,8 @@ std::vector<StampedPose> read_topic(const RecordTopic& record) {
   }
   if (poses.empty()) throw InputFileError(place + ": no pose on this topic");
   std::ranges::stable_sort(poses, {}, &StampedPose::stamp);
-  const auto repeated = std::ranges::unique(poses, {}, &StampedPose::stamp);
-  poses.erase(repeated.begin(), repeated.end());
+  const auto equal = [](const auto& a, const auto& b) { return a.stamp == b.stamp; };
+  poses.erase(std::unique(poses.begin(), poses.end(), equal), poses.end());
   return poses;
 }
 

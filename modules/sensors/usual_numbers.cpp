@@ -190,8 +190,9 @@ std::vector<Doubt> FirstPackets::add(const SensorPacket& packet) {
     judge(UsualNumber::kImuRate_hz,
           rate_hz(samples_.front().stamp, samples_.back().stamp, samples_.size()));
   if (const auto found = gravity_doubt(samples_)) doubts.push_back(*found);
-  const auto measured = std::ranges::partition(depths_m_, [](double m) { return m > 0.0; });
-  const auto count = static_cast<std::size_t>(measured.begin() - depths_m_.begin());
+  const auto unmeasured =
+      std::partition(depths_m_.begin(), depths_m_.end(), [](double m) { return m > 0.0; });
+  const auto count = static_cast<std::size_t>(unmeasured - depths_m_.begin());
   judge(UsualNumber::kDepthShare,
         static_cast<double>(count) / static_cast<double>(depths_m_.size()));  // NaN without depth
   depths_m_.resize(count);

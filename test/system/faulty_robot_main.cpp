@@ -62,7 +62,8 @@ void lie(Topics& topics, int number) {
   topics.mesh_poses.to_peers().publish(
       MeshPoses{.robot = 1, .keyframes = {{0, RoundedPose::of(far(2e6))}}});
   const auto to_robot_0 = [](auto message) {
-    return Addressed{0, std::make_shared<const decltype(message)>(std::move(message))};
+    using Message = decltype(message);
+    return Addressed<Message>{0, std::make_shared<const Message>(std::move(message))};
   };
   const auto index = static_cast<KeyframeIndex>(number);
   KeyframeReply reply;
