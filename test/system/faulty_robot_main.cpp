@@ -1,6 +1,5 @@
 #include <unistd.h>
 
-#include <cstdlib>
 #include <functional>
 #include <iostream>
 #include <limits>
@@ -66,9 +65,7 @@ void lie(Topics& topics, int number) {
     return Addressed<Message>{0, std::make_shared<const Message>(std::move(message))};
   };
   const auto index = static_cast<KeyframeIndex>(number);
-  KeyframeReply reply;
-  reply.number = index;
-  reply.found = true;
+  KeyframeReply reply{.number = index, .found = true, .keyframe = {}};
   reply.keyframe.odometry = {.id = {1, index}, .T_odom_kf = far(1e6)};
   topics.replies.own.publish(to_robot_0(reply));
   topics.words.own.publish(to_robot_0(KeyframeWords{index, {1, index}, {}}));

@@ -8,7 +8,6 @@
 #include <iostream>
 
 #include "apps/robot/run_summary.hpp"
-#include "test/support/patience.hpp"
 #include "test/support/process.hpp"
 #include "test/support/temporary_folder.hpp"
 #include "test/system/long_run.hpp"

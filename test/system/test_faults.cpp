@@ -1,8 +1,6 @@
 #include <sys/stat.h>
 
 #include <catch2/catch.hpp>
-#include <csignal>
-#include <fstream>
 #include <iostream>
 #include <list>
 

@@ -1,4 +1,3 @@
-#include <algorithm>
 #include <catch2/catch.hpp>
 #include <iostream>
 #include <string>
@@ -32,9 +31,7 @@ TEST_CASE("A robot keeps the memory of a frame for the next one", "[load]") {
   if (!dataset) return;
   const TemporaryFolder folder;
   const fs::path output = folder.path() / "a";
-  const CommandResult run = run_alone(*dataset, output, "--to 15 --rate max");
-  CAPTURE(run.output);
-  REQUIRE(run.exit_code == 0);
+  const CommandResult run = succeeded(run_alone(*dataset, output, "--to 15 --rate max"));
   const RunSummary summary = read_summary(output / "summary.json");
   REQUIRE(summary.frames == 299);
   // The start of the program, its vocabulary and its records cause 84 page faults a frame. To
@@ -51,10 +48,8 @@ TEST_CASE("On an overloaded computer the map skips frames first, then images are
   const TemporaryFolder folder;
   const fs::path output = folder.path() / "a";
   // An image every 2.5 ms: odometry alone takes two to three times as long.
-  const CommandResult run = run_alone(
-      *dataset, output, "--to 15 --rate 20 --set mapping.mode=metric sensors.max_lag_s=0.05");
-  CAPTURE(run.output);
-  REQUIRE(run.exit_code == 0);
+  const CommandResult run = succeeded(run_alone(
+      *dataset, output, "--to 15 --rate 20 --set mapping.mode=metric sensors.max_lag_s=0.05"));
   const RunSummary summary = read_summary(output / "summary.json");
   CHECK(summary.frames_skipped > 0);
   REQUIRE(summary.mapping);

@@ -2,27 +2,46 @@
 
 #include <csignal>
 #include <filesystem>
-#include <map>
-#include <set>
+#include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "apps/lab/pgo/team_graph_file.hpp"
-#include "modules/core/input_file.hpp"
+#include "modules/core/json.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
-#include "modules/recordings/open_bag.hpp"
 #include "modules/recordings/ros_messages.hpp"
 #include "test/modules/recordings/bag_contents.hpp"
+#include "test/support/command.hpp"
 #include "test/support/eavesdropper.hpp"
 #include "test/support/process.hpp"
 #include "test/support/shared_data.hpp"
-#include "test/system/record/other_readers.hpp"
+#include "test/support/temporary_folder.hpp"
 #include "test/system/team_run.hpp"
 
 // Records of robots and teams, read by our reader and by others.
 
 namespace km {
 namespace {
+
+// Content of an MCAP file according to readers of npm; nullopt if they are not available.
+std::optional<Json> read_by_others(const std::filesystem::path& file,
+                                   const TemporaryFolder& folder) {
+  const std::filesystem::path work = folder.path() / "npm";
+  std::filesystem::create_directories(work);
+  for (const char* source : {"package.json", "read_record.mjs"})
+    std::filesystem::copy_file(std::filesystem::path("test/system/record") / source, work / source,
+                               std::filesystem::copy_options::overwrite_existing);
+  const std::string in_work = "cd " + work.string() + " && ";
+  if (run_command(in_work + "npm install --silent --no-audit --no-fund --prefer-offline")
+          .exit_code != 0)
+    return std::nullopt;
+  const CommandResult result =
+      run_command(in_work + "node read_record.mjs " + file.string() + " > read.json");
+  CAPTURE(result.output);
+  REQUIRE(result.exit_code == 0);
+  return read_json(work / "read.json");
+}
 
 namespace fs = std::filesystem;
 
@@ -56,11 +75,9 @@ TEST_CASE("A robot's record has the poses of its results, also for readers that 
   const auto dataset = shared_data("euroc/MH_01_easy");
   if (!dataset) return;
   const TemporaryFolder folder;
-  const CommandResult run =
+  const CommandResult run = succeeded(
       run_command(record_command(*dataset, "--rate max --output " + folder.path().string() +
-                                               " --record-images --set mapping.mode=metric"));
-  CAPTURE(run.output);
-  REQUIRE(run.exit_code == 0);
+                                               " --record-images --set mapping.mode=metric")));
   const fs::path file = folder.path() / "record.mcap";
   Record record(file);
   CHECK_THAT(to_string(record.reader->report()), Catch::Equals(""));
@@ -196,14 +213,11 @@ TEST_CASE("Two robots on the halves of a recording localise together, and their 
   };
   const fs::path json = folder.path() / "same.json";
   const std::string record = (folder.path() / "team.mcap").string();
-  const CommandResult same =
-      evaluate(folder.path() / "a/optimized.tum", record + ":/a/path --json " + json.string());
-  CAPTURE(same.output);
-  REQUIRE(same.exit_code == 0);
+  const CommandResult same = succeeded(
+      evaluate(folder.path() / "a/optimized.tum", record + ":/a/path --json " + json.string()));
   CHECK(read_json(json)["joint"]["position_m"]["max"] < 1e-8);
-  const CommandResult both = evaluate(*dataset / "mav0/state_groundtruth_estimate0", record);
-  CAPTURE(both.output);
-  CHECK(both.exit_code == 0);
+  const CommandResult both =
+      succeeded(evaluate(*dataset / "mav0/state_groundtruth_estimate0", record));
   CHECK(both.output.find("team/a") != std::string::npos);
   CHECK(both.output.find("team/b") != std::string::npos);
 
@@ -214,9 +228,7 @@ TEST_CASE("Two robots on the halves of a recording localise together, and their 
         " --truth " + (*dataset / "mav0/state_groundtruth_estimate0/groundtruth_tum.txt").string() +
         " --results" + results);
   };
-  const CommandResult by_record = scores(' ' + (folder.path() / "team.mcap").string());
-  CAPTURE(by_record.output);
-  CHECK(by_record.exit_code == 0);
+  const CommandResult by_record = succeeded(scores(' ' + (folder.path() / "team.mcap").string()));
   CHECK(by_record.output ==
         scores(' ' + (folder.path() / "a").string() + ' ' + (folder.path() / "b").string()).output);
 }

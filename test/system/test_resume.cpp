@@ -3,7 +3,6 @@
 #include <array>
 #include <csignal>
 #include <cstdlib>
-#include <fstream>
 #include <map>
 #include <memory>
 #include <random>
@@ -89,9 +88,7 @@ double error_m(const fs::path& dataset, const std::vector<fs::path>& estimates,
       (dataset / "mav0/state_groundtruth_estimate0/groundtruth_tum.txt").string() + " --json " +
       (folder.path() / "error.json").string() + " --estimate";
   for (const fs::path& estimate : estimates) command += ' ' + estimate.string();
-  const CommandResult result = run_command(command);
-  CAPTURE(result.output);
-  REQUIRE(result.exit_code == 0);
+  const CommandResult result = succeeded(run_command(command));
   return read_json(folder.path() / "error.json")["joint"]["position_m"]["rmse"].get<double>();
 }
 
@@ -358,14 +355,12 @@ TEST_CASE("A journal with flipped bytes is continued or replaced, and a copy is 
   std::string journal = folder.read("run/run.journal");
   journal[journal.size() / 2] ^= 1;
   folder.write("run/run.journal", journal);
-  const CommandResult again =
+  const CommandResult again = succeeded(
       is_session
           ? run_command(KM_BIN_DIR "/kimera_multi_robot --robot 0 --serve-limit 0 --session " +
                         output + " --output " + output + " --domain " +
                         std::to_string(random_domain()))
-          : run_command(command + " --resume " + output);
-  CAPTURE(again.output);
-  CHECK(again.exit_code == 0);
+          : run_command(command + " --resume " + output));
   CHECK_THAT(again.output, Catch::Contains("run.journal: ") &&
                                Catch::Contains(" on are damaged and left out") &&
                                Catch::Contains("run.journal.damaged"));

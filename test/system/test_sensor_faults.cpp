@@ -9,7 +9,6 @@
 #include <string>
 #include <vector>
 
-#include "modules/core/lie.hpp"
 #include "modules/evaluation/trajectory_error.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
 #include "test/support/euroc_copy.hpp"
@@ -42,9 +41,7 @@ CommandResult run_robot(const TemporaryFolder& folder, const std::string& datase
 CamerasSummary estimated_cameras(const TemporaryFolder& folder, const std::string& output,
                                  const std::string& options,
                                  const std::string& output_option = "--output") {
-  const CommandResult run = run_robot(folder, "late", output, options, output_option);
-  CAPTURE(run.output);
-  REQUIRE(run.exit_code == 0);
+  const CommandResult run = succeeded(run_robot(folder, "late", output, options, output_option));
   return read_summary(folder.path() / output / "summary.json").cameras.value();
 }
 
@@ -308,9 +305,7 @@ TEST_CASE("A robot without an inertial sensor uses an external odometry", "[faul
   REQUIRE(run_robot(folder, "bare", "own").exit_code == 0);
   fs::remove_all(folder.path() / "bare/mav0/imu0");
   const std::string poses = (folder.path() / "own/odometry.tum").string();
-  const CommandResult run = run_robot(folder, "bare", "outside", "--odometry " + poses);
-  CAPTURE(run.output);
-  CHECK(run.exit_code == 0);
+  const CommandResult run = succeeded(run_robot(folder, "bare", "outside", "--odometry " + poses));
   CHECK(read_trajectory(folder.path() / "outside/odometry.tum").size() ==
         read_trajectory(poses).size());
   CHECK(!fs::exists(folder.path() / "outside/rig_estimated.yaml"));
