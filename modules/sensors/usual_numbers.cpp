@@ -102,6 +102,7 @@ std::string number_text(double value) {
 
 double median_norm(const std::vector<ImuSample>& samples, Eigen::Vector3d ImuSample::*value) {
   std::vector<double> norms;
+  norms.reserve(samples.size());
   for (const ImuSample& sample : samples) norms.push_back((sample.*value).norm());
   return quantile(std::move(norms), 0.5);
 }
