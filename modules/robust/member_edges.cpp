@@ -404,7 +404,6 @@ FrontGraph MemberEdges::front_graph(bool free) {
     if (tie.to.robot == graph_.self) front.edges.push_back(tie);
   }
   for (const PoseEdge& e : graph_.to_absent) {
-    if (options_.robust && is_rejected(graph_, e)) continue;
     front.edges.push_back(e);
     front.held[e.other(graph_.self)] = start_of(e.other(graph_.self));
   }

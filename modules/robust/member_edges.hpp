@@ -18,8 +18,7 @@ namespace km {
 ///
 /// In a second look (SessionGraph::again), the deferred and rejected closures that nearly fit, or
 /// that drift may explain, are undecided. A pair with undecided closures weighs its closures again,
-/// except for the rejected ones. A closure to a held pose is left out if an earlier session
-/// has rejected it, and otherwise has weight 1.
+/// except for the rejected ones. A closure to a held pose has weight 1.
 ///
 /// Exactly one of two robots weighs a closure between them and has it among its own edges. The
 /// system up the tree contains the pose at the other end. Not thread-safe.

@@ -29,7 +29,7 @@ struct SessionGraph {
   std::vector<PoseEdge> own = {};      ///< Odometry from each keyframe to the next, then closures.
   std::size_t odometry = 0;            ///< Number of steps of odometry at the beginning of `own`.
   std::vector<PoseEdge> between = {};  ///< Closures to other members, ascending by id.
-  std::vector<PoseEdge> to_absent = {};  ///< Closures to held poses of robots out of reach.
+  std::vector<PoseEdge> to_absent = {};  ///< Kept closures to held poses of robots out of reach.
   /// Start of the public poses of other robots, including absent robots.
   std::map<KeyframeId, SE3> public_poses = {};
   /// Mean weights of one step of odometry, as reported by each robot.
@@ -48,8 +48,8 @@ struct SessionGraph {
   /// Second look of a session: `start` is the solution without the deferred closures.
   bool again = false;
   double first_barc = 0.0;  ///< Second look: largest residual of an inlier in the first [sigma].
-  /// Kept or rejected: closures to robots out of reach by an earlier session, and in a second look
-  /// all closures by the first one. Closures without an entry are undecided.
+  /// Kept or rejected closures: in a second look those of the first one. Closures without an entry
+  /// are undecided.
   std::map<ClosureId, bool> decided = {};
   ClosureNoiseRecord noise = {};  ///< In a second look the noise by the first one.
 };

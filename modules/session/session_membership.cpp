@@ -180,10 +180,6 @@ void set_start(AgentState& s, const Session& session, SessionGraph& graph) {
     const SE3 T_frame_start = s.poses.T_frame_kf().front() * graph.start.front().inverse();
     for (SE3& T : graph.start) T = T_frame_start * T;
   }
-  for (const PoseEdge& e : graph.to_absent)
-    if (const auto decided = s.decisions.decided().find(e.id());
-        decided != s.decisions.decided().end())
-      graph.decided.insert(*decided);
 }
 
 // Number of closures of this robot in the newest sets of edges.
