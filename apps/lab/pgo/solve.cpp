@@ -210,8 +210,11 @@ std::string score_text(const TruthScore& truth) {
   text += "ATE of the team " + fixed(truth.ate->team_m, kDecimals) + " m";
   if (!truth.optimum_of_true) return text + '\n';
   text += "; of the optimum of the true closures " +
-          fixed(truth.optimum_of_true->team_m, kDecimals) + " m, ratio " +
-          fixed(ate_ratio(truth), kDecimals) + '\n';
+          fixed(truth.optimum_of_true->team_m, kDecimals) + " m";
+  constexpr double kExact_m = 1e-3;  // the ratio would be one of rounding errors
+  if (truth.optimum_of_true->team_m > kExact_m)
+    text += ", ratio " + fixed(ate_ratio(truth), kDecimals);
+  text += '\n';
   if (truth.optimum_of_true->parts > 1)
     text += "the true closures leave " + std::to_string(truth.optimum_of_true->parts) +
             " unconnected parts, each aligned by itself\n";
