@@ -22,6 +22,8 @@ namespace {
 constexpr double kInRooms_m = 1e-6, kOverKilometres_m = 1e-5;
 // The garage claims 200 times its noise: rounds end 8e-7 m from each other.
 constexpr double kOfSoftGraph_m = 2e-6;
+// The rounding of steps in messages moves ais2klinik by 2e-5 m along its softest motions.
+constexpr double kOfSoftKilometres_m = 3e-5;
 
 struct Answer {
   std::vector<bool> kept;       // by edge of the graph
@@ -180,7 +182,7 @@ TEST_CASE("A team ends equally with permuted ids", "[pgo][law]") {
 
 TEST_CASE("Teams with few or uneven closures end equally with reversed ids", "[.][law_long]") {
   check_ids(GENERATE(LawCase{"pose_graphs/3d/cubicle.g2o", 5, "", kInRooms_m},
-                     LawCase{"pose_graphs/2d/ais2klinik.g2o", 5, "", kOverKilometres_m},
+                     LawCase{"pose_graphs/2d/ais2klinik.g2o", 5, "", kOfSoftKilometres_m},
                      LawCase{"pose_graphs/3d/torus3D.g2o", 4, "uneven-closures-torus", kInRooms_m},
                      LawCase{"pose_graphs/3d/parking-garage.g2o", 4, "place-bias", kInRooms_m}),
             0);
