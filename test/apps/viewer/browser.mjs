@@ -117,6 +117,11 @@ class Page {
       const value =
           this.evaluate(`(() => { try { return !!(${expression}); } catch { return false; } })()`);
       if (await value.catch(() => false)) return;  // between two pages there is no page to query
+      // Chromium aborts requests when another test makes a network interface.
+      if (this.errors.some((error) => error.includes('ERR_NETWORK_CHANGED'))) {
+        this.errors = [];
+        await this.send('Page.reload');
+      }
       await pause(0.1);
     }
     throw new Error(`after ${seconds} s it is not so: ${expression}; the page says: ${
