@@ -45,6 +45,12 @@ struct Walk {
     for (std::uint32_t k = 1; k < kKeyframes; ++k)
       steps.push_back(edge(k - 1, k, rotation, translation));
   }
+  // Two closures of successive keyframes at every `stride`-th keyframe.
+  void close_in_twos(std::uint32_t stride, double rotation) {
+    for (std::uint32_t k = 0; k + 51 < kKeyframes; k += stride)
+      for (const std::uint32_t turn : {50U, 51U})
+        closures.push_back(edge(k, k + turn, rotation, 1.0));
+  }
   void close(std::uint32_t every, double noise = 1.0) {
     for (std::uint32_t k = 0; k + kTurn < kKeyframes; k += every) {
       closures.push_back(edge(k, k + kTurn, noise, noise));
@@ -171,9 +177,7 @@ TEST_CASE("Closures as precise as they claim do not have the noise of odometry",
   CAPTURE(seed);
   Walk walk(seed);
   walk.walk(11.0, 1.0);
-  for (std::uint32_t k = 0; k + 51 < Walk::kKeyframes; k += 4)
-    for (const std::uint32_t turn : {50U, 51U})
-      walk.closures.push_back(walk.edge(k, k + turn, 1.0, 1.0));
+  walk.close_in_twos(4, 1.0);
   const OdometryNoise noise = walk.noise();
   CHECK_FALSE(noise.of_closures);
   CHECK(factor(noise.rotation, 11.0) < 1.7);
@@ -187,9 +191,7 @@ TEST_CASE("Closures have the noise of odometry, although their translations are 
   CAPTURE(seed);
   Walk walk(seed);
   walk.walk(15.0, 1.0);
-  for (std::uint32_t k = 0; k + 51 < Walk::kKeyframes; ++k)
-    for (const std::uint32_t turn : {50U, 51U})
-      walk.closures.push_back(walk.edge(k, k + turn, 15.0, 1.0));
+  walk.close_in_twos(1, 15.0);
   for (auto* edges : {&walk.steps, &walk.closures})
     for (PoseEdge& e : *edges) e.precision.tau /= 100.0;
   const OdometryNoise noise = walk.noise();
