@@ -29,7 +29,8 @@ struct SessionGraph {
   std::vector<PoseEdge> own = {};      ///< Odometry from each keyframe to the next, then closures.
   std::size_t odometry = 0;            ///< Number of steps of odometry at the beginning of `own`.
   std::vector<PoseEdge> between = {};  ///< Closures to other members, ascending by id.
-  std::vector<PoseEdge> to_absent = {};  ///< Kept closures to held poses of robots out of reach.
+  /// Closures to held poses of robots out of reach; only kept ones, unless all are trusted.
+  std::vector<PoseEdge> to_absent = {};
   /// Start of the public poses of other robots, including absent robots.
   std::map<KeyframeId, SE3> public_poses = {};
   /// Mean weights of one step of odometry, as reported by each robot.

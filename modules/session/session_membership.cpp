@@ -127,8 +127,8 @@ std::optional<FrozenPart> freeze(const AgentState& s, const Session& session) {
   if (!part) return std::nullopt;
   part->in_frame = session.plan.members.front().peer == s.self;
   part->closures_may_be_false = s.expects_false();
-  // Without a robot out of reach, there is too little evidence on which closures to it are false.
-  // Those that no session has kept wait for it.
+  // A robot out of reach takes its evidence on false closures with it: closures to it that no
+  // session has kept wait for its return.
   if (s.expects_false())
     std::erase_if(part->graph.to_absent, [&](const PoseEdge& e) {
       const auto decided = s.decisions.decided().find(e.id());
