@@ -23,7 +23,7 @@ std::string data_of(RobotId robot, std::uint64_t boot, std::uint16_t protocol = 
 
 // Participant `from` announces itself with `data`, and its statuses arrive.
 void arrive(PeerTable& table, const Guid& from, const std::string& data,
-             const std::string& address = "") {
+            const std::string& address = "") {
   table.participant(from, data, address);
   table.alive(from);
 }
