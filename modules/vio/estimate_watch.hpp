@@ -15,10 +15,9 @@ struct ImageFit {
 ///
 /// An image contradicts the estimate if more than kContradictingShare of its points do. The tracker
 /// has already dropped the points that contradict the common motion of the others. Each other point
-/// contradicts a right estimate with a probability of at most 0.05 (README, "Images that contradict
-/// the estimate"). By the binomial distribution an image of kMinPoints points then contradicts it
-/// with a probability below kFalseRate, and an image of more points with a lower one. Images with
-/// fewer points are not judged.
+/// contradicts a right estimate with a probability of at most 0.05. By the binomial distribution an
+/// image of kMinPoints points then contradicts it with a probability below kFalseRate, and an image
+/// of more points with a lower one. Images with fewer points are not judged.
 ///
 /// A cumulative sum decides over the sequence of images (Page, "Continuous Inspection Schemes",
 /// Biometrika 1954). It adds the logarithms of the likelihood ratios and is never below zero. The

@@ -4,7 +4,7 @@
 const keyOf = ({of, cell, part}) => `${of} ${cell} ${part}`;
 
 const GONE_S = 10;
-const HOLE_S = 1, HOLE_INTERVALS = 5;  // as in pose_holes.hpp
+const HOLE_S = 1, HOLE_INTERVALS = 5;  // as pose_holes()
 
 const median = (values) => [...values].sort((a, b) => a - b)[values.length >> 1];
 

@@ -281,7 +281,7 @@ CommandResult run_tool(const std::string& arguments) {
   return run_command(std::string(KM_BIN_DIR) + "/kimera_multi_vocabulary " + arguments);
 }
 
-// checks.md L5 on real images, through the tool.
+// On real images, through the tool.
 TEST_CASE("The tool trains on real images and distinguishes the two places",
           "[place_recognition]") {
   const auto images = shared_data("kimera_vio_lcd");
