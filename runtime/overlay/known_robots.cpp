@@ -120,12 +120,6 @@ bool KnownRobots::knows(RobotId neighbour, const TeamPeer& peer) const {
   return held != holds.end() && held->second.origin == peer;
 }
 
-bool KnownRobots::awaits_introduction(RobotId neighbour, RobotId robot) const {
-  const Neighbour& of = neighbours_.at(neighbour);
-  return !of.introduced_s.contains(robot) && !of.holds.contains(robot) &&
-         !links_.receives(neighbour, robot);
-}
-
 void KnownRobots::sign(OverlayMessage& message) const {
   if (keys_) endorse(message, *keys_);
 }

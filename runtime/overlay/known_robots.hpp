@@ -88,8 +88,6 @@ class KnownRobots {
   };
   /// Processes an introduction by a neighbour.
   Introduced introduce(const OverlayMessage& message);
-  /// True if the neighbour reports no process of this robot, and has got no introduction of it.
-  [[nodiscard]] bool awaits_introduction(RobotId neighbour, RobotId robot) const;
   /// Introduction of a robot for a neighbour; nullopt if the neighbour knows the robot, or if the
   /// robot cannot be introduced or was introduced a moment ago.
   [[nodiscard]] std::optional<OverlayMessage> introduction(RobotId neighbour, RobotId robot,

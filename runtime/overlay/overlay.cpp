@@ -101,7 +101,8 @@ bool Overlay::take_in(Meeting meeting, const TeamPeer& peer) {
 void Overlay::step(double now_s) {
   robots_.expire(now_s);
   std::vector<TeamPeer> links = robots_.own_links();
-  if (links != published_links_) {
+  if (links != published_links_ && now_s - links_s_ >= kLinksPeriod_s) {
+    links_s_ = now_s;
     published_links_ = std::move(links);
     publish(OverlayStream::kLinks, encode_links(published_links_), now_s);
   }

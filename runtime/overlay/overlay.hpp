@@ -66,6 +66,9 @@ class Overlay {
   static constexpr double kMissedAfter_s = 20.0;
   /// Least time between two renewals of the writers to one neighbour.
   static constexpr double kRenewEvery_s = 60.0;
+  /// Least time between two reports of links: a robot that joins a large team meets its robots one
+  /// after the other.
+  static constexpr double kLinksPeriod_s = 0.5;
 
   /// Without `keys` nothing is signed. Messages are passed and delivered without signatures.
   explicit Overlay(TeamPeer self, std::optional<OverlayKeys> keys = {})
@@ -150,6 +153,7 @@ class Overlay {
   MessageStore store_;
   std::uint64_t links_version_ = 0;        // version of the links at the last step()
   std::vector<TeamPeer> published_links_;  // content of the last state kLinks
+  double links_s_ = -kLinksPeriod_s;       // time of the last state kLinks
   std::set<RobotId> reachable_;            // robots out of range to which a route is known
 };
 

@@ -83,10 +83,12 @@ bool SpreadStates::hold(std::optional<Held>& held, Held newer) {
 }
 
 // True if the robots may soon receive each other: only one end has reported the link, or this robot
-// receives both, and the first does not know the second yet. If another robot has introduced the
-// origin to this robot, that robot has already waited.
-bool SpreadStates::may_be_linked(RobotId next, RobotId origin) const {
-  const bool is_new = robots_.receives(origin) && robots_.awaits_introduction(next, origin);
+// receives both, and one of them only recently. If another robot has introduced the origin to this
+// robot, that robot has already waited.
+bool SpreadStates::may_be_linked(RobotId next, RobotId origin, double now_s) const {
+  const auto from = receivers_.find(origin);
+  const bool is_new = from != receivers_.end() &&
+                      now_s - std::max(from->second.met_s, receivers_.at(next).met_s) < kMeeting_s;
   return is_new || links().receives(next, origin) || links().receives(origin, next);
 }
 
@@ -100,14 +102,14 @@ void SpreadStates::pass_on(RobotId from, const Key& key, double now_s) {
 void SpreadStates::offer(RobotId next, const Key& key, double now_s) {
   const RobotId origin = key.first;
   if (next == origin || links().linked(next, origin)) return;
-  if (origin != robots_.self().robot && may_be_linked(next, origin))
+  if (origin != robots_.self().robot && may_be_linked(next, origin, now_s))
     receivers_.at(next).due_s.try_emplace(key, now_s + kMeeting_s);
   else
     send(next, key, now_s);
 }
 
 void SpreadStates::connected(RobotId robot, double now_s) {
-  receivers_[robot] = {.repair_s = now_s + kRepairAfter_s};
+  receivers_[robot] = {.met_s = now_s, .repair_s = now_s + kRepairAfter_s};
   for (const auto& [origin, states] : origins_)
     for (std::size_t kind = 0; kind < kStateStreams; ++kind)
       if (states[kind]) offer(robot, {origin, kind}, now_s);
@@ -153,7 +155,7 @@ void SpreadStates::step(double now_s) {
   for (auto& [robot, receiver] : receivers_)
     for (auto due = receiver.due_s.begin(); due != receiver.due_s.end();) {
       const Key key = due->first;
-      if (due->second > now_s && may_be_linked(robot, key.first)) {
+      if (due->second > now_s && may_be_linked(robot, key.first, now_s)) {
         ++due;
         continue;
       }

@@ -37,10 +37,11 @@ class SpreadStates {
   /// sessions and public poses of a thousand keyframes of a hundred robots fit.
   static constexpr std::size_t kMaxHeldFromOne = 4U << 20U;
   static constexpr double kRepairAfter_s = 1.0;
-  /// Time for which a link is awaited that both ends have not reported yet. States of a robot are
-  /// not forwarded to another one meanwhile, nor is the robot introduced to it. Robots in range of
-  /// each other discover a new robot within a tenth of a second of each other.
-  static constexpr double kMeeting_s = 0.2;
+  /// Two robots that this one receives have this time to report a link between them, from its
+  /// first meeting with one of them, or from the report of one end. States of a robot are not
+  /// forwarded to the other meanwhile, nor is the robot introduced to it. 32 processes on two cores
+  /// discover each other within three seconds, and two pairs of a robot mostly within one.
+  static constexpr double kMeeting_s = 1.5;
 
   /// Both outlive this object; the packets to send are appended to `packets`.
   SpreadStates(KnownRobots& robots, std::vector<OverlayPacket>& packets)
@@ -87,6 +88,7 @@ class SpreadStates {
     bool confirmed = false;  // the neighbour has shown that it has it
   };
   struct Receiver {
+    double met_s = 0.0;
     std::map<Key, Served> served = {};
     std::map<Key, double> due_s = {};  // states to send then, unless they arrive another way
     bool differs = false;              // the last hash was another one
@@ -98,7 +100,7 @@ class SpreadStates {
   [[nodiscard]] bool hold(std::optional<Held>& held, Held newer);
   [[nodiscard]] bool may_forward(const Held& held) const;
   [[nodiscard]] std::size_t held_bytes(const Held& held) const;
-  [[nodiscard]] bool may_be_linked(RobotId next, RobotId origin) const;
+  [[nodiscard]] bool may_be_linked(RobotId next, RobotId origin, double now_s) const;
   void repair(RobotId robot, double now_s);
   void pass_on(RobotId from, const Key& key, double now_s);
   void offer(RobotId next, const Key& key, double now_s);

@@ -1,6 +1,8 @@
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <map>
 #include <memory>
+#include <random>
 #include <set>
 #include <utility>
 #include <vector>
@@ -46,6 +48,27 @@ TEST_CASE("all robots receive each state once, over any links", "[overlay]") {
     const std::size_t own = id == 1 || id == 3 || id == 6 ? 1 : 0;
     CHECK(network.read(id, kPoses).size() == 3 - own);
   }
+}
+
+TEST_CASE("robots that meet one after the other forward nothing", "[overlay]") {
+  constexpr RobotId kRobots = 16;
+  Links links;
+  for (RobotId a = 0; a < kRobots; ++a)
+    for (RobotId b = 0; b < a; ++b) links.emplace_back(b, a);
+  std::mt19937 random(GENERATE(1U, 2U, 3U));
+  std::ranges::shuffle(links, random);
+  Network network(kRobots);
+  std::size_t reports = 0;
+  network.tamper([&](const OverlayMessage&) { ++reports; });
+  for (const auto& [a, b] : links) {
+    network.link(a, b);
+    network.wait(0.9 / static_cast<double>(links.size()));
+  }
+  network.run(3.0);
+  CHECK(network.packets() == 0);
+  CHECK(reports <= kRobots * (kRobots - 1) * 3);
+  for (RobotId id = 0; id < kRobots; ++id)
+    CHECK(network.at(id).robots().links().component(id).size() == kRobots);
 }
 
 TEST_CASE("the states of a full team reach all robots of a line", "[overlay]") {
