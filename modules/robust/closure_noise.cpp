@@ -36,7 +36,7 @@ constexpr double kNotable = 1.3;
 constexpr double kDistinct = 2.0;
 
 // Prior standard deviation of the relative error of length of a robot's odometry, under the
-// hypothesis that its odometry has such an error. Sensitivity: METHOD.md.
+// hypothesis that its odometry has such an error.
 constexpr double kLengthSigma = 0.5;
 constexpr int kLengthSteps = 5;
 
