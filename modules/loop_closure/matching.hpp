@@ -13,8 +13,7 @@ namespace km {
 
 /// The first 96 of the 256 tests of each descriptor. The tests of ORB are sorted by a greedy search
 /// for tests of high variance that are independent of those before (Rublee et al., "ORB", ICCV
-/// 2011, Sec. 4.3), so the first ones distinguish points best. The module's README compares numbers
-/// of bytes.
+/// 2011, Sec. 4.3), so the first ones distinguish points best.
 [[nodiscard]] std::vector<MatchedDescriptor> orb_bits(
     std::span<const BinaryDescriptor> descriptors);
 
