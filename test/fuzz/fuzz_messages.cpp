@@ -1,4 +1,4 @@
-// libFuzzer's entry: the first byte chooses the topic, the rest is its message. See README.md.
+// libFuzzer's entry: the first byte chooses the topic, the rest is its message. See idl/README.md.
 #include <cstddef>
 #include <cstdint>
 
