@@ -153,7 +153,7 @@ class Overlay {
   MessageStore store_;
   std::uint64_t links_version_ = 0;        // version of the links at the last step()
   std::vector<TeamPeer> published_links_;  // content of the last state kLinks
-  double links_s_ = -kLinksPeriod_s;       // time of the last state kLinks
+  double links_s_ = -1e9;                  // time of the last state kLinks
   std::set<RobotId> reachable_;            // robots out of range to which a route is known
 };
 

@@ -84,8 +84,8 @@ TEST_CASE("a robot that resumes, or restarts without its data, takes part again"
   (void)network.run(1.0);
   const std::uint64_t next = resumes ? next_boot(boot) : 2U << kResumeBits;
   feed(network.add({back, next}, {}, gather()), back, problem);
-  (void)network.run(0.5);
-  if (!resumes)  // closures to the new process are found again
+  (void)network.run(2.0 * SpreadStates::kMeeting_s);  // all robots know the new process
+  if (!resumes)                                       // closures to it are found again
     for (const RobotId id : kIds) feed_closures(network.agent(id), id, problem, 3);
   (void)network.run(1.0);
   REQUIRE(settle(network));
