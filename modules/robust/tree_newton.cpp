@@ -259,8 +259,7 @@ std::vector<SolverMessage> TreeNewton::go_down(const DownMessage& message) {
             .noise_scale = v.noise_scale,
             .odometry_noise = edges_.odometry_noise(),
             .barc = options_.robust ? v.barc : 0.0,
-            .deferred = state_.deferred ||
-                        ((v.next == Next::kStart || v.next == Next::kDone) && v.deferred),
+            .deferred = v.next == Next::kDone && v.deferred,
             .failed = state_.failed};
   if (!done()) phase_ = Phase::kUp;
   std::vector<SolverMessage> messages;
@@ -276,7 +275,7 @@ std::vector<SolverMessage> TreeNewton::go_down(const DownMessage& message) {
 void TreeNewton::compute_covariances(const TreeInverse& from_parent) {
   const bool known =
       factorised_ && !front_->damped() && !(place_.parent && from_parent.diagonal.empty());
-  if (!options_.covariances || !known) return;
+  if (!options_.covariances || !known || verdict_.deferred) return;
   // nullopt also if the message of the parent does not fit: the poses are final nevertheless.
   const std::optional<BlockMatrix> solved =
       place_.parent ? front_->inverse(from_parent)

@@ -52,7 +52,10 @@ constexpr double kMostRejected = 0.03;
 constexpr double kPullOfMean = 6.0;
 constexpr double kPullOfOne = 1.0;
 
-constexpr double kNearlyConverged = 1e-8;  // predicted decrease of a step, relative to the cost
+// Predicted decrease of a step, relative to the cost: of nearly converged poses, and of poses from
+// which a second look starts.
+constexpr double kNearlyConverged = 1e-8;
+constexpr double kGoodStart = 1e-9;
 
 constexpr std::size_t kEnoughPairs = 3;  // for the noise of the usual pair
 
@@ -170,8 +173,6 @@ DownMessage TreeRoot::decide_start(const TreeSums& sums, std::uint32_t round) {
     const bool deferred = sums.left > kFewOpen && enough && joined(members_, sums.votes);
     return start(deferred, deferred ? sums : *first_);
   }
-  const bool weighs = options_.robust && members_.size() > 1;
-  if (again_ && weighs && sums.open == 0) return answer(Next::kStop);
   if (!odometry_is_noisy_ && options_.robust && !again_) {
     const auto noise = likely_odometry_noise(sums.votes);
     if (!noise.empty()) {
@@ -188,7 +189,7 @@ DownMessage TreeRoot::decide_start(const TreeSums& sums, std::uint32_t round) {
   const double margin = noise_scale_ < 1.0 ? std::min(1.0, kMargin * noise_scale_) : noise_scale_;
   barc_ = options_.barc > 0.0 ? options_.barc : margin * default_threshold(options_.dimension);
   may_defer_ = !again_ && noise && noise->consistent >= kMostlyConsistent && sums.open > kFewOpen;
-  alone_ = weighs && sums.open > 0;
+  alone_ = options_.robust && members_.size() > 1 && sums.open > 0;
   DownMessage message = may_defer_ || alone_ ? answer(Next::kCount) : start(false, sums);
   if (message.verdict.next == Next::kCount) message.verdict.deferred = may_defer_;
   if (options_.robust && free_ && !again_ && sums.open > 0)
@@ -200,6 +201,7 @@ DownMessage TreeRoot::start(bool deferred, const TreeSums& sums) {
   schedule_.start(sums.largest, options_.robust ? sums.open : 0, barc_);
   if (options_.robust) usual_pair_ = usual_strength(motions_of(sums.votes));
   weighing_ = schedule_.decided() ? Weighing::kDecided : Weighing::kWeigh;
+  deferred_ = deferred;
   DownMessage message = answer(Next::kStart);
   message.verdict.deferred = deferred;
   message.verdict.weigh_all = !alone_;
@@ -242,7 +244,10 @@ DownMessage TreeRoot::step(const TreeSums& sums, const TreeFront& front,
   if (!far && weighing_ != Weighing::kHold) schedule_.next({sums.changed, sums.fractional});
   if (decrement_ <= kNearRounding * (1.0 + cost_))
     for (double* limit : {&options_.tolerance, &options_.absolute_tolerance}) *limit *= kRelax;
-  const bool small = 0.5 * decrement_ <= options_.tolerance * cost_ + options_.absolute_tolerance;
+  const bool looks_again = deferred_ || (!again_ && sums.left > 0);
+  const double tolerance =
+      looks_again ? std::max(kGoodStart, options_.tolerance) : options_.tolerance;
+  const bool small = 0.5 * decrement_ <= tolerance * cost_ + options_.absolute_tolerance;
   // Weights are decided before the poses have converged. If the converged poses contradict them,
   // closures are weighed again. A second look mostly rejects closures that it has reopened.
   const bool contradicts = alone_ && !again_ && sums.rejected >= kLeastRejected &&
@@ -271,7 +276,7 @@ DownMessage TreeRoot::step(const TreeSums& sums, const TreeFront& front,
     noise_scale_ =
         noise_allowed(noise_scale_, cost_, sums.kept, members_.size(), options_.dimension);
     DownMessage message = answer(Next::kDone);
-    message.verdict.deferred = !again_ && sums.left > 0;
+    message.verdict.deferred = looks_again;
     return message;
   }
   if (decided && worth_refreshing(decrement_)) {

@@ -68,6 +68,7 @@ class TreeRoot {
   bool odometry_is_noisy_ = false;  // by cycles through other robots
   bool alone_ = false;              // robots have decided the closures inside them
   bool may_defer_ = false;          // closures that stand alone are probably false
+  bool deferred_ = false;           // they wait for a second look
   std::uint32_t round_ = 0;
   double barc_ = 0.0;
   double noise_scale_ = 1.0;

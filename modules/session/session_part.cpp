@@ -222,13 +222,11 @@ void SessionPart::solve(double now_s) {
   if (!solver_->done()) return;
   const SolverState state = solver_->state();
   if (state.failed) return fail("the team's equations cannot be solved");
-  // A second look without closures to weigh ends in its first round: the first one is the result.
-  if (state_ == SessionState::kSolving || state.round > 1)
-    result_ = {.state = progress(),
-               .verdicts = solver_->verdicts(),
-               .noise = solver_->noise(),
-               .covariances = solver_->covariances(),
-               .poses = solver_->poses()};
+  result_ = {.state = progress(),
+             .verdicts = solver_->verdicts(),
+             .noise = solver_->noise(),
+             .covariances = solver_->covariances(),
+             .poses = solver_->poses()};
   solver_.reset();
   if (state.deferred && state_ == SessionState::kSolving) return look_again();
   take(SessionEvent::kConverged);
