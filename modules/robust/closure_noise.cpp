@@ -35,25 +35,18 @@ constexpr double kNotable = 1.3;
 // METHOD.md.
 constexpr double kDistinct = 2.0;
 
-// Prior standard deviation of the relative error of length of a robot's odometry, under the
-// hypothesis that its odometry has such an error.
-constexpr double kLengthSigma = 0.5;
-constexpr int kLengthSteps = 5;
-
 struct Posterior {
   double log_density = 0.0;  // log posterior density of the factor s, up to a constant
   double distinct = 0.0;     // mean log density ratio of a cycle to a false one
 };
 
 // Log density ratio of a cycle, true over false. Closures are `s` times and odometry is `odometry`
-// times noisier than claimed. `length`: relative excess length of the odometry of each robot.
-double log_ratio_of(const NoiseCycle& cycle, double s, double odometry,
-                    const Eigen::Vector2d& length = Eigen::Vector2d::Zero()) {
+// times noisier than claimed.
+double log_ratio_of(const NoiseCycle& cycle, double s, double odometry) {
   double log_if_true = 0.0;
   for (std::size_t k = 0; k < cycle.axes; ++k) {
     const double variance = odometry * odometry + s * s * static_cast<double>(cycle.variance[k]);
-    const double error =
-        cycle.error[k] - length(0) * cycle.by_length[0][k] - length(1) * cycle.by_length[1][k];
+    const double error = cycle.error[k];
     log_if_true -= 0.5 * (error * error / variance + std::log(variance));
   }
   return log_if_true - static_cast<double>(cycle.log_if_false);
@@ -125,56 +118,6 @@ double log_odds(std::span<const NoiseCycle> cycles, double observations, double 
          posterior_of(cycles, weights, other, other, odometry).log_density;
 }
 
-// The errors of length of the odometry of both robots that explain these cycles best, by least
-// squares.
-Eigen::Vector2d fit_length(std::span<const NoiseCycle> cycles, std::span<const double> weights,
-                           double s, double odometry) {
-  Eigen::Matrix2d H = Eigen::Matrix2d::Identity() / (kLengthSigma * kLengthSigma);
-  Eigen::Vector2d g = Eigen::Vector2d::Zero();
-  for (std::size_t c = 0; c < cycles.size(); ++c)
-    for (std::size_t k = 0; k < cycles[c].axes; ++k) {
-      const double variance =
-          odometry * odometry + s * s * static_cast<double>(cycles[c].variance[k]);
-      const Eigen::Vector2d d(cycles[c].by_length[0][k], cycles[c].by_length[1][k]);
-      H += weights[c] / variance * d * d.transpose();
-      g += weights[c] / variance * cycles[c].error[k] * d;
-    }
-  return H.ldlt().solve(g);
-}
-
-// Log of the odds that the odometry of the robots has another length, against usual noise alone.
-// Every cycle proposes the lengths that explain it; the best proposal is fitted to all true cycles.
-double log_odds_of_length(std::span<const NoiseCycle> cycles, std::span<const double> weights,
-                          double usual, double odometry) {
-  std::vector<double> is_true;
-  const auto log_density = [&](const Eigen::Vector2d& length) {
-    std::vector<double> log_ratio;
-    for (const NoiseCycle& cycle : cycles)
-      log_ratio.push_back(log_ratio_of(cycle, usual, odometry, length));
-    const CycleMixture mixture = fit_cycle_mixture(log_ratio, weights);
-    is_true.clear();
-    for (std::size_t k = 0; k < cycles.size(); ++k)
-      is_true.push_back(weights[k] * mixture.true_probability(log_ratio[k]));
-    return mixture.log_likelihood - 0.5 * length.squaredNorm() / (kLengthSigma * kLengthSigma);
-  };
-  const double without = log_density(Eigen::Vector2d::Zero());
-  double most = without;
-  Eigen::Vector2d best = Eigen::Vector2d::Zero();
-  for (std::size_t k = 0; k < cycles.size(); ++k) {
-    const Eigen::Vector2d length =
-        fit_length(cycles.subspan(k, 1), std::array{1.0}, usual, odometry);
-    if (const double found = log_density(length); found > most) {
-      most = found;
-      best = length;
-    }
-  }
-  for (int i = 0; i < kLengthSteps; ++i) {
-    most = std::max(most, log_density(best));
-    best = fit_length(cycles, is_true, usual, odometry);
-  }
-  return most - without;
-}
-
 // Log of the odds that some cycles have the usual noise and those of the factor `s` are false,
 // against all of them having this factor.
 double log_odds_of_two(std::span<const NoiseCycle> cycles, std::span<const double> weights,
@@ -202,17 +145,15 @@ double factor_of(std::span<const NoiseCycle> cycles, double observations, double
           kThousandToOne;
   if (!likely) return usual;
   const std::vector<double> weights = weights_of(cycles, observations);
-  if (log_odds_of_two(cycles, weights, usual, found.factor, odometry) >= kThousandToOne)
-    return usual;
-  const bool other_length = log_odds_of_length(cycles, weights, usual, odometry) > found.log_odds;
-  return other_length ? usual : found.factor;
+  const bool is_two =
+      log_odds_of_two(cycles, weights, usual, found.factor, odometry) >= kThousandToOne;
+  return is_two ? usual : found.factor;
 }
 
 }  // namespace
 
 NoiseCycle NoiseCycle::of(const Vector6& e, const Matrix6& Sigma_o, const Matrix6& Sigma_c,
-                          double log_if_false, int dimension,
-                          const std::array<Vector6, 2>& by_length) {
+                          double log_if_false, int dimension) {
   const Eigen::Index first = dimension == 2 ? 2 : 0;
   const Eigen::Index size = dimension == 2 ? 3 : 6;
   const Eigen::MatrixXd odometry = Sigma_o.block(first, first, size, size);
@@ -228,9 +169,7 @@ NoiseCycle NoiseCycle::of(const Vector6& e, const Matrix6& Sigma_o, const Matrix
             .cast<float>();
     return white;
   };
-  NoiseCycle cycle{.error = whitened(e),
-                   .axes = static_cast<std::size_t>(size),
-                   .by_length = {whitened(by_length[0]), whitened(by_length[1])}};
+  NoiseCycle cycle{.error = whitened(e), .axes = static_cast<std::size_t>(size)};
   for (Eigen::Index k = 0; k < size; ++k) {
     cycle.variance[static_cast<std::size_t>(k)] =
         static_cast<float>(std::max(0.0, eigen.values(k)));

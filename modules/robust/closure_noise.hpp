@@ -20,16 +20,12 @@ struct NoiseCycle {
   std::array<float, 6> variance = {};  ///< Claimed for the two closures, relative to the odometry.
   std::size_t axes = 6;                ///< Number of entries; 3 in the plane.
   float log_if_false = 0.0F;           ///< Log density if a closure is false, in these coordinates.
-  /// Derivatives of `error` with respect to the relative length of the odometry of each robot.
-  std::array<std::array<float, 6>, 2> by_length = {};
 
   /// The cycle with the error `e`. Its covariances are `Sigma_o` of the odometry and `Sigma_c` of
   /// the two closures, both positive definite (`dimension` 2: on rows 2, 3 and 4). `log_if_false`
-  /// is that of `e`, see log_density_if_false(). `by_length`: the derivatives of `e`.
+  /// is that of `e`, see log_density_if_false().
   [[nodiscard]] static NoiseCycle of(const Vector6& e, const Matrix6& Sigma_o,
-                                     const Matrix6& Sigma_c, double log_if_false, int dimension,
-                                     const std::array<Vector6, 2>& by_length = {Vector6::Zero(),
-                                                                                Vector6::Zero()});
+                                     const Matrix6& Sigma_c, double log_if_false, int dimension);
 };
 
 /// The cycles of one pair of robots (or of the closures inside one robot).

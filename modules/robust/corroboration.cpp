@@ -27,7 +27,6 @@ constexpr std::uint32_t kStepsBetweenPlaces = 60;
 constexpr double kPossible = 0.5;
 // Precision of an identity.
 constexpr Precision kExact{1e18, 1e18};
-constexpr double kLonger = 0.01;  // relative step of numeric derivatives by length
 // Largest standard deviation of the rotation of odometry in a cycle between two places. Errors of
 // cycles with a larger one are not normally distributed.
 constexpr double kLargestTurnSigma_rad = 0.5;
@@ -118,15 +117,8 @@ void Corroboration::count_lengths(NoiseHistogram& histogram, std::size_t most) c
 NoiseCycle Corroboration::noise_cycle(const Upward& one, const Upward& other, double volume) const {
   const TwoClosureCycle cycle = cycle_of(one, other, true);
   const Vector6 error = se3_log(cycle.T());
-  // Derivative of the error by the relative length of one chain of odometry.
-  const auto by_length = [&](UncertainPose TwoClosureCycle::*chain_of) {
-    TwoClosureCycle longer = cycle;
-    (longer.*chain_of).T.translation() *= 1.0 + kLonger;
-    return Vector6((se3_log(longer.T()) - error) / kLonger);
-  };
   return NoiseCycle::of(error, cycle.covariance_of_odometry(), cycle.covariance_of_closures(),
-                        log_density_if_false(error, volume, dimension_), dimension_,
-                        {by_length(&TwoClosureCycle::below), by_length(&TwoClosureCycle::above)});
+                        log_density_if_false(error, volume, dimension_), dimension_);
 }
 
 double Corroboration::volume() const {
