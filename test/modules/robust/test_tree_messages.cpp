@@ -216,48 +216,11 @@ std::vector<Bytes> one_of_each() {
           encode(some_down_message(TreeVerdict::Next::kStep, TreeVerdict::Weighing::kWeigh))};
 }
 
-// Memory of a decoded message [bytes].
-std::size_t held_by(const UpMessage& message) {
-  std::size_t bytes = sizeof(message) + 64 * message.sums.lengths.size() +
-                      sizeof(PairVote) * message.sums.votes.capacity() +
-                      sizeof(PairPull) * message.sums.pulls.capacity() +
-                      sizeof(NewWeight) * message.weights.capacity() +
-                      sizeof(double) * static_cast<std::size_t>(message.reduced.size());
-  if (!message.system) return bytes;
-  const TreeSystem& s = *message.system;
-  return bytes + sizeof(TreeVariable) * s.variables.capacity() +
-         sizeof(NodePair) * s.pairs.capacity() + sizeof(SentEdge) * s.edges.capacity() +
-         sizeof(double) *
-             static_cast<std::size_t>(s.schur.diagonal.size() + s.schur.coupling.size());
-}
-
-std::size_t held_by(const DownMessage& message) {
-  return sizeof(message) + sizeof(message.verdict.moves[0]) * message.verdict.moves.capacity() +
-         sizeof(message.verdict.released[0]) * message.verdict.released.capacity() +
-         sizeof(double) * static_cast<std::size_t>(message.step.size());
-}
-
-// A coupling of two bytes may result in a block of 36 numbers.
-constexpr std::size_t kMostPerByte = 160;
-
-// Checks that decoding fails, or gives a message that encode() writes as equal bytes, within the
-// memory limit.
+// Checks that decoding fails, or gives a message that encode() writes as equal bytes.
 void check_harmless(const Bytes& bytes) {
-  std::size_t held = 0;
-  bool same = true;
-  if (const auto up = decode_up(bytes)) {
-    same = encode(*up) == bytes;
-    held = held_by(*up);
-  }
-  if (const auto down = decode_down(bytes)) {
-    same = same && encode(*down) == bytes;
-    held = held_by(*down);
-  }
-  if (!same || held > 10000 + kMostPerByte * bytes.size()) {
-    CAPTURE(held, bytes.size());
-    CHECK(same);
-    CHECK(held <= 10000 + kMostPerByte * bytes.size());
-  }
+  if (const auto up = decode_up(bytes); up && encode(*up) != bytes) FAIL_CHECK("another message");
+  if (const auto down = decode_down(bytes); down && encode(*down) != bytes)
+    FAIL_CHECK("another message");
 }
 
 TEST_CASE("A message truncated anywhere is refused", "[pose_graph]") {
