@@ -17,9 +17,12 @@ struct EdgeWeight {
   bool is_open = false;  ///< May be rejected.
   /// Decided by the start: open, but not weighed unless the solution contradicts it.
   bool is_settled = false;
+  bool is_doubted = false;       ///< Rejected by doubt().
+  bool was_lifted = false;       ///< A doubt has been lifted: it is not lifted again.
   bool is_contradicted = false;  ///< The present poses contradict its decided weight.
   double weight = 1.0;           ///< At the accepted poses.
   double candidate = 1.0;        ///< At the present poses.
+  double volume = 1.0;           ///< In which it may end if it is false [m^3], in the plane [m^2].
   double pair_limit = 1.0;       ///< Factor on the weight while the pair of the edge is limited.
   bool is_limited = true;        ///< At the accepted poses.
   bool may_be_limited = true;    ///< At the present poses.
@@ -38,6 +41,13 @@ class EdgeWeights {
   /// these poses. Adds the counts of closures and the pulls of limited pairs to `sums`.
   void weigh(const TreeVerdict& verdict, const FrontEdges& front, std::span<const SE3> present,
              TreeSums& sums);
+  /// Rejects the closures that are likelier false than true, at converged `poses`. The error of a
+  /// closure against all other edges follows from its residual and the `inverse` of the second
+  /// derivatives of the team. If it is true, this error has the covariance of the closure and of
+  /// its ends without it, both scaled by the noise of `verdict`. Earlier doubts are lifted if they
+  /// no longer hold. See Decisions in METHOD.md.
+  void doubt(const TreeVerdict& verdict, const FrontEdges& front, std::span<const SE3> poses,
+             const BlockMatrix& inverse);
   /// The weights at the present poses become the accepted ones.
   void accept();
 
@@ -51,6 +61,7 @@ class EdgeWeights {
                    std::span<const SE3> present, TreeSums& sums);
 
   std::vector<EdgeWeight> edges_;
+  std::uint32_t doubted_ = 0;  // changes by doubt() that no sums have counted
 };
 
 }  // namespace km

@@ -422,6 +422,14 @@ EdgeWeights MemberEdges::weights(const Precision& usual_pair) const {
     sum.kappa += edge.precision.kappa;
     sum.tau += edge.precision.tau;
   }
+  std::map<RobotId, ClosureVolume> volumes;
+  for (const auto& [peer, closures] : by_peer())
+    for (const std::size_t k : closures) {
+      const PoseEdge& e = known_[k].edge;
+      volumes[peer].add_ends(start_of(e.id().from).translation(),
+                             start_of(e.id().to).translation());
+      volumes[peer].add_length(e.T_from_to.translation().norm());
+    }
   std::vector<EdgeWeight> weights;
   for (const Known& k : known_) {
     if (!takes_part(k) || !k.own) continue;
@@ -431,6 +439,7 @@ EdgeWeights MemberEdges::weights(const Precision& usual_pair) const {
               .is_odometry = k.odometry,
               .is_open = k.trust == Trust::kOpen,
               .is_settled = k.settled};
+    if (!k.odometry) weight.volume = volumes.at(weight.peer).of(options_.dimension);
     weight.weight = weight.candidate = k.settled && !k.fits ? 0.0 : 1.0;
     if (!weight.is_between) continue;
     const Precision& sum = sums.at(weight.peer);

@@ -74,6 +74,8 @@ void TreeSums::add(const TreeSums& other) {
   rejected += other.rejected;
   left += other.left;
   fixed += other.fixed;
+  dropped += other.dropped;
+  doubted += other.doubted;
   poses += other.poses;
   for (const auto& [bin, n] : other.lengths) lengths[bin] += n;
   merge_pairs(votes, other.votes, [](PairVote& x, const PairVote& y) { x.used += y.used; });
@@ -104,7 +106,7 @@ void describe(auto& archive, As<PairVote> auto& v) {
 
 void describe(auto& archive, As<TreeSums> auto& s) {
   archive(s.base_cost, s.cost, s.decrement, s.largest, s.largest_of_all, s.open, s.changed,
-          s.fractional, s.kept, s.rejected, s.left, s.fixed, s.poses);
+          s.fractional, s.kept, s.rejected, s.left, s.fixed, s.dropped, s.doubted, s.poses);
   using Length = std::pair<std::uint16_t, std::uint32_t>;
   std::vector<Length> lengths(s.lengths.begin(), s.lengths.end());
   archive.list(lengths, kMaxElements, 2,
@@ -203,7 +205,8 @@ template <typename Number>
 void describe_rows(auto& archive, auto& values) {
   auto rows = static_cast<std::size_t>(values.size());
   archive.count(rows, kMaxElements, sizeof(Number));
-  if constexpr (kReads<decltype(archive)>) values.resize(static_cast<Index>(rows));
+  if constexpr (kReads<decltype(archive)>)
+    values.resize(static_cast<decltype(values.size())>(rows));
   for (auto& value : values) {
     auto number = static_cast<Number>(value);
     archive(number);
@@ -225,12 +228,12 @@ void describe(auto& archive, As<TreeVerdict> auto& v) {
   archive(v.round);
   archive.choice(v.next, TreeVerdict::Next::kStop);
   archive.choice(v.weighing, TreeVerdict::Weighing::kDecided);
-  archive.flags(v.accept, v.full, v.deferred, v.free, v.weigh_all);
-  archive(v.scale, v.mu, v.barc, v.noise_scale, v.usual_noise, v.usual_pair.kappa, v.usual_pair.tau,
-          v.cost, v.gradient);
+  archive.flags(v.accept, v.full, v.deferred, v.free, v.weigh_all, v.restart);
+  archive(v.scale, v.mu, v.barc, v.noise_scale, v.doubt, v.usual_noise, v.usual_pair.kappa,
+          v.usual_pair.tau, v.cost, v.gradient);
   archive.require(v.scale > 0.0 && v.scale <= 1.0 && v.mu >= 0.0 && v.barc >= 0.0 &&
-                  v.noise_scale > 0.0 && v.usual_noise >= 1.0 && v.usual_pair.kappa > 0.0 &&
-                  v.usual_pair.tau > 0.0 && v.gradient >= 0.0);
+                  v.noise_scale > 0.0 && v.doubt >= 0.0 && v.usual_noise >= 1.0 &&
+                  v.usual_pair.kappa > 0.0 && v.usual_pair.tau > 0.0 && v.gradient >= 0.0);
   for (auto& x : v.drift) archive(x);
   archive.list(v.moves, kMaxElements, 29, [&](auto& move) { archive(move.first, move.second); });
   archive.list(v.odometry, kMaxElements, 9, [&](auto& noise) {
@@ -240,15 +243,32 @@ void describe(auto& archive, As<TreeVerdict> auto& v) {
   archive.list(v.released, kMaxElements, 2, [&](auto& pair) { archive(pair.first, pair.second); });
 }
 
+void archive_fixed(auto& archive, auto& number) {
+  if constexpr (std::is_same_v<std::remove_cvref_t<decltype(number)>, double>) {
+    archive(number);
+  } else {
+    auto bits = static_cast<std::uint16_t>(number);
+    archive.fixed(bits);
+    if constexpr (kReads<decltype(archive)>) number = static_cast<std::int16_t>(bits);
+  }
+}
+
+template <typename Number, typename Correlation>
+void describe_inverse(auto& archive, As<TreeInverse> auto& inverse) {
+  describe_rows<Number>(archive, inverse.diagonal);
+  archive.list(inverse.correlations, kMaxElements, sizeof(Correlation), [&](auto& correlation) {
+    auto rounded = static_cast<Correlation>(correlation);
+    archive_fixed(archive, rounded);
+    if constexpr (kReads<decltype(archive)>) correlation = static_cast<double>(rounded);
+  });
+}
+
 void describe(auto& archive, As<DownMessage> auto& m) {
   archive(m.verdict);
   describe_rows<float>(archive, m.step);
-  archive.list(m.inverse.diagonal, kMaxElements, sizeof(float));
-  archive.list(m.inverse.correlations, kMaxElements, sizeof(std::int16_t), [&](auto& correlation) {
-    auto bits = static_cast<std::uint16_t>(correlation);
-    archive.fixed(bits);
-    if constexpr (kReads<decltype(archive)>) correlation = static_cast<std::int16_t>(bits);
-  });
+  m.verdict.doubt > 0.0 ? describe_inverse<double, double>(archive, m.inverse)
+                        : describe_inverse<float, std::int16_t>(archive, m.inverse);
+  if constexpr (kReads<decltype(archive)>) m.inverse.fine = m.verdict.doubt > 0.0;
 }
 
 namespace {

@@ -46,8 +46,10 @@ struct TreeSums {
   std::uint32_t fractional = 0;  ///< Open closures with a weight between 0 and 1.
   std::uint32_t kept = 0;        ///< Closures with a weight above one half.
   std::uint32_t rejected = 0;    ///< Open closures between robots with a lower weight.
-  std::uint32_t left = 0;   ///< Closures for a second look: deferred, or rejected and possible.
-  std::uint32_t fixed = 0;  ///< Number of edges to held poses.
+  std::uint32_t left = 0;     ///< Closures for a second look: deferred, or rejected and possible.
+  std::uint32_t fixed = 0;    ///< Number of edges to held poses.
+  std::uint32_t dropped = 0;  ///< Closures with a weight of at most one half.
+  std::uint32_t doubted = 0;  ///< Closures that a doubt has changed, see EdgeWeights::doubt().
   std::uint32_t poses = 0;
   std::map<std::uint16_t, std::uint32_t> lengths = {};  ///< See NoiseHistogram; at the start only.
   std::vector<PairVote> votes = {};                     ///< Ascending by (a, b).
@@ -94,11 +96,15 @@ struct TreeVerdict {
   /// kStart, kRefresh: also weigh the closures that robots have decided. kRefresh: the start
   /// poses are the accepted ones again.
   bool weigh_all = false;
+  bool restart = false;  ///< kRefresh: the start poses are the accepted ones again.
   Weighing weighing = Weighing::kDecided;
   double scale = 1.0;
   double mu = 0.0;           ///< For the next weights.
   double barc = 0.0;         ///< Largest residual of an inlier [sigma].
   double noise_scale = 1.0;  ///< kDone: at most what the cost of the solution allows.
+  /// kStep: first, closures are compared with all other edges, see EdgeWeights::doubt(). All noise
+  /// is this many times the claimed one. 0: they are not compared.
+  double doubt = 0.0;
   double usual_noise = 1.0;  ///< kStart: see usual_pair_noise().
   /// kCount, kStart: first these robots are moved as a whole, see common_placement(). Ascending.
   std::vector<std::pair<RobotId, SinglePose>> moves = {};
@@ -123,7 +129,7 @@ struct DownMessage {
   TreeVerdict verdict;
   /// Step of the variables of the child, in single precision; kStep only.
   Eigen::VectorXd step = {};
-  TreeInverse inverse = {};  ///< For the variables of the child; kDone only, empty if unknown.
+  TreeInverse inverse = {};  ///< For the variables of the child; kDone or doubt, empty if unknown.
 };
 
 [[nodiscard]] std::vector<std::uint8_t> encode(const UpMessage& message);

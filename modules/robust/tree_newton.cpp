@@ -232,6 +232,7 @@ std::vector<SolverMessage> TreeNewton::go_down(const DownMessage& message) {
       break;
     case Next::kStep:
       accept();
+      if (v.doubt > 0.0) doubt(message.inverse);
       take_step(message.step, step_of_child);
       move(v.scale);
       break;
@@ -240,7 +241,7 @@ std::vector<SolverMessage> TreeNewton::go_down(const DownMessage& message) {
       break;
     case Next::kRefresh:
       if (v.accept) accept();
-      if (v.weigh_all) return_to_start();
+      if (v.weigh_all || v.restart) return_to_start();
       present_ = base_;
       refresh_ = true;
       break;
@@ -268,6 +269,17 @@ std::vector<SolverMessage> TreeNewton::go_down(const DownMessage& message) {
     messages.push_back(message_to(child, encode(down)));
   }
   return messages;
+}
+
+void TreeNewton::doubt(const TreeInverse& from_parent) {
+  if (!factorised_ || front_->damped() || (place_.parent && from_parent.diagonal.empty())) return;
+  const std::optional<BlockMatrix> inverse =
+      place_.parent ? front_->inverse(from_parent)
+                    : front_->inverse_about_held(edges_.graph().upright);
+  if (!inverse) return;
+  weights_->doubt(verdict_, front_->own(), base_, *inverse);
+  for (const RobotId child : place_.children)
+    inverse_of_child_[child] = front_->inverse_of_child(child, *inverse, true);
 }
 
 // The cost is chi-squared distributed, so the covariance is twice the inverse of its second

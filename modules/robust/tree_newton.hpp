@@ -45,6 +45,7 @@ class TreeNewton final : public MemberSolver {
   void move(double scale);
   void accept();
   void finish();
+  void doubt(const TreeInverse& from_parent);
   void compute_covariances(const TreeInverse& from_parent);
 
   TreeNewtonOptions options_;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <utility>
 
@@ -52,10 +53,18 @@ constexpr double kMostRejected = 0.03;
 constexpr double kPullOfMean = 6.0;
 constexpr double kPullOfOne = 1.0;
 
+// Closures are doubted if all noise is at most this many times the claimed one. Limits on residuals
+// are then too wide for false closures. Two false ones may hide each other, so there are more
+// doubts.
+constexpr double kClaimsTooMuch = 0.5;
+constexpr int kMaxDoubts = 4;
+
 // Predicted decrease of a step, relative to the cost: of nearly converged poses, and of poses from
 // which a second look starts.
 constexpr double kNearlyConverged = 1e-8;
 constexpr double kGoodStart = 1e-9;
+// Largest ratio of the predicted decreases at two second derivatives that make progress.
+constexpr double kProgress = 0.5;
 
 constexpr std::size_t kEnoughPairs = 3;  // for the noise of the usual pair
 
@@ -91,21 +100,17 @@ double usual_pair_noise(const std::vector<PairVote>& votes) {
   return static_cast<double>(*middle);
 }
 
-// The noise scale that the solution allows, at most `scale`. False closures that agree roughly with
-// each other look like noisy ones at first, and are rejected later. `cost` is at least that of the
-// kept closures. With closures s times noisier than stated, it is s^2 times a chi-squared variable
-// of their cycles. The result is the upper end of the one-sided interval for s of 99 % (quantile by
-// Wilson and Hilferty, PNAS 1931), and at least 1.
-double noise_allowed(double scale, double cost, std::uint32_t kept, std::size_t members,
-                     int dimension) {
+// The largest noise scale that a solution allows. `cost` is at least that of the kept closures.
+// With closures s times noisier than stated, it is s^2 times a chi-squared variable of their
+// cycles. The result is the upper end of the one-sided interval for s of 99 % (quantile by Wilson
+// and Hilferty, PNAS 1931); infinity if there are no cycles.
+double noise_allowed(double cost, std::uint32_t kept, std::size_t members, int dimension) {
   constexpr double kQuantile = -2.326;  // quantile of the normal distribution at 1 %
   const double cycles = static_cast<double>(kept) - static_cast<double>(members - 1);
-  if (scale <= 1.0 || cycles < 1.0) return scale;
+  if (cycles < 1.0) return std::numeric_limits<double>::infinity();
   const double freedom = (dimension == 2 ? 3.0 : 6.0) * cycles;
   const double v = 2.0 / (9.0 * freedom);
-  const double quantile = freedom * std::pow(1.0 - v + kQuantile * std::sqrt(v), 3.0);
-  const double allowed = std::sqrt(cost / quantile);
-  return allowed < scale ? std::max(1.0, allowed) : scale;
+  return std::sqrt(cost / (freedom * std::pow(1.0 - v + kQuantile * std::sqrt(v), 3.0)));
 }
 
 std::vector<std::pair<RobotId, SinglePose>> moves_of(const std::vector<PairVote>& votes) {
@@ -211,6 +216,13 @@ DownMessage TreeRoot::start(bool deferred, const TreeSums& sums) {
 DownMessage TreeRoot::decide(const TreeSums& sums, std::uint32_t round, const TreeFront& front,
                              std::span<const SE3> poses, bool factorised) {
   round_ = round;
+  if (sums.doubted > 0) {
+    may_doubt_ = true;
+    rises_ = backtracks_ = 0;
+    DownMessage message = refresh(false, weighing_);
+    message.verdict.restart = true;
+    return message;
+  }
   const bool may_rise = weighing_ != Weighing::kDecided && rises_ < kMaxRises;
   const double limit = sums.base_cost * (may_rise ? kMaxRise : 1.0 + kCostRounding) + kLeastRise;
   if (!at_base_ && !(sums.cost <= limit)) return go_back();
@@ -272,15 +284,29 @@ DownMessage TreeRoot::step(const TreeSums& sums, const TreeFront& front,
     }
   }
   const bool unlimited = released_ || usual_pair_.tau >= kUnlimited.tau;
-  if ((decided && small && unlimited) || round_ + 1 >= options_.max_rounds) {
-    noise_scale_ =
-        noise_allowed(noise_scale_, cost_, sums.kept, members_.size(), options_.dimension);
+  const double allowed = noise_allowed(cost_, sums.kept, members_.size(), options_.dimension);
+  const bool doubts = may_doubt_ && options_.robust && (again_ || sums.dropped > 0) && decided &&
+                      shows_pulls && nearly && unlimited && allowed < kClaimsTooMuch &&
+                      doubts_ < kMaxDoubts;
+  if ((decided && small && unlimited && !doubts) || round_ + 1 >= options_.max_rounds) {
+    // False closures that agree roughly with each other look like noisy ones at first, and are
+    // rejected later.
+    if (allowed < noise_scale_) noise_scale_ = std::min(noise_scale_, std::max(1.0, allowed));
     DownMessage message = answer(Next::kDone);
     message.verdict.deferred = looks_again;
     return message;
   }
-  if (decided && worth_refreshing(decrement_)) {
-    full_ = true;
+  // Full second derivatives may hold a closure less than its own precision does.
+  if (doubts && (full_ || stale_)) {
+    full_ = false;
+    return refresh(true, weighing_);
+  }
+  if (decided && !doubts && worth_refreshing(decrement_)) {
+    // Couplings are rounded when they are sent. If steps have not become shorter since the last
+    // full ones, soft motions of the team are rounded away; those of Gauss-Newton round
+    // differently.
+    full_ = !full_ || !nearly || decrement_ < kProgress * refreshed_decrement_;
+    refreshed_decrement_ = decrement_;
     convex_ = false;
     return refresh(true, weighing_);
   }
@@ -289,6 +315,11 @@ DownMessage TreeRoot::step(const TreeSums& sums, const TreeFront& front,
   DownMessage message = answer(Next::kStep);
   message.verdict.scale = length_;
   message.step = root.kept;
+  if (doubts) {
+    message.verdict.doubt = allowed;
+    may_doubt_ = false;
+    ++doubts_;
+  }
   if (free_)
     message.verdict.drift = drift_against(
         poses, front.substitute_back(root.kept).leftCols(static_cast<Index>(poses.size())),

@@ -8,7 +8,6 @@ namespace {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
-using Eigen::MatrixXf;
 
 // Eliminates the first `pivots` scalar columns of the dense `front` (lower triangle) in place.
 // These columns become L, and the rest becomes the Schur complement. False if a pivot is not
@@ -154,10 +153,10 @@ void FrontalCholesky::backward(MatrixXd& X) const {
 // later fronts. If the front has a parent, these nodes are in the parent, and the blocks come from
 // `of_parent`. Otherwise these nodes are kept, and the blocks come from `kept`. `place`: index of
 // each of these nodes in the parent front or in the list of kept nodes.
-MatrixXf FrontalCholesky::inverse_of_rest(const std::vector<int>& place, const MatrixXf& of_parent,
+MatrixXd FrontalCholesky::inverse_of_rest(const std::vector<int>& place, const MatrixXd& of_parent,
                                           const BlockMatrix& kept) const {
   const auto rest = static_cast<Index>(place.size());
-  MatrixXf Z(block_ * rest, block_ * rest);
+  MatrixXd Z(block_ * rest, block_ * rest);
   for (Index i = 0; i < rest; ++i)
     for (Index j = 0; j < rest; ++j) {
       const int a = place[at(i)], b = place[at(j)];
@@ -165,29 +164,28 @@ MatrixXf FrontalCholesky::inverse_of_rest(const std::vector<int>& place, const M
       if (of_parent.size() > 0)
         block = of_parent.block(block_ * a, block_ * b, block_, block_);
       else if (a == b)
-        block = kept.at(a).cast<float>();
+        block = kept.at(a);
       else if (a < b)
-        block = kept.between(index_of(plan_->kept_pairs(), a, b)).cast<float>();
+        block = kept.between(index_of(plan_->kept_pairs(), a, b));
       else
-        block = kept.between(index_of(plan_->kept_pairs(), a, b)).transpose().cast<float>();
+        block = kept.between(index_of(plan_->kept_pairs(), a, b)).transpose();
     }
   return Z;
 }
 
 // At first, Z has the inverse of a front at the nodes below its pivots. The pivots are added in
 // groups, the last ones first. Let [L; M] be the columns of a group in the factor, and G = M L^-1.
-// Then the new blocks are -Z G and (L L^T)^-1 + G^T Z G. Single precision suffices, because both
-// terms of the second block are positive definite and do not cancel.
-void FrontalCholesky::invert_pivots(const MatrixXd& factor, MatrixXf& Z) const {
+// Then the new blocks are -Z G and (L L^T)^-1 + G^T Z G.
+void FrontalCholesky::invert_pivots(const MatrixXd& factor, MatrixXd& Z) const {
   constexpr Index kGroup = 48;  // columns
   const Index rows = factor.rows();
   for (Index end = factor.cols(); end > 0;) {
     const Index first = std::max(Index{0}, end - kGroup), columns = end - first, rest = rows - end;
     const auto L = factor.block(first, first, columns, columns).triangularView<Eigen::Lower>();
     const MatrixXd inverse_L = L.solve(MatrixXd::Identity(columns, columns));
-    MatrixXf corner = (inverse_L.transpose() * inverse_L).cast<float>();
+    MatrixXd corner = (inverse_L.transpose() * inverse_L);
     if (rest > 0) {
-      const MatrixXf G = (factor.block(end, first, rest, columns) * inverse_L).cast<float>();
+      const MatrixXd G = (factor.block(end, first, rest, columns) * inverse_L);
       auto below = Z.block(end, first, rest, columns);
       below.noalias() = -Z.bottomRightCorner(rest, rest) * G;
       Z.block(first, end, columns, rest) = below.transpose();
@@ -200,8 +198,8 @@ void FrontalCholesky::invert_pivots(const MatrixXd& factor, MatrixXf& Z) const {
 
 BlockMatrix FrontalCholesky::selected_inverse(const BlockMatrix& kept) const {
   BlockMatrix inverse = BlockMatrix::zero(block_, at(plan_->nodes()), plan_->pairs().size());
-  std::vector<MatrixXf> inverses(factors_.size());
-  MatrixXf none;
+  std::vector<MatrixXd> inverses(factors_.size());
+  MatrixXd none;
   std::vector<int> local(at(plan_->nodes()));  // place in a front
   const auto number = [&](const EliminationPlan::Front& front) {
     for (std::size_t k = 0; k < front.nodes.size(); ++k)
@@ -220,10 +218,10 @@ BlockMatrix FrontalCholesky::selected_inverse(const BlockMatrix& kept) const {
       const auto node = at(front.nodes[k]);
       place.push_back(has_parent ? local[node] : plan_->place_of_kept()[node]);
     }
-    MatrixXf& Z = inverses[f];
+    MatrixXd& Z = inverses[f];
     Z.resize(factors_[f].rows(), factors_[f].rows());
     const Index rest = block_ * static_cast<Index>(place.size());
-    MatrixXf& of_parent = has_parent ? inverses[at(front.parent)] : none;
+    MatrixXd& of_parent = has_parent ? inverses[at(front.parent)] : none;
     Z.bottomRightCorner(rest, rest) = inverse_of_rest(place, of_parent, kept);
     invert_pivots(factors_[f], Z);
     number(front);
@@ -238,11 +236,9 @@ BlockMatrix FrontalCholesky::selected_inverse(const BlockMatrix& kept) const {
 }
 
 // Copies the diagonal blocks of the pivots of a front, and its couplings, to `inverse`.
-void FrontalCholesky::add_front(const EliminationPlan::Front& front, const MatrixXf& Z,
+void FrontalCholesky::add_front(const EliminationPlan::Front& front, const MatrixXd& Z,
                                 const std::vector<int>& local, BlockMatrix& inverse) const {
-  const auto block = [&](int i, int j) {
-    return Z.block(block_ * i, block_ * j, block_, block_).cast<double>();
-  };
+  const auto block = [&](int i, int j) { return Z.block(block_ * i, block_ * j, block_, block_); };
   for (int k = 0; k < front.pivots; ++k) inverse.at(front.nodes[at(k)]) = block(k, k);
   for (const int pair : front.pairs) {
     const auto& [i, j] = plan_->pairs()[at(pair)];

@@ -34,18 +34,17 @@ class FrontalCholesky {
 
   /// Blocks of the inverse of A at all nodes and pairs of the plan (selected inversion: Takahashi,
   /// Fagan, Chin, PICA 1973). `kept` has these blocks at the kept nodes, in the order of schur().
-  /// In single precision.
   [[nodiscard]] BlockMatrix selected_inverse(const BlockMatrix& kept) const;
 
  private:
   bool factorise_front(std::size_t f, const BlockMatrix& A);
   void add_to_schur(const EliminationPlan::Front& front, const Eigen::MatrixXd& rest);
   void add_kept(const BlockMatrix& A);
-  void invert_pivots(const Eigen::MatrixXd& factor, Eigen::MatrixXf& Z) const;
-  [[nodiscard]] Eigen::MatrixXf inverse_of_rest(const std::vector<int>& place,
-                                                const Eigen::MatrixXf& of_parent,
+  void invert_pivots(const Eigen::MatrixXd& factor, Eigen::MatrixXd& Z) const;
+  [[nodiscard]] Eigen::MatrixXd inverse_of_rest(const std::vector<int>& place,
+                                                const Eigen::MatrixXd& of_parent,
                                                 const BlockMatrix& kept) const;
-  void add_front(const EliminationPlan::Front& front, const Eigen::MatrixXf& Z,
+  void add_front(const EliminationPlan::Front& front, const Eigen::MatrixXd& Z,
                  const std::vector<int>& local, BlockMatrix& inverse) const;
   void place_kept(const BlockMatrix& kept, BlockMatrix& inverse) const;
 

@@ -49,6 +49,17 @@ std::optional<Tilts> tilts_of(const BlockMatrix& held, bool upright) {
   return tilts.stiffness.minCoeff() > 0.0 ? std::optional(tilts) : std::nullopt;
 }
 
+// The inverse for errors relative to the pose that is kept, if one is.
+BlockMatrix inverse_about_kept(const FrontalCholesky& factor, bool upright) {
+  const BlockMatrix& schur = factor.schur();
+  BlockMatrix held = BlockMatrix::zero(schur.block(), at(schur.diagonal.cols() / schur.block()), 0);
+  if (const auto tilts = tilts_of(schur, upright))
+    held.at(0).topLeftCorner<3, 3>() = tilts->directions *
+                                       tilts->stiffness.cwiseInverse().asDiagonal() *
+                                       tilts->directions.transpose();
+  return factor.selected_inverse(held);
+}
+
 }  // namespace
 
 EdgeSlot TreeFront::Child::slot_of(const SentEdge& edge) const {
@@ -312,15 +323,14 @@ std::optional<BlockMatrix> TreeFront::inverse_about_origin(bool upright) {
   factor_.reset();
   FrontalCholesky factor(std::make_shared<const EliminationPlan>(std::move(keep), plan_->pairs()));
   if (!factor.factorise(assembled())) return std::nullopt;
-  BlockMatrix held = BlockMatrix::zero(own_.block(), 1, 0);
-  if (const auto tilts = tilts_of(factor.schur(), upright))
-    held.at(0).topLeftCorner<3, 3>() = tilts->directions *
-                                       tilts->stiffness.cwiseInverse().asDiagonal() *
-                                       tilts->directions.transpose();
-  return factor.selected_inverse(held);
+  return inverse_about_kept(factor, upright);
 }
 
-TreeInverse TreeFront::inverse_of_child(RobotId name, const BlockMatrix& inverse) const {
+BlockMatrix TreeFront::inverse_about_held(bool upright) const {
+  return inverse_about_kept(*factor_, upright);
+}
+
+TreeInverse TreeFront::inverse_of_child(RobotId name, const BlockMatrix& inverse, bool fine) const {
   const Child& child = children_.at(name);
   BlockMatrix part = BlockMatrix::zero(own_.block(), child.node.size(), child.pairs.size());
   for (std::size_t k = 0; k < child.node.size(); ++k)
@@ -328,7 +338,7 @@ TreeInverse TreeFront::inverse_of_child(RobotId name, const BlockMatrix& inverse
   for (std::size_t p = 0; p < child.pairs.size(); ++p)
     part.add(static_cast<int>(p), child.pairs[p].i > child.pairs[p].j,
              inverse.between(child.pairs[p].pair));
-  return TreeInverse::of(part, child.system.pairs, child.system.schur);
+  return TreeInverse::of(part, child.system.pairs, child.system.schur, fine);
 }
 
 }  // namespace km

@@ -84,8 +84,11 @@ class TreeFront {
   /// singular. Frees the factor first, so that two never take memory at once: of the other
   /// functions, only inverse_of_child() may be called afterwards.
   [[nodiscard]] std::optional<BlockMatrix> inverse_about_origin(bool upright);
-  /// The part of a child in `inverse`.
-  [[nodiscard]] TreeInverse inverse_of_child(RobotId child, const BlockMatrix& inverse) const;
+  /// At the root: these blocks for errors relative to the pose that Newton steps hold.
+  [[nodiscard]] BlockMatrix inverse_about_held(bool upright) const;
+  /// The part of a child in `inverse`. `fine`: see TreeInverse.
+  [[nodiscard]] TreeInverse inverse_of_child(RobotId child, const BlockMatrix& inverse,
+                                             bool fine = false) const;
 
  private:
   struct Child {

@@ -15,26 +15,30 @@ using Eigen::Index;
 // weakest motions are softer than the rounding errors. With 2^-26, ais2klinik takes 200 rounds in
 // 2, 4 or 6 robots, with 2^-28 115, 73 and 48.
 constexpr double kCouplingUnit = 0x1p-28;
-constexpr double kMostUnits = 1e15;           // beyond it, a double is not a whole number of units
-constexpr double kMostCorrelation = 32767.0;  // units of a correlation of 1
+constexpr double kMostUnits = 1e15;  // beyond it, a double is not a whole number of units
+
+// Units of a correlation of 1.
+double most_correlation(bool fine) {
+  return fine ? 1.0 : 32767.0;
+}
 
 // Standard deviations of the variables whose covariances are `triangles`, one column each, times
 // the square root of the unit of a correlation.
-Eigen::MatrixXd units_of_correlations(std::span<const float> triangles, Index block) {
-  constexpr double kCorrelation = 1.0 / kMostCorrelation;
+Eigen::MatrixXd units_of_correlations(const TreeInverse& inverse, Index block) {
+  const double correlation = 1.0 / most_correlation(inverse.fine);
   const Index size = block * (block + 1) / 2;
-  Eigen::MatrixXd units(block, static_cast<Index>(triangles.size()) / size);
+  Eigen::MatrixXd units(block, std::ssize(inverse.diagonal) / size);
   for (Index k = 0; k < units.cols(); ++k)
     for (Index row = 0, next = k * size; row < block; next += block - row, ++row)
-      units(row, k) =
-          std::sqrt(kCorrelation * std::max(0.0, static_cast<double>(triangles[at(next)])));
+      units(row, k) = std::sqrt(correlation * std::max(0.0, inverse.diagonal[at(next)]));
   return units;
 }
 
-std::int16_t correlation_of(double covariance, double unit) {
-  constexpr double kMost = kMostCorrelation;
-  if (!(unit > 0.0)) return 0;
-  return static_cast<std::int16_t>(std::lround(std::clamp(covariance / unit, -kMost, kMost)));
+double correlation_of(double covariance, double unit, bool fine) {
+  if (!(unit > 0.0)) return 0.0;
+  const double most = most_correlation(fine);
+  const double correlation = std::clamp(covariance / unit, -most, most);
+  return fine ? correlation : std::round(correlation);
 }
 
 }  // namespace
@@ -65,21 +69,23 @@ bool is_sent(const BlockMatrix& schur, const NodePair& ends, int pair) {
 }
 
 TreeInverse TreeInverse::of(const BlockMatrix& inverse, std::span<const NodePair> pairs,
-                            const BlockMatrix& schur) {
+                            const BlockMatrix& schur, bool fine) {
   const Index B = inverse.block(), variables = inverse.diagonal.cols() / B;
-  TreeInverse sent;
+  TreeInverse sent{.fine = fine};
   for (int k = 0; k < variables; ++k)
     for (Index c = 0; c < B; ++c)
       for (Index row = c; row < B; ++row)
-        sent.diagonal.push_back(static_cast<float>(inverse.at(k)(row, c)));
-  const Eigen::MatrixXd units = units_of_correlations(sent.diagonal, B);
+        sent.diagonal.push_back(
+            fine ? inverse.at(k)(row, c)
+                 : static_cast<double>(static_cast<float>(inverse.at(k)(row, c))));
+  const Eigen::MatrixXd units = units_of_correlations(sent, B);
   for (int p = 0; p < std::ssize(pairs); ++p) {
     const auto& [i, j] = pairs[at(p)];
-    if (!is_sent(schur, pairs[at(p)], p)) continue;
+    if (!fine && !is_sent(schur, pairs[at(p)], p)) continue;
     for (Index c = 0; c < B; ++c)
       for (Index row = 0; row < B; ++row)
         sent.correlations.push_back(
-            correlation_of(inverse.between(p)(row, c), units(row, i) * units(c, j)));
+            correlation_of(inverse.between(p)(row, c), units(row, i) * units(c, j), fine));
   }
   return sent;
 }
@@ -89,7 +95,7 @@ std::optional<BlockMatrix> TreeInverse::decoded(std::span<const NodePair> pairs,
   const Index B = schur.block(), variables = schur.diagonal.cols() / B;
   std::vector<int> coupled;
   for (int p = 0; p < std::ssize(pairs); ++p)
-    if (is_sent(schur, pairs[at(p)], p)) coupled.push_back(p);
+    if (fine || is_sent(schur, pairs[at(p)], p)) coupled.push_back(p);
   if (diagonal.size() != at(variables * B * (B + 1) / 2) ||
       correlations.size() != coupled.size() * at(B * B))
     return std::nullopt;
@@ -100,7 +106,7 @@ std::optional<BlockMatrix> TreeInverse::decoded(std::span<const NodePair> pairs,
     for (Index c = 0; c < B; ++c)
       for (Index row = c; row < B; ++row) values(row, c) = values(c, row) = *variance++;
   }
-  const Eigen::MatrixXd units = units_of_correlations(diagonal, B);
+  const Eigen::MatrixXd units = units_of_correlations(*this, B);
   auto correlation = correlations.begin();
   for (const int p : coupled) {
     const auto& [i, j] = pairs[at(p)];

@@ -52,15 +52,18 @@ struct TreeSystem {
 /// The inverse of the second derivatives of the team at the variables of a TreeSystem, column by
 /// column.
 struct TreeInverse {
-  std::vector<float> diagonal = {};  ///< Lower triangles of the diagonal blocks.
+  /// In double precision, with the couplings of all pairs: for covariances of relative poses, which
+  /// are small differences.
+  bool fine = false;
+  std::vector<double> diagonal = {};  ///< Lower triangles of the diagonal blocks.
   /// The couplings that the system was sent with, as correlations in units of 1 / 32767. The error
   /// of a covariance is then at most 1.6e-5 of the product of its standard deviations.
-  std::vector<std::int16_t> correlations = {};
+  std::vector<double> correlations = {};
 
   /// `inverse` has the variables and `pairs` of a system with the Schur complement `schur`.
   /// Couplings that are zero there are not part of the factor, so the child does not need them.
   [[nodiscard]] static TreeInverse of(const BlockMatrix& inverse, std::span<const NodePair> pairs,
-                                      const BlockMatrix& schur);
+                                      const BlockMatrix& schur, bool fine);
   /// nullopt if the sizes differ from those of the system.
   [[nodiscard]] std::optional<BlockMatrix> decoded(std::span<const NodePair> pairs,
                                                    const BlockMatrix& schur) const;

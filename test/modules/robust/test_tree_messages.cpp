@@ -30,6 +30,8 @@ TreeSums some_sums() {
                 .rejected = 900,
                 .left = 2,
                 .fixed = 0,
+                .dropped = 11,
+                .doubted = 3,
                 .poses = 4'000'000'000U,
                 .lengths = {{0, 1}, {90, 1'000'000}, {65535, 3}}};
   sums.votes = {{.a = 1,
@@ -109,11 +111,13 @@ DownMessage some_down_message(TreeVerdict::Next next, TreeVerdict::Weighing weig
                      .deferred = true,
                      .free = false,
                      .weigh_all = true,
+                     .restart = next == TreeVerdict::Next::kRefresh,
                      .weighing = weighing,
                      .scale = 0.25,
                      .mu = 1e30,
                      .barc = 5.28,
                      .noise_scale = 1.0 / 3.0,
+                     .doubt = next == TreeVerdict::Next::kStep ? 0.25 : 0.0,
                      .usual_noise = 2.5,
                      .moves = {{7, {.t = {1.0F, 2.0F, 3.0F}}}, {9, {}}},
                      .odometry = {{1, 2.5}, {4, 1.0}},
@@ -123,7 +127,9 @@ DownMessage some_down_message(TreeVerdict::Next next, TreeVerdict::Weighing weig
                      .gradient = 1e-9,
                      .drift = {1.0, -2.0, 3.0, 0.0, 1e-200, 6.0}};
   message.step = some_numbers(rng, 12).cast<float>().cast<double>();
-  message.inverse = {.diagonal = {1.5F, 0.0F, 1e-3F}, .correlations = {-32767, 0, 5, 32767}};
+  message.inverse = {.diagonal = {1.5, 0.0, 0.25}, .correlations = {-32767.0, 0.0, 5.0, 32767.0}};
+  if (next == TreeVerdict::Next::kStep)
+    message.inverse = {.fine = true, .diagonal = {1e-3}, .correlations = {1.0 / 3.0, -1.0}};
   return message;
 }
 

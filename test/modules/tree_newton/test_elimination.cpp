@@ -138,7 +138,7 @@ TEST_CASE("the selected inverse equals the blocks of the dense inverse", "[newto
     const auto& [i, j] = problem.pairs[p];
     worst = std::max(worst, (inverse.between(static_cast<int>(p)) - block_of(i, j)).norm());
   }
-  CHECK(worst < 1e-6 * expected.norm());  // single precision
+  CHECK(worst < 1e-10 * expected.norm());
 }
 
 TEST_CASE("forward and backward solve the dense system", "[newton]") {
