@@ -6,7 +6,6 @@
 #include <numbers>
 
 #include "modules/core/symmetric_eigen.hpp"
-#include "modules/outlier_rejection/chi_squared.hpp"
 #include "modules/robust/cycle_mixture.hpp"
 
 namespace km {
@@ -23,13 +22,6 @@ constexpr double kGridStep = 1.1;  // a tenth of the standard deviation is preci
 constexpr double kClaimsFail = 1.5;
 // With fewer places, some of them false, the noise of the true ones cannot be estimated.
 constexpr double kFewPlaces = 5.0;
-// If more cycles of a pair than this share agree with the noise of the team, the pair has that
-// noise. Its other cycles then contain false closures.
-constexpr double kMostAgree = 0.8;
-constexpr double kAgreeing = 0.99;  // share of such cycles that agree, by chi-squared
-// Smaller differences are within the errors of the model: claims are isotropic, and the noise of
-// odometry is that of its mean step.
-constexpr double kNotable = 1.3;
 // Least mean log density ratio of a cycle with the estimated noise to a false cycle. It rejects
 // very large noise, with which closures that are all false would be as likely true. Sensitivity:
 // METHOD.md.
@@ -61,21 +53,6 @@ Posterior posterior_of(std::span<const NoiseCycle> cycles, std::span<const doubl
   const double log_likelihood = fit_cycle_mixture(log_ratio, weights).log_likelihood;
   const double total = weights.front() * static_cast<double>(weights.size());
   return {log_likelihood - std::log1p(away * away), log_likelihood / total};
-}
-
-// Share of the cycles that agree with the factor `s`. The odometry is `odometry` times noisier than
-// it claims.
-double agreeing(std::span<const NoiseCycle> cycles, double s, double odometry) {
-  const double limit = pose_quantile(kAgreeing, cycles.front().axes == 3 ? 2 : 3);
-  const auto agrees = [&](const NoiseCycle& cycle) {
-    double squared = 0.0;
-    for (std::size_t k = 0; k < cycle.axes; ++k)
-      squared +=
-          cycle.error[k] * cycle.error[k] / (odometry * odometry + s * s * cycle.variance[k]);
-    return squared <= limit;
-  };
-  return static_cast<double>(std::ranges::count_if(cycles, agrees)) /
-         static_cast<double>(cycles.size());
 }
 
 std::vector<double> weights_of(std::span<const NoiseCycle> cycles, double observations) {
@@ -135,9 +112,7 @@ double log_odds_of_two(std::span<const NoiseCycle> cycles, std::span<const doubl
 // odometry.
 double factor_of(std::span<const NoiseCycle> cycles, double observations, double usual) {
   const double odometry = std::min(1.0, kNoisyOdometry * usual);
-  if (cycles.empty() || observations < kFewPlaces || usual > kClaimsFail ||
-      agreeing(cycles, usual, odometry) > kMostAgree)
-    return usual;
+  if (cycles.empty() || observations < kFewPlaces || usual > kClaimsFail) return usual;
   const Estimate found = estimate(cycles, observations, usual, odometry, kDistinct);
   const bool likely =
       found.log_odds >= kThousandToOne &&
@@ -195,9 +170,8 @@ bool excludes_noise(const PairCycles& cycles, double excluded, double factor) {
 }
 
 double estimate_closure_noise(const PairCycles& cycles, double usual) {
-  const double noise = std::max(factor_of(cycles.inside, cycles.places, usual),
-                                factor_of(cycles.between, cycles.places, usual));
-  return noise < kNotable * usual ? usual : noise;
+  return std::max(factor_of(cycles.inside, cycles.places, usual),
+                  factor_of(cycles.between, cycles.places, usual));
 }
 
 }  // namespace km
