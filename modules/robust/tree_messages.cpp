@@ -243,32 +243,21 @@ void describe(auto& archive, As<TreeVerdict> auto& v) {
   archive.list(v.released, kMaxElements, 2, [&](auto& pair) { archive(pair.first, pair.second); });
 }
 
-void archive_fixed(auto& archive, auto& number) {
-  if constexpr (std::is_same_v<std::remove_cvref_t<decltype(number)>, double>) {
-    archive(number);
-  } else {
-    auto bits = static_cast<std::uint16_t>(number);
-    archive.fixed(bits);
-    if constexpr (kReads<decltype(archive)>) number = static_cast<std::int16_t>(bits);
-  }
-}
-
-template <typename Number, typename Correlation>
-void describe_inverse(auto& archive, As<TreeInverse> auto& inverse) {
-  describe_rows<Number>(archive, inverse.diagonal);
-  archive.list(inverse.correlations, kMaxElements, sizeof(Correlation), [&](auto& correlation) {
-    auto rounded = static_cast<Correlation>(correlation);
-    archive_fixed(archive, rounded);
-    if constexpr (kReads<decltype(archive)>) correlation = static_cast<double>(rounded);
-  });
-}
-
 void describe(auto& archive, As<DownMessage> auto& m) {
   archive(m.verdict);
   describe_rows<float>(archive, m.step);
-  m.verdict.doubt > 0.0 ? describe_inverse<double, double>(archive, m.inverse)
-                        : describe_inverse<float, std::int16_t>(archive, m.inverse);
-  if constexpr (kReads<decltype(archive)>) m.inverse.fine = m.verdict.doubt > 0.0;
+  const bool fine = m.verdict.doubt > 0.0;
+  if constexpr (kReads<decltype(archive)>) m.inverse.fine = fine;
+  if (fine) {
+    describe_rows<double>(archive, m.inverse.diagonal);
+    return describe_rows<double>(archive, m.inverse.correlations);
+  }
+  describe_rows<float>(archive, m.inverse.diagonal);
+  archive.list(m.inverse.correlations, kMaxElements, sizeof(std::int16_t), [&](auto& correlation) {
+    auto bits = static_cast<std::uint16_t>(static_cast<std::int16_t>(correlation));
+    archive.fixed(bits);
+    if constexpr (kReads<decltype(archive)>) correlation = static_cast<std::int16_t>(bits);
+  });
 }
 
 namespace {
