@@ -18,11 +18,7 @@ using Weighing = TreeVerdict::Weighing;
 
 constexpr double kShorten = 0.25;
 constexpr double kLengthen = 4.0;
-// Newton steps that first increase the cost often decrease it afterwards. While weights change, the
-// root therefore accepts kMaxRises increases in a row, each by a factor of up to kMaxRise.
-constexpr int kMaxRises = 2;
-constexpr double kMaxRise = 1.5;
-// Smaller increases of the cost are rounding: relative to the cost, and if it is near 0.
+// An increase of the cost is accepted if it is rounding: relative to the cost, and near 0.
 constexpr double kCostRounding = 1e-13;
 constexpr double kLeastRise = 1e-9;
 // Rounding may keep steps from being shorter: each round below this predicted decrease relaxes the
@@ -218,18 +214,16 @@ DownMessage TreeRoot::decide(const TreeSums& sums, std::uint32_t round, const Tr
   round_ = round;
   if (sums.doubted > 0) {
     may_doubt_ = true;
-    rises_ = backtracks_ = 0;
+    backtracks_ = 0;
     DownMessage message = refresh(false, weighing_);
     message.verdict.restart = true;
     return message;
   }
-  const bool may_rise = weighing_ != Weighing::kDecided && rises_ < kMaxRises;
-  const double limit = sums.base_cost * (may_rise ? kMaxRise : 1.0 + kCostRounding) + kLeastRise;
+  const double limit = sums.base_cost * (1.0 + kCostRounding) + kLeastRise;
   if (!at_base_ && !(sums.cost <= limit)) return go_back();
   if (!at_base_) {
     retried_ = false;
     stale_ = true;
-    rises_ = sums.cost > sums.base_cost ? rises_ + 1 : 0;
     // While weights change, a step length that is much too long now will be too long in the next
     // round.
     length_ = std::min(1.0, backtracks_ > 0 ? length_ : kLengthen * length_);
@@ -248,12 +242,7 @@ DownMessage TreeRoot::step(const TreeSums& sums, const TreeFront& front,
                            std::span<const SE3> poses) {
   const TreeFront::Reduced root = front.solve_root(upright_);
   decrement_ = sums.decrement + root.decrement;
-  // If odometry is noisy, the poses may be far from the minimum of the nearly convex cost at the
-  // beginning. A predicted decrease of more than the whole cost shows that the quadratic model does
-  // not hold there; mu then waits for another step.
-  const bool far =
-      odometry_is_noisy_ && !at_base_ && schedule_.is_nearly_convex() && 0.5 * decrement_ > cost_;
-  if (!far && weighing_ != Weighing::kHold) schedule_.next({sums.changed, sums.fractional});
+  if (weighing_ != Weighing::kHold) schedule_.next({sums.changed, sums.fractional});
   if (decrement_ <= kNearRounding * (1.0 + cost_))
     for (double* limit : {&options_.tolerance, &options_.absolute_tolerance}) *limit *= kRelax;
   const bool looks_again = deferred_ || (!again_ && sums.left > 0);
@@ -332,7 +321,7 @@ DownMessage TreeRoot::step(const TreeSums& sums, const TreeFront& front,
 DownMessage TreeRoot::weigh_all() {
   alone_ = released_ = false;
   schedule_.start(first_->largest, first_->open, barc_);
-  rises_ = backtracks_ = 0;
+  backtracks_ = 0;
   DownMessage message = refresh(false, Weighing::kWeigh);
   message.verdict.weigh_all = true;
   return message;

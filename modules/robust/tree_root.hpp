@@ -87,7 +87,6 @@ class TreeRoot {
   int doubts_ = 0;         // number of doubts, see EdgeWeights::doubt()
   bool may_doubt_ = true;  // none yet, or the last one has changed a closure
   int backtracks_ = 0;     // in a row
-  int rises_ = 0;          // accepted increases of the cost, in a row
   double length_ = 1.0;    // scale of the next Newton step; 1 once all is decided
   double refreshed_decrement_ = 0.0;      // when full second derivatives were last due
   std::optional<double> last_decrement_;  // with the present second derivatives

@@ -12,9 +12,9 @@ using Eigen::Index;
 
 // See unit_of_coupling(). With 2^-15, three of twenty recorded graphs of 2 to 12 robots do not
 // converge. With 2^-20 all of them do, but not the equations of 100 robots on a ring, whose
-// weakest motions are softer than the rounding errors. With 2^-26, ais2klinik takes 200 rounds in
-// 2, 4 or 6 robots, with 2^-28 115, 73 and 48.
-constexpr double kCouplingUnit = 0x1p-28;
+// weakest motions are softer than the rounding errors. With 2^-28, ais2klinik takes 195 rounds in 6
+// robots, and in 5 its poses differ by 4e-5 m with reversed ids; with 2^-32 73 rounds and 4e-7 m.
+constexpr double kCouplingUnit = 0x1p-32;
 constexpr double kMostUnits = 1e15;  // beyond it, a double is not a whole number of units
 
 // Units of a correlation of 1.
