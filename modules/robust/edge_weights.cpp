@@ -71,6 +71,7 @@ void EdgeWeights::unsettle() {
 void EdgeWeights::weigh(const TreeVerdict& verdict, const FrontEdges& front,
                         std::span<const SE3> present, TreeSums& sums) {
   sums.doubted = std::exchange(doubted_, 0);
+  sums.dropped = left_out_;
   for (std::size_t k = 0; k < edges_.size(); ++k) {
     EdgeWeight& edge = edges_[k];
     edge.candidate = edge.weight;

@@ -32,8 +32,10 @@ struct EdgeWeight {
 /// the limits of pairs. Not thread-safe.
 class EdgeWeights {
  public:
-  /// `edges`: of the first edges of the front.
-  explicit EdgeWeights(std::vector<EdgeWeight> edges) : edges_(std::move(edges)) {}
+  /// `edges`: of the first edges of the front. `left_out`: number of rejected closures of this
+  /// robot that are no edges.
+  explicit EdgeWeights(std::vector<EdgeWeight> edges, std::uint32_t left_out = 0)
+      : edges_(std::move(edges)), left_out_(left_out) {}
 
   /// All open closures are weighed from now on.
   void unsettle();
@@ -61,6 +63,7 @@ class EdgeWeights {
                    std::span<const SE3> present, TreeSums& sums);
 
   std::vector<EdgeWeight> edges_;
+  std::uint32_t left_out_ = 0;
   std::uint32_t doubted_ = 0;  // changes by doubt() that no sums have counted
 };
 

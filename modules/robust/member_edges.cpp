@@ -446,7 +446,9 @@ EdgeWeights MemberEdges::weights(const Precision& usual_pair) const {
     weight.pair_limit = std::min(
         1.0, kStrongest * std::min(usual_pair.kappa / sum.kappa, usual_pair.tau / sum.tau));
   }
-  return EdgeWeights(std::move(weights));
+  const auto left_out = std::ranges::count_if(
+      known_, [&](const Known& k) { return !k.odometry && !takes_part(k) && reports(k); });
+  return EdgeWeights(std::move(weights), static_cast<std::uint32_t>(left_out));
 }
 
 ClosureVerdicts MemberEdges::verdicts(const EdgeWeights& weights) const {

@@ -48,7 +48,7 @@ struct TreeSums {
   std::uint32_t rejected = 0;    ///< Open closures between robots with a lower weight.
   std::uint32_t left = 0;     ///< Closures for a second look: deferred, or rejected and possible.
   std::uint32_t fixed = 0;    ///< Number of edges to held poses.
-  std::uint32_t dropped = 0;  ///< Closures with a weight of at most one half.
+  std::uint32_t dropped = 0;  ///< Closures with a weight of at most one half, or without.
   std::uint32_t doubted = 0;  ///< Closures that a doubt has changed, see EdgeWeights::doubt().
   std::uint32_t poses = 0;
   std::map<std::uint16_t, std::uint32_t> lengths = {};  ///< See NoiseHistogram; at the start only.

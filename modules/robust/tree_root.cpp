@@ -50,9 +50,10 @@ constexpr double kPullOfMean = 6.0;
 constexpr double kPullOfOne = 1.0;
 
 // Closures are doubted if all noise is at most this many times the claimed one. Limits on residuals
-// are then too wide for false closures. Two false ones may hide each other, so there are more
-// doubts.
+// are then too wide for false closures, of which they let about one in a hundred pass. Two false
+// ones may hide each other, so there are more doubts.
 constexpr double kClaimsTooMuch = 0.5;
+constexpr std::uint32_t kWorthDoubting = 100;  // rejected closures
 constexpr int kMaxDoubts = 4;
 
 // Predicted decrease of a step, relative to the cost: of nearly converged poses, and of poses from
@@ -274,7 +275,7 @@ DownMessage TreeRoot::step(const TreeSums& sums, const TreeFront& front,
   }
   const bool unlimited = released_ || usual_pair_.tau >= kUnlimited.tau;
   const double allowed = noise_allowed(cost_, sums.kept, members_.size(), options_.dimension);
-  const bool doubts = may_doubt_ && options_.robust && (again_ || sums.dropped > 0) && decided &&
+  const bool doubts = may_doubt_ && options_.robust && sums.dropped >= kWorthDoubting && decided &&
                       shows_pulls && nearly && unlimited && allowed < kClaimsTooMuch &&
                       doubts_ < kMaxDoubts;
   if ((decided && small && unlimited && !doubts) || round_ + 1 >= options_.max_rounds) {

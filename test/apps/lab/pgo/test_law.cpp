@@ -199,5 +199,14 @@ TEST_CASE("Motions softer than rounding errors of messages take no further round
   CHECK(run.last.round <= 130);  // in two looks
 }
 
+TEST_CASE("A few rejected closures do not make the team doubt the others", "[pgo][law]") {
+  const auto graph = graph_of({"pose_graphs/3d/cubicle.g2o", 5, "", 0.0});
+  if (!graph) return;
+  const AgentTeamRun run = run_agent_team(*graph, {});
+  CHECK(run.settled);
+  CHECK(std::ranges::count(run.kept, false) <= 6);
+  CHECK(run.last.round <= 25);
+}
+
 }  // namespace
 }  // namespace km
