@@ -21,8 +21,11 @@ constexpr std::int64_t kClockTolerance_s = 86400;
 
 // Makes a folder that only its owner may enter, because it holds a secret.
 void make_private_folder(const fs::path& folder) {
-  fs::create_directories(folder);
-  fs::permissions(folder, fs::perms::owner_all);
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (!error) fs::permissions(folder, fs::perms::owner_all, error);
+  if (error)
+    throw std::runtime_error(folder.string() + ": cannot make the folder: " + error.message());
 }
 
 std::string describe(RobotId id, const std::string& name) {
