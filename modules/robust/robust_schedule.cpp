@@ -55,11 +55,15 @@ void RobustSchedule::next(const Tally& tally) {
              updates_ >= kMaxUpdates;
   if (decided_) return;
   ++updates_;
-  const double step = mu_ < kNearlyConvex                          ? kFirstMuStep
+  const double step = is_nearly_convex()                           ? kFirstMuStep
                       : tally.fractional <= kMostlyDecided * open_ ? kLastMuStep
                                                                    : kMuStep;
   mu_ = std::min(kLargestMu, mu_ * step);
   if (mu_ >= kHardMu) ++hard_updates_;
+}
+
+bool RobustSchedule::is_nearly_convex() const {
+  return mu_ < kNearlyConvex;
 }
 
 bool RobustSchedule::reopen() {

@@ -46,6 +46,8 @@ class RobustSchedule {
   [[nodiscard]] bool reopen();
 
   [[nodiscard]] bool decided() const { return decided_; }
+  /// True while the surrogate cost is nearly convex.
+  [[nodiscard]] bool is_nearly_convex() const;
   [[nodiscard]] double mu() const { return mu_; }
 
  private:

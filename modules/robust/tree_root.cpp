@@ -243,7 +243,12 @@ DownMessage TreeRoot::step(const TreeSums& sums, const TreeFront& front,
                            std::span<const SE3> poses) {
   const TreeFront::Reduced root = front.solve_root(upright_);
   decrement_ = sums.decrement + root.decrement;
-  if (weighing_ != Weighing::kHold) schedule_.next({sums.changed, sums.fractional});
+  // If odometry is noisy, the poses may be far from the minimum of the nearly convex cost at the
+  // beginning. A predicted decrease of more than the whole cost shows that the quadratic model does
+  // not hold there; mu then waits for another step.
+  const bool far =
+      odometry_is_noisy_ && !at_base_ && schedule_.is_nearly_convex() && 0.5 * decrement_ > cost_;
+  if (!far && weighing_ != Weighing::kHold) schedule_.next({sums.changed, sums.fractional});
   if (decrement_ <= kNearRounding * (1.0 + cost_))
     for (double* limit : {&options_.tolerance, &options_.absolute_tolerance}) *limit *= kRelax;
   const bool looks_again = deferred_ || (!again_ && sums.left > 0);
