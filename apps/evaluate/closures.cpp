@@ -107,15 +107,12 @@ struct ClosuresCommand {
     app.add_option("--truth", truths,
                    "True poses in one common world: one file for each of --results, or one for "
                    "all, where they are parts of one recording")
-        ->check(CLI::ExistingPath)
         ->required();
     app.add_option(
            "--results", results,
            "Results folders of all robots of the run, or records (MCAP) of robots or of the team")
-        ->check(CLI::ExistingPath)
         ->required();
     app.add_option("--dataset", dataset, "EuRoC/ASL folder: its left camera is the robots'")
-        ->check(CLI::ExistingPath)
         ->required();
     app.add_option("--json", json, "Also write the numbers to this file, as JSON");
   }

@@ -71,11 +71,8 @@ struct ConsistencyCommand {
 
   void define(CLI::App& app) {
     app.add_option("--truth", truths, "True poses: one file for all robots or one for each")
-        ->check(CLI::ExistingPath)
         ->required();
-    app.add_option("--results", results, "Folders of the results, one per robot")
-        ->check(CLI::ExistingPath)
-        ->required();
+    app.add_option("--results", results, "Folders of the results, one per robot")->required();
     app.add_flag("--upright", upright,
                  "Both frames have z up: runs with inertial sensing, and a truth with z up");
     app.add_option("--json", json, "Also write the numbers to this file");

@@ -16,12 +16,9 @@ struct GlbCommand {
   std::filesystem::path palette, output;
 
   void define(CLI::App& app) {
-    app.add_option("--mesh", meshes, "Meshes (PLY) in one frame")
-        ->check(CLI::ExistingPath)
-        ->required();
+    app.add_option("--mesh", meshes, "Meshes (PLY) in one frame")->required();
     app.add_option("--palette", palette,
-                   "Names of the labels (CSV); default: label_palette.csv beside the first mesh")
-        ->check(CLI::ExistingPath);
+                   "Names of the labels (CSV); default: label_palette.csv beside the first mesh");
     app.add_option("--output", output, "File to write")->required();
   }
 

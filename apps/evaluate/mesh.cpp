@@ -87,29 +87,24 @@ struct MeshCommand {
   MeshErrorOptions options;
 
   void define(CLI::App& app) {
-    app.add_option("--truth", truth, "The true mesh (PLY)")->check(CLI::ExistingPath)->required();
+    app.add_option("--truth", truth, "The true mesh (PLY)")->required();
     app.add_option("--estimate", estimates,
                    "Estimated meshes (PLY) in one common frame, one file per robot")
-        ->check(CLI::ExistingPath)
         ->required();
     app.add_option("--trajectory", trajectories,
-                   "Estimated poses of the robots in the frame of the meshes, TUM or EuRoC CSV")
-        ->check(CLI::ExistingPath);
+                   "Estimated poses of the robots in the frame of the meshes, TUM or EuRoC CSV");
     app.add_option("--trajectory-truth", true_trajectories,
-                   "Their true poses: one file for all or one for each")
-        ->check(CLI::ExistingPath);
+                   "Their true poses: one file for all or one for each");
     app.add_option("--samples-per-m2", options.samples_per_m2, "Samples per square metre")
         ->check(CLI::PositiveNumber)
         ->capture_default_str();
     app.add_flag("!--no-icp", options.icp, "Compare the meshes where they are");
     app.add_option("--palette", palette,
-                   "Names of the labels (CSV); default: label_palette.csv beside the truth")
-        ->check(CLI::ExistingPath);
+                   "Names of the labels (CSV); default: label_palette.csv beside the truth");
     app.add_option(
-           "--seen-by", seen_by,
-           "Recordings (EuRoC/ASL folders) with the true poses: also how much of what their "
-           "left cameras saw is mapped, by distance and class, and how smooth walls are")
-        ->check(CLI::ExistingPath);
+        "--seen-by", seen_by,
+        "Recordings (EuRoC/ASL folders) with the true poses: also how much of what their "
+        "left cameras saw is mapped, by distance and class, and how smooth walls are");
     app.add_option("--json", json, "Also write the numbers to this file, as JSON");
   }
 

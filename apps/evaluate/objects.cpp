@@ -20,19 +20,12 @@ struct ObjectsCommand {
   std::vector<std::filesystem::path> meshes, trajectories, true_trajectories;
 
   void define(CLI::App& app) {
-    app.add_option("--truth", truth, "The true objects (objects.json)")
-        ->check(CLI::ExistingPath)
-        ->required();
-    app.add_option("--estimate", estimate, "The objects of a robot (objects.json)")
-        ->check(CLI::ExistingPath)
-        ->required();
-    app.add_option("--mesh", meshes, "Meshes of all robots in the frame of the objects")
-        ->check(CLI::ExistingPath);
+    app.add_option("--truth", truth, "The true objects (objects.json)")->required();
+    app.add_option("--estimate", estimate, "The objects of a robot (objects.json)")->required();
+    app.add_option("--mesh", meshes, "Meshes of all robots in the frame of the objects");
     app.add_option("--trajectory", trajectories,
-                   "Estimated poses of the robots in the frame of the objects, TUM or EuRoC CSV")
-        ->check(CLI::ExistingPath);
-    app.add_option("--trajectory-truth", true_trajectories, "Their true poses: one file for each")
-        ->check(CLI::ExistingPath);
+                   "Estimated poses of the robots in the frame of the objects, TUM or EuRoC CSV");
+    app.add_option("--trajectory-truth", true_trajectories, "Their true poses: one file for each");
     app.add_option("--json", json, "Also write the numbers to this file, as JSON");
   }
 

@@ -54,9 +54,7 @@ struct RenderCommand {
   fs::path palette, output;
 
   void define(CLI::App& app) {
-    app.add_option("--mesh", meshes, "Meshes (PLY) in one frame")
-        ->check(CLI::ExistingPath)
-        ->required();
+    app.add_option("--mesh", meshes, "Meshes (PLY) in one frame")->required();
     app.add_option("--output", output, "PNG; the file of the second view is NAME_2.png")
         ->required()
         ->check([](const std::string& file) {
@@ -65,12 +63,10 @@ struct RenderCommand {
     app.add_option("--view", views, "Viewpoint, see above; several give a picture each")
         ->capture_default_str();
     app.add_option("--trajectory", trajectories,
-                   "Poses drawn on top (TUM, EuRoC CSV, or a record: see trajectory)")
-        ->check(CLI::ExistingPath);
+                   "Poses drawn on top (TUM, EuRoC CSV, or a record: see trajectory)");
     app.add_option("--reference", references,
                    "Poses of the first trajectories in the frame to draw in: the truth puts the "
-                   "map into the world, the first robot's odometry.tum stands it upright")
-        ->check(CLI::ExistingPath);
+                   "map into the world, the first robot's odometry.tum stands it upright");
     app.add_option("--color", color,
                    "Colours by label, of the vertices, none, or one per mesh; auto: by label if "
                    "there are labels")

@@ -19,10 +19,8 @@ struct TrajectoryCommand {
 
   void define(CLI::App& app) {
     app.add_option("--truth", truths, "True poses: one file for all estimates or one for each")
-        ->check(CLI::ExistingPath)
         ->required();
     app.add_option("--estimate", estimates, "Estimated poses, one file per robot, or a record")
-        ->check(CLI::ExistingPath)
         ->required();
     files.define(app, "the numbers", "truth and estimates from above");
   }

@@ -75,9 +75,8 @@ void define(CLI::App& app, TeamOptions& options) {
       "file;\nthe others are of every link, and in pairs of the links named there:\n" +
       km::links_file_keys());
   options.robot_binary = km::program_folder() / "kimera_multi_robot";
-  app.add_option("--config", options.config, "Team file")->check(CLI::ExistingPath)->required();
-  app.add_option("--dataset", options.dataset, "Value of ${DATASET} in the team file")
-      ->check(CLI::ExistingPath);
+  app.add_option("--config", options.config, "Team file")->required();
+  app.add_option("--dataset", options.dataset, "Value of ${DATASET} in the team file");
   app.add_option(
          "--rate", options.rate,
          "Times real time, max, or auto, see kimera_multi_robot --help (default: the file's, auto)")

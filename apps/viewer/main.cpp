@@ -61,8 +61,7 @@ struct ViewerOptions {
 
 void define(CLI::App& app, ViewerOptions& options) {
   app.footer(kFooter);
-  CLI::Option* const results =
-      app.add_option("RESULTS", options.results, "Results of a run")->check(CLI::ExistingPath);
+  CLI::Option* const results = app.add_option("RESULTS", options.results, "Results of a run");
   CLI::Option* const domain = app.add_option(
       "--domain", options.dds.domain, "DDS domain of the team, whose robots run with --view");
   domain->check(CLI::Range(0, 230))->excludes(results);

@@ -126,7 +126,6 @@ struct TrainCommand {
 
 void define(CLI::App& app, TrainCommand& command) {
   app.add_option("images", command.images, "IMAGES to learn from, as varied as the places to come")
-      ->check(CLI::ExistingPath)
       ->required();
   app.add_option("-o,--output", command.vocabulary, "Vocabulary file to write")->required();
   app.add_option("-k,--branching", command.branching, "Children of a node of the tree")

@@ -289,7 +289,7 @@ TEST_CASE("Input that cannot be run is refused", "[team]") {
       {elsewhere + " --output /proc/none", "/proc/none: cannot be"},
       {elsewhere + " --json /none/team.json", "/none/team.json: cannot be"},
       {tool, "--config is required"},
-      {tool + " --config /nowhere.yaml", "--config: Path does not exist: /nowhere.yaml"}};
+      {tool + " --config /nowhere.yaml", "kimera_multi_team: /nowhere.yaml: cannot open: no such"}};
   for (const auto& [command, message] : refused) {
     const auto result = run_command(command);
     CAPTURE(command);
