@@ -183,9 +183,9 @@ void FrontalCholesky::invert_pivots(const MatrixXd& factor, MatrixXd& Z) const {
     const Index first = std::max(Index{0}, end - kGroup), columns = end - first, rest = rows - end;
     const auto L = factor.block(first, first, columns, columns).triangularView<Eigen::Lower>();
     const MatrixXd inverse_L = L.solve(MatrixXd::Identity(columns, columns));
-    MatrixXd corner = (inverse_L.transpose() * inverse_L);
+    MatrixXd corner = inverse_L.transpose() * inverse_L;
     if (rest > 0) {
-      const MatrixXd G = (factor.block(end, first, rest, columns) * inverse_L);
+      const MatrixXd G = factor.block(end, first, rest, columns) * inverse_L;
       auto below = Z.block(end, first, rest, columns);
       below.noalias() = -Z.bottomRightCorner(rest, rest) * G;
       Z.block(first, end, columns, rest) = below.transpose();

@@ -56,8 +56,9 @@ struct TreeInverse {
   /// are small differences.
   bool fine = false;
   std::vector<double> diagonal = {};  ///< Lower triangles of the diagonal blocks.
-  /// The couplings that the system was sent with, as correlations in units of 1 / 32767. The error
-  /// of a covariance is then at most 1.6e-5 of the product of its standard deviations.
+  /// Couplings as correlations. Unless `fine`, they are those that the system was sent with, in
+  /// whole units of 1 / 32767: the error of a covariance is then at most 1.6e-5 of the product of
+  /// its standard deviations.
   std::vector<double> correlations = {};
 
   /// `inverse` has the variables and `pairs` of a system with the Schur complement `schur`.
