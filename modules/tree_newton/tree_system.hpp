@@ -57,7 +57,7 @@ struct TreeInverse {
   bool fine = false;
   std::vector<double> diagonal = {};  ///< Lower triangles of the diagonal blocks.
   /// Couplings as correlations. Unless `fine`, they are those that the system was sent with, in
-  /// whole units of 1 / 32767: the error of a covariance is then at most 1.6e-5 of the product of
+  /// whole units of 1 / 32767. The error of a covariance is then at most 1.6e-5 of the product of
   /// its standard deviations.
   std::vector<double> correlations = {};
 
