@@ -31,12 +31,10 @@ The cost is the chordal one without 1/2. Weights are read as SE-Sync reads them.
 results of a team and for JRL files they are those of the robots:
   F = sum kappa |R_j - R_i R_ij|^2 + tau |t_j - t_i - R_i t_ij|^2
 A vertical in a g2o file (EDGE_SE3_PRIOR with information on the tilt alone, as
-kimera_multi_robot writes it) adds |R_i up_i - z|^2 / sigma_i^2. dgs does not support
-verticals. Other priors are refused.
+kimera_multi_robot writes it) adds |R_i up_i - z|^2 / sigma_i^2. Other priors are refused.
 
 Methods:
   local        every robot alone; their frames joined by one closure each
-  dgs          two-stage distributed Gauss-Seidel (Choudhary et al., IJRR 2017)
   rbcd         Riemannian block-coordinate descent (Tian et al., TRO 2021) as robots run
                it: in a round all robots update, in turn, over-relaxed unless
                --over-relaxation is 1; ends when the cost hardly decreases any more

@@ -8,7 +8,6 @@
 
 #include "apps/lab/pgo/agent_team.hpp"
 #include "apps/lab/pgo/central_solver.hpp"
-#include "apps/lab/pgo/gauss_seidel_team.hpp"
 #include "apps/lab/pgo/local_team.hpp"
 #include "modules/core/symmetric_eigen.hpp"
 #include "modules/rbcd/solver_choice.hpp"
@@ -67,7 +66,6 @@ std::unique_ptr<TeamSolver> make_team(const TeamGraph& graph, const std::vector<
                                       const SolverOptions& options) {
   const std::string& method = options.method;
   if (method == "local") return std::make_unique<LocalTeam>(graph);
-  if (method == "dgs") return std::make_unique<GaussSeidelTeam>(graph, start);
   if (method == "rbcd") return rbcd_team(graph, start, options);
   if (method == "centralized") return std::make_unique<CentralTeam>(graph, start);
   throw std::invalid_argument("unknown method " + method);
@@ -118,10 +116,6 @@ SolverRun run_agents(const TeamGraph& graph, const SolverOptions& options, const
 
 SolverRun run_solver(const TeamGraph& graph, const std::vector<SE3>& start,
                      const SolverOptions& options, const TeamMeter& meter) {
-  if (options.method == "dgs" && !graph.verticals.empty())
-    throw std::invalid_argument("method dgs does not know verticals, and the graph has " +
-                                std::to_string(graph.verticals.size()) +
-                                ": leave them out by --no-vertical");
   if (options.rejects()) return run_agents(graph, options, meter);
   if (options.method == "newton") return run_trusting(graph, start, options, meter);
   const auto team = make_team(graph, start, options);

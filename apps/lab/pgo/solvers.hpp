@@ -30,7 +30,7 @@ struct SolverOptions {
   [[nodiscard]] std::string name() const { return method + (trust_all ? " --trust-all" : ""); }
 };
 
-inline const std::vector<std::string> kMethods = {"local", "dgs", "rbcd", "centralized", "newton"};
+inline const std::vector<std::string> kMethods = {"local", "rbcd", "centralized", "newton"};
 
 /// The edges that a method has kept, and the estimates behind this decision.
 struct Decision {

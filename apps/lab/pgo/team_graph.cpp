@@ -130,29 +130,6 @@ TeamNeighbours neighbours_in(const TeamGraph& graph) {
   return neighbours;
 }
 
-std::vector<std::vector<std::size_t>> colours_of(const TeamNeighbours& neighbours) {
-  std::vector<std::size_t> order(neighbours.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-    return neighbours[a].size() > neighbours[b].size();
-  });
-  std::vector<std::vector<std::size_t>> colours;
-  for (const std::size_t k : order) {
-    const auto is_free = [&](const std::vector<std::size_t>& members) {
-      return std::none_of(members.begin(), members.end(), [&](std::size_t other) {
-        return std::binary_search(neighbours[k].begin(), neighbours[k].end(), other);
-      });
-    };
-    const auto found = std::find_if(colours.begin(), colours.end(), is_free);
-    if (found == colours.end())
-      colours.push_back({k});
-    else
-      found->push_back(k);
-  }
-  for (auto& members : colours) std::sort(members.begin(), members.end());
-  return colours;
-}
-
 TeamTree breadth_first_tree(const TeamNeighbours& neighbours) {
   TeamTree tree{.order = {0}, .parent = std::vector<std::size_t>(neighbours.size(), 0)};
   std::set<std::size_t> reached{0};

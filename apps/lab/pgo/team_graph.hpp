@@ -20,8 +20,7 @@ struct TeamGraph {
   std::vector<KeyframeId> ids = {};      ///< Ids of the poses in the file.
   /// Poses in the file, which start the solution where odometry has gaps; empty without vertices.
   std::vector<SE3> vertices = {};
-  /// Vertical priors, ascending by pose. If there are any, solutions have z up. GaussSeidelTeam
-  /// does not support them.
+  /// Vertical priors, ascending by pose. If there are any, solutions have z up.
   std::vector<VerticalPrior> verticals = {};
   std::size_t indefinite_edges = 0;  ///< Number in the files, see G2oGraph.
 
@@ -66,10 +65,6 @@ struct TeamGraph {
 using TeamNeighbours = std::vector<std::vector<std::size_t>>;
 
 [[nodiscard]] TeamNeighbours neighbours_in(const TeamGraph& graph);
-
-/// Groups of robots without edges between them, which may move at the same time. The greedy
-/// colouring begins with the robot with the most neighbours.
-[[nodiscard]] std::vector<std::vector<std::size_t>> colours_of(const TeamNeighbours& neighbours);
 
 /// Breadth-first tree from robot 0. parent[k] comes before k in `order`.
 struct TeamTree {

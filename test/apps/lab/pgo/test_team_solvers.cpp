@@ -1,30 +1,15 @@
 #include <catch2/catch.hpp>
 
-#include "apps/lab/pgo/central_solver.hpp"
-#include "apps/lab/pgo/gauss_seidel_team.hpp"
 #include "apps/lab/pgo/local_team.hpp"
 #include "apps/lab/pgo/member_team.hpp"
 #include "modules/core/lie.hpp"
 #include "modules/rbcd/member_rbcd.hpp"
 #include "modules/tree_newton/chordal.hpp"
 #include "test/support/pose_graph_problems.hpp"
-#include "test/support/shared_data.hpp"
 #include "test/support/team_graphs.hpp"
 
 namespace km {
 namespace {
-
-std::vector<SE3> chordal(const TeamGraph& graph) {
-  return chordal_initialisation(graph.poses(), graph.edges);
-}
-
-double certified_optimum_of(const TeamGraph& graph) {
-  Staircase staircase(graph.edges, lift(chordal(graph), 3));
-  while (staircase.step()) {
-  }
-  REQUIRE(staircase.certificate()->certified);
-  return staircase.cost();
-}
 
 // Clock that advances by one unit at every use.
 TeamMeter counting_meter(double& clock) {
@@ -82,45 +67,6 @@ TEST_CASE("A round of block descent counts the bytes of its messages", "[pgo][rb
                                                                           // round
   const std::size_t progress = 2 * (kHeader + 2 + (2 + numbers) * sizeof(double));
   CHECK(rounds[1].work.bytes == starts + poses + shares + progress);
-}
-
-TEST_CASE("Robots of one colour share no edges, and all have a colour", "[pgo]") {
-  const TeamGraph graph = WoundRing(24, 12).graph;
-  const TeamNeighbours neighbours = neighbours_in(graph);
-  std::size_t coloured = 0;
-  for (const auto& members : colours_of(neighbours)) {
-    coloured += members.size();
-    for (const std::size_t a : members)
-      for (const std::size_t b : members)
-        CHECK_FALSE(std::binary_search(neighbours[a].begin(), neighbours[a].end(), b));
-  }
-  CHECK(coloured == 12);
-  CHECK(colours_of(neighbours).size() == 2);  // a ring with an even number of robots
-  const TeamTree tree = breadth_first_tree(neighbours);
-  CHECK(tree.order.size() == 12);
-}
-
-TEST_CASE("Gauss-Seidel sweeps of a team reach the result of one robot", "[pgo]") {
-  const std::size_t robots = GENERATE(2U, 4U);
-  CAPTURE(robots);
-  std::mt19937 rng(2);
-  const TeamGraph graph = noisy_chain(40, robots, 0.05, rng);
-  TeamGraph alone = graph;
-  alone.first = {0, 40};
-  const GaussSeidelOptions exact{.max_sweeps = 2000, .tolerance = 1e-7};
-  const auto cost_of = [&](const TeamGraph& partitioned) {
-    GaussSeidelTeam team(partitioned, chordal(graph), exact);
-    return run_team(partitioned, team, {.max_rounds = 20000}, {}).back().cost;
-  };
-  const double team_cost = cost_of(graph);
-  // Positions of some 100 m are sent in single precision, and slow modes accumulate the rounding
-  // errors.
-  CHECK(team_cost == Approx(cost_of(alone)).epsilon(1e-2));
-  // One Gauss-Newton step from the chordal rotations improves on them, and cannot be better than
-  // the optimum.
-  const QuadraticProblem problem(3, 40, graph.edges, {});
-  CHECK(team_cost < problem.cost(lift(chordal(graph), 3)));
-  CHECK(team_cost >= certified_optimum_of(graph) * (1.0 - 1e-9));
 }
 
 TEST_CASE("Without noise, robots that solve alone and are joined have no cost", "[pgo]") {
