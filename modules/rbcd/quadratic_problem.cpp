@@ -12,10 +12,10 @@ namespace {
 
 // Diagonal that precondition() adds on translations, relative to the largest sum of tau over the
 // edges of one pose. It only keeps the preconditioner definite. A larger value would slow down the
-// motions of long chains of poses, which change the cost little. Rotations need a larger value, see
-// set_rotation_shift(): otherwise the preconditioner amplifies steps of rotations off their
-// manifold.
-constexpr double kTranslationShift = 1e-10;
+// motions of long chains of poses, which change the cost little. Rotations need a larger value,
+// relative to the largest sum of kappa: otherwise the preconditioner amplifies steps of rotations
+// off their manifold.
+constexpr double kTranslationShift = 1e-10, kRotationShift = 1e-3;
 
 Eigen::Vector4d weights(double kappa, double tau) {
   return {kappa, kappa, kappa, tau};
@@ -203,11 +203,6 @@ LiftedPoses QuadraticProblem::hessian_product(const LiftedPoses& X, const Lifted
   return project_tangent(X, product);
 }
 
-void QuadraticProblem::set_rotation_shift(double shift) {
-  rotation_shift_ = shift;
-  preconditioner_.reset();
-}
-
 Eigen::Vector2d QuadraticProblem::largest_degrees() const {
   Eigen::Matrix2Xd degrees = Eigen::Matrix2Xd::Zero(2, poses_);
   for (const BlockEdge& e : edges_)
@@ -220,7 +215,7 @@ LiftedPoses QuadraticProblem::precondition(const LiftedPoses& X, const LiftedPos
   if (!preconditioner_) {
     Eigen::SparseMatrix<double> A = 2.0 * Q_;
     const Eigen::Vector2d degree = largest_degrees();
-    const double rotation = 2.0 * rotation_shift_ * degree.x();
+    const double rotation = 2.0 * kRotationShift * degree.x();
     const double translation = 2.0 * kTranslationShift * degree.y();
     A.diagonal() += Eigen::Vector4d(rotation, rotation, rotation, translation).replicate(poses_, 1);
     preconditioner_ = std::make_unique<const BlockCholesky>(A);

@@ -85,11 +85,6 @@ class QuadraticProblem {
   /// once, at the first call.
   [[nodiscard]] LiftedPoses precondition(const LiftedPoses& X, const LiftedPoses& V) const;
 
-  /// Sets the diagonal that precondition() adds on rotations, relative to the largest sum of kappa
-  /// over the edges of one pose. With a small value, truncated Newton steps converge fast near a
-  /// minimum and slowly far from it.
-  void set_rotation_shift(double shift);
-
   [[nodiscard]] Eigen::Index rank() const { return rank_; }
   [[nodiscard]] Eigen::Index poses() const { return poses_; }
   [[nodiscard]] const std::vector<BlockEdge>& edges() const { return edges_; }
@@ -109,7 +104,6 @@ class QuadraticProblem {
   Eigen::Index rank_;
   Eigen::Index poses_;
   Eigen::Index fixed_count_ = 0;
-  double rotation_shift_ = 1e-3;
   std::vector<BlockEdge> edges_;
   std::vector<PublicEdge> public_edges_;
   std::vector<VerticalPrior> verticals_;

@@ -170,7 +170,7 @@ inline Eavesdropper listen_to(const TeamGraph& graph, int max_rounds) {
   const TreeNewtonOptions options{.dimension = graph.dimension};
   REQUIRE(options.robust);
   std::vector<SE3> start = chordal_initialisation(graph.poses(), graph.edges);
-  MemberTeam team(graph, 3, std::move(start), [&](SessionGraph part, TreePlace place) {
+  MemberTeam team(graph, std::move(start), [&](SessionGraph part, TreePlace place) {
     const RobotId self = part.self;
     ear.announced(part);
     auto member = std::make_unique<TreeNewton>(std::move(part), std::move(place), options);

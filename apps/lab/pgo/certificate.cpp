@@ -1,8 +1,7 @@
 #include "apps/lab/pgo/certificate.hpp"
 
-#include <Spectra/SymEigsSolver.h>
+#include <Eigen/SparseCholesky>
 #include <algorithm>
-#include <random>
 
 namespace km {
 namespace {
@@ -16,9 +15,6 @@ constexpr double kRounding = 1e-12;  // relative to the largest sum of kappa at 
 // of a singular S fails.
 constexpr double kLeastShift = 1e-14;
 constexpr double kShiftGrowth = 30.0;
-constexpr Index kKrylovSize = 60;
-constexpr Index kMaxRestarts = 1000;
-constexpr double kEigenTolerance = 1e-6;
 
 // 1 for the columns that have unit length in every solution: those of rotations, and the vertical.
 // 0 for translations and for the padding of the block of the vertical.
@@ -58,8 +54,6 @@ class ShiftedCholesky {
     llt_.factorize(A);
     return llt_.info() == Eigen::Success;
   }
-
-  [[nodiscard]] Eigen::VectorXd solve(const Eigen::VectorXd& b) const { return llt_.solve(b); }
 
  private:
   Eigen::SparseMatrix<double> S_;
@@ -120,13 +114,6 @@ void append_vertical(const QuadraticProblem& problem, const LiftedPoses& X,
   }
 }
 
-// Changes `direction` so that the vertical stays constant, by a multiple of the row of [X z] along
-// z. This row is in the kernel of S.
-Eigen::VectorXd with_vertical_held(const Eigen::VectorXd& direction, const LiftedPoses& X) {
-  const double moved = direction.size() > X.cols() ? direction(X.cols() + 2) : 0.0;
-  return direction.head(X.cols()) - moved * X.row(2).transpose();
-}
-
 // sym(Y_i^T (X Q)_Y,i) of every pose, side by side. The bound of certify() holds for every X,
 // because S and tr(Lambda) use the same multipliers.
 Eigen::Matrix3Xd multipliers(const QuadraticProblem& problem, const LiftedPoses& X) {
@@ -150,35 +137,14 @@ double dual_value(const QuadraticProblem& problem, const LiftedPoses& X,
   return sum;
 }
 
-struct Eigenpair {
-  double value = 0.0;
-  Eigen::VectorXd vector;
-};
-
-// The block of the inverse on `units`, as an operator of Spectra.
-struct InverseOnUnits {
-  using Scalar = double;
-
-  const ShiftedCholesky& cholesky;
-  const Eigen::VectorXd& units;
-
-  [[nodiscard]] Index rows() const { return units.size(); }
-  [[nodiscard]] Index cols() const { return units.size(); }
-  void perform_op(const double* in, double* out) const {
-    const Eigen::Map<const Eigen::VectorXd> x(in, units.size());
-    Eigen::Map<Eigen::VectorXd>(out, units.size()) =
-        units.cwiseProduct(cholesky.solve(units.cwiseProduct(x)));
-  }
-};
-
 // Eigenvalue problem of certify(), with one pose held at the origin.
 class ProofOf {
  public:
   ProofOf(const QuadraticProblem& problem, const LiftedPoses& X) : units_(unit_columns(problem)) {
     const double held = problem.largest_degrees().y();
-    best_ = with_best_tilt(problem, with_best_translations(problem, X, held));
-    cholesky_.emplace(hold(certificate_matrix(problem, best_), problem, held));
-    dual_ = dual_value(problem, best_, multipliers(problem, best_));
+    const LiftedPoses best = with_best_tilt(problem, with_best_translations(problem, X, held));
+    cholesky_.emplace(hold(certificate_matrix(problem, best), problem, held));
+    dual_ = dual_value(problem, best, multipliers(problem, best));
   }
 
   [[nodiscard]] bool definite(double shift) { return cholesky_->factorise(units_, shift); }
@@ -189,47 +155,13 @@ class ProofOf {
     return std::max(0.0, dual_ - shift * units_.sum());
   }
 
-  // The smallest eigenvalue, from above, and its direction; nullopt if the iterations do not
-  // converge. Their operator is the block of (S + shift)^-1 on the rotations: the inverse of the
-  // shifted Schur complement. Precondition: definite(shift) was called last and returned true.
-  [[nodiscard]] std::optional<Eigenpair> smallest_eigenpair(double shift, unsigned seed) const {
-    std::mt19937 rng(seed);
-    std::normal_distribution<double> normal;
-    Eigen::VectorXd start(units_.size());
-    for (double& v : start) v = normal(rng);
-    InverseOnUnits inverse{*cholesky_, units_};
-    Spectra::SymEigsSolver<InverseOnUnits> lanczos(inverse, 1, std::min(kKrylovSize, start.size()));
-    lanczos.init(start.data());
-    if (lanczos.compute(Spectra::SortRule::LargestAlge, kMaxRestarts, kEigenTolerance) == 0)
-      return std::nullopt;
-    return Eigenpair{
-        1.0 / lanczos.eigenvalues()(0) - shift,
-        with_vertical_held(cholesky_->solve(lanczos.eigenvectors().col(0)), best_).normalized()};
-  }
-
   [[nodiscard]] double trace() const { return units_.sum(); }
 
  private:
   Eigen::VectorXd units_;
-  LiftedPoses best_;
   std::optional<ShiftedCholesky> cholesky_;
   double dual_ = 0.0;
 };
-
-// If `refused` > 0, the factorisation with this shift was not definite, so the smallest eigenvalue
-// is below -refused. A larger Ritz value shows that the start was nearly orthogonal to the
-// eigenvector, and other starts are tried.
-std::optional<Eigenpair> eigenpair_below(const ProofOf& proof, double shift, double refused,
-                                         unsigned seed) {
-  constexpr unsigned kStarts = 4;
-  constexpr unsigned kBetweenSeeds = 1000;
-  std::optional<Eigenpair> least = proof.smallest_eigenpair(shift, seed);
-  for (unsigned k = 1; refused > 0.0 && k < kStarts && !(least && least->value <= -refused); ++k) {
-    std::optional<Eigenpair> other = proof.smallest_eigenpair(shift, seed + k * kBetweenSeeds);
-    if (other && !(least && least->value <= other->value)) least = std::move(other);
-  }
-  return least;
-}
 
 }  // namespace
 
@@ -263,60 +195,13 @@ Certificate certify(const QuadraticProblem& problem, const LiftedPoses& X) {
   const double scale = std::max(cost, kRounding * degree * proof.trace());
   const double allowed = std::max(0.5 * kCertifiedGap * cost / proof.trace(), kLeastShift * degree);
   const double tight = std::max(kTightGap * cost / proof.trace(), kLeastShift * degree);
-  Certificate certificate;
   double shift = tight;
-  double refused = 0.0;  // largest shift that was too small
-  for (const double tried : {tight, allowed}) {
-    if (proof.definite(shift = tried)) break;
-    refused = shift;
+  if (!proof.definite(shift) && !proof.definite(shift = allowed)) {
+    shift = std::max(kShiftGrowth * allowed, kRounding * degree);
+    while (!proof.definite(shift)) shift *= kShiftGrowth;
   }
-  if (refused == allowed) {
-    shift = std::max(kShiftGrowth * refused, kRounding * degree);
-    while (!proof.definite(shift)) {
-      refused = shift;
-      shift *= kShiftGrowth;
-    }
-  }
-  const auto prove = [&] {
-    certificate.lambda_bound = -shift;
-    certificate.relative_gap = std::max(0.0, (cost - proof.bound(shift)) / scale);
-    certificate.certified = certificate.relative_gap <= kCertifiedGap;
-  };
-  prove();
-  if (certificate.certified) return certificate;
-  // The start differs between ranks. The Krylov space of a start contains only one eigenvector of a
-  // multiple eigenvalue, and the last escape has already used that one.
-  if (auto least = eigenpair_below(proof, shift, refused, static_cast<unsigned>(X.rows()))) {
-    certificate.lambda_min = least->value;
-    certificate.direction = std::move(least->vector);
-  }
-  return certificate;
-}
-
-LiftedPoses escape(const QuadraticProblem& problem, const LiftedPoses& X,
-                   const Eigen::VectorXd& direction) {
-  LiftedPoses lifted = LiftedPoses::Zero(X.rows() + 1, X.cols());
-  lifted.topRows(X.rows()) = X;
-  LiftedPoses step = LiftedPoses::Zero(lifted.rows(), lifted.cols());
-  step.bottomRows(1) = direction.transpose();
-  const double cost = problem.cost(lifted);
-  // In the first trial the pose that rotates most rotates by half a radian.
-  double largest = 0.0;
-  for (Eigen::Index i = 0; i < problem.poses(); ++i)
-    largest = std::max(largest, direction.segment<3>(4 * i).norm());
-  constexpr int kMaxHalvings = 40;
-  double length = 0.5 / std::max(largest, 1e-300);
-  LiftedPoses best = lifted;
-  double best_cost = cost;
-  for (int k = 0; k < kMaxHalvings; ++k, length *= 0.5) {
-    LiftedPoses candidate = retract(lifted, length * step);
-    const double candidate_cost = problem.cost(candidate);
-    if (candidate_cost >= best_cost && best_cost < cost) break;
-    if (candidate_cost >= best_cost) continue;
-    best = std::move(candidate);
-    best_cost = candidate_cost;
-  }
-  return best;
+  const double gap = std::max(0.0, (cost - proof.bound(shift)) / scale);
+  return {.certified = gap <= kCertifiedGap, .relative_gap = gap, .lambda_bound = -shift};
 }
 
 }  // namespace km

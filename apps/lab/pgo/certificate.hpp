@@ -1,7 +1,5 @@
 #pragma once
 
-#include <optional>
-
 #include "modules/rbcd/quadratic_problem.hpp"
 
 namespace km {
@@ -26,12 +24,6 @@ struct [[nodiscard]] Certificate {
   double relative_gap = 0.0;
   /// No eigenvalue of S is smaller once the translations are eliminated.
   double lambda_bound = 0.0;
-  /// Estimate of the smallest eigenvalue, from above. nullopt if certified, or if the estimate does
-  /// not converge.
-  std::optional<double> lambda_min = {};
-  /// Eigenvector of `lambda_min`, 4n, with the best translations for its rotations. The vertical
-  /// does not change along it. Empty without `lambda_min`.
-  Eigen::VectorXd direction = {};
 };
 
 /// Bounds the cost of all feasible points of any rank from below, and thus the gap of feasible `X`.
@@ -46,16 +38,8 @@ struct [[nodiscard]] Certificate {
 /// translation is held, because S does not depend on the position of the origin.
 ///
 /// The shifts 1e-8 of the cost over 3n and then half of 1e-4 of the cost over 3n are tried. If
-/// neither certifies `X`, larger shifts show which gap can be proven, and Lanczos iterations on the
-/// inverse estimate the smallest eigenvalue. Precondition: `problem` has no public edges and is
-/// connected.
+/// neither certifies `X`, larger shifts show which gap can be proven. Precondition: `problem` has
+/// no public edges and is connected.
 [[nodiscard]] Certificate certify(const QuadraticProblem& problem, const LiftedPoses& X);
-
-/// Returns feasible poses of rank r + 1 with a lower cost than `X` of rank r. It searches along the
-/// negative direction in the added dimension (Riemannian staircase of SE-Sync, step out of a saddle
-/// point). The rank of `problem` is r + 1. If the cost does not decrease, the result is `X` with an
-/// added row of zeros.
-[[nodiscard]] LiftedPoses escape(const QuadraticProblem& problem, const LiftedPoses& X,
-                                 const Eigen::VectorXd& direction);
 
 }  // namespace km

@@ -12,10 +12,8 @@ namespace km {
 
 using Eigen::Index;
 
-MemberTeam::MemberTeam(const TeamGraph& graph, Index rank, std::vector<SE3> start,
-                       const Factory& make)
+MemberTeam::MemberTeam(const TeamGraph& graph, std::vector<SE3> start, const Factory& make)
     : graph_(graph),
-      rank_(rank),
       parts_(graph.robots()),
       sent_(graph.robots(), 0),
       received_(graph.robots(), 0) {
@@ -27,7 +25,6 @@ MemberTeam::MemberTeam(const TeamGraph& graph, Index rank, std::vector<SE3> star
   announce_starts(std::move(start));
   for (std::size_t k = 0; k < parts_.size(); ++k)
     members_.push_back(make(parts_[k], places_.at(k)));
-  take_poses();
 }
 
 // Places in the tree that the robots' own plan_tree() computes.
@@ -66,13 +63,12 @@ void MemberTeam::announce_starts(std::vector<SE3> start) {
     T = SinglePose::of(T).pose();
     public_poses[id] = T;
   }
-  constexpr std::size_t kBytes = sizeof(float) * 7 + 2;
-  to_announce_ = kBytes * ends.size();
+  to_announce_ = kPoseBytes * ends.size();
   for (const KeyframeId& id : ends)
     for (std::size_t k = 0; k < parts_.size(); ++k) {
       if (k == id.robot) continue;
-      sent_[id.robot] += kBytes;
-      received_[k] += kBytes;
+      sent_[id.robot] += kPoseBytes;
+      received_[k] += kPoseBytes;
     }
   for (std::size_t k = 0; k < parts_.size(); ++k) {
     parts_[k].start.assign(start.begin() + graph_.first[k], start.begin() + graph_.first[k + 1]);
@@ -84,11 +80,11 @@ void MemberTeam::announce_starts(std::vector<SE3> start) {
   }
 }
 
-void MemberTeam::take_poses() {
-  blocks_.clear();
-  for (const auto& member : members_) blocks_.push_back(lift(member->poses(), rank_));
-  for (std::size_t k = 0; k < members_.size(); ++k)
-    if (!places_.at(k).parent) state_ = members_[k]->state();
+std::vector<SE3> MemberTeam::poses() const {
+  std::vector<SE3> poses;
+  for (const auto& member : members_)
+    poses.insert(poses.end(), member->poses().begin(), member->poses().end());
+  return poses;
 }
 
 int MemberTeam::step(RoundMeter& meter) {
@@ -103,7 +99,8 @@ int MemberTeam::step(RoundMeter& meter) {
   while (!arrived())
     if (!pass_on(round, meter))
       throw std::runtime_error("MemberTeam: the members wait for each other");
-  take_poses();
+  for (std::size_t k = 0; k < members_.size(); ++k)
+    if (!places_.at(k).parent) state_ = members_[k]->state();
   // A solver may publish its state every few rounds only.
   rounds_ = std::max(round, state_.round);
   return static_cast<int>(rounds_ - before);
@@ -136,6 +133,13 @@ bool MemberTeam::pass_on(std::uint32_t round, RoundMeter& meter) {
   }
   meter.finish_exchange();
   return worked;
+}
+
+std::vector<TeamRound> run_team(const TeamGraph& graph, MemberTeam& team, int max_rounds,
+                                const TeamMeter& meter) {
+  return run_rounds(
+      graph, [&] { return team.poses(); }, [&](RoundMeter& round) { return team.step(round); },
+      max_rounds, meter);
 }
 
 }  // namespace km

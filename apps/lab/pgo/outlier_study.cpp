@@ -11,7 +11,6 @@
 #include "apps/lab/pgo/team_graph.hpp"
 #include "modules/evaluation/trajectory_error.hpp"
 #include "modules/outlier_rejection/pcm.hpp"
-#include "modules/rbcd/stiefel.hpp"
 #include "modules/robust/lone_solution.hpp"
 #include "modules/tree_newton/chordal.hpp"
 #include "modules/tree_newton/tree_front.hpp"
@@ -93,13 +92,13 @@ PlacedTeam solve_centrally(const TeamGraph& graph, std::vector<bool> kept, std::
   PlacedTeam placed{.T_frame_kf = std::move(start), .frame_of = {}, .kept = std::move(kept)};
   placed.frame_of = part_of_poses(with_edges(graph, placed.kept));
   for (const ConnectedPart& part : connected_parts(graph, placed.kept)) {
-    SessionGraph alone;
-    for (const std::size_t i : part.poses) alone.start.push_back(placed.T_frame_kf[i]);
-    for (const BlockEdge& e : part.graph.edges) alone.own.push_back(e.of_one_robot());
-    const LoneSolution solved = solve_alone(std::move(alone), {.dimension = graph.dimension,
-                                                               .absolute_tolerance = kEnd,
-                                                               .max_rounds = 300,
-                                                               .robust = false});
+    std::vector<SE3> from;
+    for (const std::size_t i : part.poses) from.push_back(placed.T_frame_kf[i]);
+    const LoneSolution solved =
+        solve_alone(whole_session(part.graph, std::move(from)), {.dimension = graph.dimension,
+                                                                 .absolute_tolerance = kEnd,
+                                                                 .max_rounds = 300,
+                                                                 .robust = false});
     placed.decided = placed.decided && solved.converged;
     for (std::size_t k = 0; k < part.poses.size(); ++k)
       placed.T_frame_kf[part.poses[k]] = solved.poses[k];
@@ -153,8 +152,9 @@ OutlierStudy run_outlier_study(const TeamGraph& clean, const OutlierStudyOptions
     if (!(percent >= 0.0 && std::isfinite(percent)))
       throw std::invalid_argument("outlier study: a share of " + std::to_string(percent) + " %");
   const CentralOptimum central = central_optimum(clean);
-  const std::vector<SE3> optimum = round_to_poses(central.X, central.X.leftCols<4>());
-  OutlierStudy study{.scenario = scenario.name, .certified = central.certified, .results = {}};
+  const std::vector<SE3>& optimum = central.poses;
+  OutlierStudy study{
+      .scenario = scenario.name, .certified = central.certificate.certified, .results = {}};
   const std::size_t all = shares.size() * options.methods.size() * options.seeds.size();
   for (const double percent : shares)
     for (const std::string& method : options.methods)

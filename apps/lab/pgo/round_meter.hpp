@@ -1,11 +1,12 @@
 #pragma once
 
-#include <Eigen/Core>
 #include <algorithm>
 #include <cstddef>
 #include <functional>
 #include <utility>
 #include <vector>
+
+#include "apps/lab/pgo/team_graph.hpp"
 
 namespace km {
 
@@ -36,16 +37,8 @@ struct TeamWork {
   }
 };
 
-// Bytes that a message of a method without encoded messages would take as a solver message between
-// robots (see SolverMessage). The head takes 4 bytes for kind and round. Public poses take 2 bytes
-// for the index of each and 4 rank floats.
-
-inline constexpr std::size_t kMessageHeader = 1 + 3;  ///< Kind, and the round as a varint.
-
-[[nodiscard]] constexpr std::size_t bytes_of_poses(std::size_t poses, Eigen::Index rank) {
-  constexpr std::size_t kIndex = 2;
-  return poses * (kIndex + 4 * sizeof(float) * static_cast<std::size_t>(rank));
-}
+/// Bytes of a pose in a message between robots: single precision, with its index.
+inline constexpr std::size_t kPoseBytes = 7 * sizeof(float) + 2;
 
 /// Measures the rounds of a team that is run in one thread. Not thread-safe.
 class RoundMeter {
@@ -60,7 +53,7 @@ class RoundMeter {
     return work();
   }
 
-  /// Counts a message of `bytes` bytes, see bytes_of_poses(). A message with the same content for
+  /// Counts a message of `bytes` bytes. A message with the same content for
   /// all peers is a broadcast and counts once.
   void sent(std::size_t bytes) { round_.bytes += bytes; }
 
@@ -82,5 +75,21 @@ class RoundMeter {
   std::vector<double> cpu_s_;  // per robot, in this exchange
   TeamWork round_;
 };
+
+/// State of the team after a round.
+struct TeamRound {
+  int round = 0;               ///< Rounds of the team so far.
+  double cost = 0.0;           ///< Chordal cost, without 1/2, with all verticals.
+  double gradient_norm = 0.0;  ///< Riemannian gradient of the whole graph.
+  TeamWork work;               ///< Work up to and including this round.
+};
+
+/// Calls step(meter), which returns the number of rounds that it took, until that is 0 or
+/// `max_rounds` are over. Cost and gradient at poses() are evaluated centrally, and their CPU time
+/// is not counted. Entry 0 is the state at the start, without work.
+[[nodiscard]] std::vector<TeamRound> run_rounds(const TeamGraph& graph,
+                                                const std::function<std::vector<SE3>()>& poses,
+                                                const std::function<int(RoundMeter&)>& step,
+                                                int max_rounds, const TeamMeter& meter);
 
 }  // namespace km

@@ -38,15 +38,14 @@ Methods:
   rbcd         Riemannian block-coordinate descent (Tian et al., TRO 2021) as robots run
                it: in a round all robots update, in turn, over-relaxed unless
                --over-relaxation is 1; ends when the cost hardly decreases any more
-  centralized  the whole graph on one computer: Newton, certified; otherwise the
-               staircase of SE-Sync
+  centralized  the whole graph on one computer: Newton's method
   newton       default of the robots: Newton steps of the whole team up and down a tree
                of robots. It estimates how noisy closures are and rejects false ones
                (graduated non-convexity: weights and a step, in turn). It ends with the
                optimum of the closures that it keeps. --trust-all keeps all closures
 newton is the robots' own code, from measurements to published poses, over an ideal network.
 newton --trust-all and the other methods start from the chordal initialisation of the whole
-graph, whose time is shown separately (local: of each robot's own graph).
+graph, whose time is shown separately.
 
 A round is one exchange of messages. For newton it is one pass up the tree and one pass down.
 For rbcd it is an update by every robot, and poses are available after every fifth round.
@@ -111,9 +110,8 @@ std::string certificate_text(const Certificate& certificate) {
   std::string text = certificate.certified ? "certified" : "not certified";
   text += ": proven that the cost lies above that of any poses by at most " +
           rounded(std::max(certificate.relative_gap, 1e-12), 2) +
-          " of itself (lambda_min at least " + rounded(certificate.lambda_bound, 3);
-  if (certificate.lambda_min) text += ", estimated " + rounded(*certificate.lambda_min, 3);
-  return text + ")\n";
+          " of itself (lambda_min at least " + rounded(certificate.lambda_bound, 3) + ")\n";
+  return text;
 }
 
 std::string comparison_text(const Solution& solution) {
@@ -122,7 +120,7 @@ std::string comparison_text(const Solution& solution) {
   text << table(solution) << "chordal start in " << fixed(solution.start_s, 3) << " s, "
        << (comparison.optimum_certified ? "optimum " : "least cost known ")
        << rounded(comparison.optimum, 9) << ", rounded cost " << rounded(comparison.rounded_cost, 9)
-       << ", rank " << comparison.rank << '\n'
+       << '\n'
        << certificate_text(comparison.certificate);
   return text.str();
 }
@@ -223,9 +221,8 @@ std::string score_text(const TruthScore& truth) {
 // Writes one object. rounds[0] is the start; bytes and times are sums up to the round:
 //     {"poses", "edges", "verticals", "indefinite_edges", "robots", "method", "start_cpu_s",
 //     "rounds": [{"cost", "gradient_norm", "bytes", "critical_path_s", "total_cpu_s"}]}.
-// Keys in addition if the solution has a comparison; "lambda_min" only if it was estimated:
-//     "rounded_cost", "relative_gap", "lambda_bound", "lambda_min", "certified", "rank",
-//     "optimum".
+// Keys in addition if the solution has a comparison:
+//     "rounded_cost", "relative_gap", "lambda_bound", "certified", "optimum".
 // Keys of newton in addition:
 //     "noise_scale", "barc" [sigma of the graph], "most_sent", "most_received", "decided",
 //     "kept": [indices of edges].
@@ -257,9 +254,7 @@ void write_solution_json(std::ostream& out, const TeamGraph& graph, const Soluti
                  {"relative_gap", certificate.relative_gap},
                  {"lambda_bound", certificate.lambda_bound},
                  {"certified", certificate.certified},
-                 {"rank", comparison->rank},
                  {"optimum", comparison->optimum}});
-    if (certificate.lambda_min) json["lambda_min"] = *certificate.lambda_min;
   }
   if (const auto& decision = solution.run.decision) {
     json.update({{"noise_scale", decision->noise_scale},
@@ -310,7 +305,7 @@ void define_method(CLI::App& app, SolveCommand& command) {
 void check(CLI::App& app, SolveCommand& command) {
   if (command.solver.trust_all && command.solver.method != "newton")
     throw std::runtime_error("--trust-all is for --method newton only");
-  command.solver.run.max_rounds = command.rounds.value_or(command.solver.rejects() ? 1000 : 100);
+  command.solver.max_rounds = command.rounds.value_or(command.solver.rejects() ? 1000 : 100);
   if (app.count("--over-relaxation") > 0 && command.solver.method != "rbcd")
     throw std::runtime_error("--over-relaxation is for --method rbcd only");
   check_output_folder(command.json);

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "apps/lab/pgo/certificate.hpp"
-#include "apps/lab/pgo/member_team.hpp"
-#include "apps/lab/pgo/team_solver.hpp"
+#include "apps/lab/pgo/round_meter.hpp"
+#include "apps/lab/pgo/team_graph.hpp"
 
 namespace km {
 
@@ -21,7 +21,7 @@ namespace km {
 /// A method, by its name in kMethods, and its parameters.
 struct SolverOptions {
   std::string method = "newton";
-  TeamRunOptions run = {.max_rounds = 100};
+  int max_rounds = 100;
   double over_relaxation = 1.95;  ///< rbcd: largest value; 1: as published.
   bool trust_all = false;         ///< newton: all closures are treated as true.
 
@@ -46,7 +46,7 @@ struct SolverRun {
   /// [0]: the start, with costs of all edges at weight 1. A method that rejects closures reports
   /// only the last round, with the cost of the closures that it keeps.
   std::vector<TeamRound> rounds;
-  LiftedPoses X;
+  std::vector<SE3> poses;            ///< In any frame; z up with verticals.
   std::optional<Decision> decision;  ///< Only of newton.
 };
 
@@ -57,12 +57,12 @@ struct SolverRun {
 
 /// The least known cost of a graph with all edges trusted, computed on one computer.
 struct CentralOptimum {
-  LiftedPoses X;
+  std::vector<SE3> poses;  ///< In the frame of the first one.
   double cost = 0.0;
-  bool certified = false;
+  Certificate certificate;
 };
 
-/// Computed by CentralSolver, from `start` or from the chordal initialisation.
+/// Computed by solve_alone(), from `start` or from the chordal initialisation.
 [[nodiscard]] CentralOptimum central_optimum(const TeamGraph& graph, const std::vector<SE3>& start);
 [[nodiscard]] CentralOptimum central_optimum(const TeamGraph& graph);
 
@@ -75,8 +75,6 @@ struct OptimumComparison {
   double optimum = 0.0;            ///< The least known cost.
   bool optimum_certified = false;  ///< Proven to be the least of all.
   Certificate certificate = {};
-  /// Numerical rank of the rotations; 3 (2 in the plane): the poses are rigid.
-  Eigen::Index rank = 0;
 };
 
 /// Result of one method on one graph.
@@ -84,7 +82,7 @@ struct Solution {
   std::string method;    ///< SolverOptions::name().
   double start_s = 0.0;  ///< CPU time of the chordal initialisation.
   SolverRun run = {};
-  /// Rounded poses in the frame of the first pose; z up with verticals.
+  /// Poses in the frame of the first one; z up with verticals.
   std::vector<SE3> T_world_kf = {};
   /// nullopt if the method rejects closures: its optimum depends on its own decision.
   std::optional<OptimumComparison> comparison = {};

@@ -4,7 +4,6 @@
 #include <map>
 #include <numeric>
 #include <set>
-#include <stdexcept>
 #include <utility>
 
 namespace km {
@@ -112,36 +111,15 @@ SessionGraph part_of(const TeamGraph& graph, std::size_t robot) {
   return part;
 }
 
+SessionGraph whole_session(const TeamGraph& graph, std::vector<SE3> start) {
+  SessionGraph whole{
+      .start = std::move(start), .verticals = graph.verticals, .upright = !graph.verticals.empty()};
+  for (const BlockEdge& e : graph.edges) whole.own.push_back(e.of_one_robot());
+  return whole;
+}
+
 QuadraticProblem problem_of(const TeamGraph& graph, Eigen::Index rank) {
   return {rank, graph.poses(), graph.edges, {}, graph.verticals};
-}
-
-TeamNeighbours neighbours_in(const TeamGraph& graph) {
-  std::vector<std::set<std::size_t>> sets(graph.robots());
-  for (const BlockEdge& e : graph.edges) {
-    const std::size_t a = graph.robot_of(e.i);
-    const std::size_t b = graph.robot_of(e.j);
-    if (a == b) continue;
-    sets[a].insert(b);
-    sets[b].insert(a);
-  }
-  TeamNeighbours neighbours;
-  for (const auto& set : sets) neighbours.emplace_back(set.begin(), set.end());
-  return neighbours;
-}
-
-TeamTree breadth_first_tree(const TeamNeighbours& neighbours) {
-  TeamTree tree{.order = {0}, .parent = std::vector<std::size_t>(neighbours.size(), 0)};
-  std::set<std::size_t> reached{0};
-  for (std::size_t at = 0; at < tree.order.size(); ++at)
-    for (const std::size_t next : neighbours[tree.order[at]])
-      if (reached.insert(next).second) {
-        tree.parent[next] = tree.order[at];
-        tree.order.push_back(next);
-      }
-  if (tree.order.size() != neighbours.size())
-    throw std::invalid_argument("breadth_first_tree: robot 0 is not connected with all others");
-  return tree;
 }
 
 std::vector<ConnectedPart> connected_parts(const TeamGraph& graph,

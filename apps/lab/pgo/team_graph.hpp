@@ -57,23 +57,12 @@ struct TeamGraph {
 /// values of all robots.
 [[nodiscard]] SessionGraph part_of(const TeamGraph& graph, std::size_t robot);
 
+/// The whole graph as that of one robot, with id 0, that starts at `start`.
+[[nodiscard]] SessionGraph whole_session(const TeamGraph& graph, std::vector<SE3> start);
+
 /// Cost function of the whole graph at rank r. Throws std::invalid_argument as QuadraticProblem
 /// does.
 [[nodiscard]] QuadraticProblem problem_of(const TeamGraph& graph, Eigen::Index rank);
-
-/// By robot: the robots with which it shares edges, ascending.
-using TeamNeighbours = std::vector<std::vector<std::size_t>>;
-
-[[nodiscard]] TeamNeighbours neighbours_in(const TeamGraph& graph);
-
-/// Breadth-first tree from robot 0. parent[k] comes before k in `order`.
-struct TeamTree {
-  std::vector<std::size_t> order;
-  std::vector<std::size_t> parent;  ///< By robot; the parent of robot 0 is 0.
-};
-
-/// Throws std::invalid_argument if robot 0 is not connected with all others.
-[[nodiscard]] TeamTree breadth_first_tree(const TeamNeighbours& neighbours);
 
 /// A connected part of a team's graph. Robots, poses and edges keep the order of the whole graph.
 struct ConnectedPart {

@@ -6,7 +6,6 @@
 
 #include "apps/lab/pgo/solvers.hpp"
 #include "modules/evaluation/trajectory_error.hpp"
-#include "modules/rbcd/stiefel.hpp"
 
 namespace km {
 std::vector<ConnectedPart> true_parts(const LabelledTeamGraph& team) {
@@ -23,8 +22,8 @@ TrueOptimum optimum_of_true(const LabelledTeamGraph& team) {
       continue;
     }
     const CentralOptimum solved = central_optimum(part.graph);
-    optimum.parts.push_back({part.poses, round_to_poses(solved.X, solved.X.leftCols<4>())});
-    optimum.certified = optimum.certified && solved.certified;
+    optimum.parts.push_back({part.poses, solved.poses});
+    optimum.certified = optimum.certified && solved.certificate.certified;
   }
   return optimum;
 }

@@ -6,9 +6,8 @@
 #include <utility>
 
 #include "apps/lab/pgo/agent_team.hpp"
-#include "apps/lab/pgo/central_solver.hpp"
+#include "apps/lab/pgo/solvers.hpp"
 #include "modules/core/lie.hpp"
-#include "modules/rbcd/stiefel.hpp"
 #include "modules/tree_newton/chordal.hpp"
 #include "test/support/team_graphs.hpp"
 
@@ -61,13 +60,7 @@ TEST_CASE("The robots' own code publishes the optimum of a graph", "[pgo][agents
   CHECK(run.world_of == std::vector<RobotId>{0, 0, 0});
   // One of the true closures may look false by its noise, as in 11 of 120 runs of seeds 1 to 40.
   CHECK(std::ranges::count(run.kept, false) <= 1);
-  std::vector<BlockEdge> kept;
-  for (std::size_t e = 0; e < graph.edges.size(); ++e)
-    if (run.kept[e]) kept.push_back(graph.edges[e]);
-  CentralSolver central(kept, lift(chordal_initialisation(graph.poses(), kept), 3), 3);
-  while (central.step()) {
-  }
-  const std::vector<SE3> optimum = round_to_poses(central.X(), central.X().leftCols<4>());
+  const std::vector<SE3> optimum = central_optimum(with_edges(graph, run.kept)).poses;
   CHECK(largest_difference_m(run.T_world_kf, optimum) < 1e-3 * kNoise);
 }
 

@@ -10,7 +10,6 @@
 #include "apps/lab/pgo/scenario.hpp"
 #include "apps/lab/pgo/solvers.hpp"
 #include "apps/lab/pgo/team_graph_file.hpp"
-#include "modules/rbcd/stiefel.hpp"
 #include "test/support/shared_data.hpp"
 
 // The law: a team ends with the decisions and the poses that follow from the measurements, in
@@ -93,9 +92,8 @@ std::optional<TeamGraph> graph_of(const LawCase& recorded) {
   const TeamGraph graph =
       partition_contiguously(read_g2o(*file), drawn ? 1 : recorded.robots, recorded.name);
   if (!drawn) return without_cut_steps(graph);
-  const CentralOptimum optimum = central_optimum(graph);
-  return draw_scenario(graph, round_to_poses(optimum.X, optimum.X.leftCols<4>()),
-                       scenario_of(recorded.scenario), recorded.seed)
+  return draw_scenario(graph, central_optimum(graph).poses, scenario_of(recorded.scenario),
+                       recorded.seed)
       .graph;
 }
 

@@ -31,7 +31,7 @@ class AskedTeam {
         neighbours_(graph.robots()),
         meter_(graph.robots(), {}) {
     options.dimension = graph.dimension;
-    team_.emplace(graph_, 3, std::move(start), [this, options](SessionGraph part, TreePlace place) {
+    team_.emplace(graph_, std::move(start), [this, options](SessionGraph part, TreePlace place) {
       const RobotId self = part.self;
       neighbours_[self] = {place.children.begin(), place.children.end()};
       if (place.parent) neighbours_[self].insert(*place.parent);
@@ -55,12 +55,7 @@ class AskedTeam {
       if (!step()) return true;
     return false;
   }
-  [[nodiscard]] std::vector<SE3> poses() const {
-    std::vector<SE3> poses;
-    for (const TreeNewton* member : members_)
-      poses.insert(poses.end(), member->poses().begin(), member->poses().end());
-    return poses;
-  }
+  [[nodiscard]] std::vector<SE3> poses() const { return team_->poses(); }
   [[nodiscard]] const MemberTeam& team() const { return *team_; }
   [[nodiscard]] const TreeNewton& member(std::size_t robot) const { return *members_[robot]; }
   [[nodiscard]] std::size_t message_bytes() const { return message_bytes_; }
