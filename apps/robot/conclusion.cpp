@@ -124,6 +124,7 @@ FixesSummary fixes_summary(const Robot& robot, const RunRecord& record) {
                        .not_used = {{"without a position", counts.without_position},
                                     {"not finite", counts.not_finite},
                                     {"too uncertain", counts.too_uncertain},
+                                    {"more than 40 km from the datum", counts.far_from_datum},
                                     {"out of order", counts.out_of_order},
                                     {"malformed", counts.malformed},
                                     {"not nearest to a keyframe", counts.far_from_keyframe}},

@@ -5,6 +5,7 @@
 
 #include "modules/core/bytes.hpp"
 #include "modules/core/input_file.hpp"
+#include "modules/core/measurement_limits.hpp"
 #include "modules/core/text_rows.hpp"
 #include "modules/recordings/ros_messages.hpp"
 
@@ -115,10 +116,14 @@ std::optional<TimedPosition> FixReader::accept(const ReceivedFix& fix) {
   if (last_ && stamp <= *last_) return refuse(counts_.out_of_order);
   last_ = stamp;
   TimedPosition accepted{stamp, coordinates, std::max(claimed_m, config_.min_sigma_m)};
-  if (!is_gnss) return accepted;
-  const GeodeticPoint point{coordinates.x(), coordinates.y(), coordinates.z()};
-  if (!datum_) enu_.emplace(datum_.emplace(point));
-  accepted.p_datum = enu_->position_of(point);
+  if (is_gnss) {
+    const GeodeticPoint point{coordinates.x(), coordinates.y(), coordinates.z()};
+    if (!datum_) enu_.emplace(datum_.emplace(point));
+    accepted.p_datum = enu_->position_of(point);
+  }
+  if (!kFix_m.contains(accepted.p_datum.minCoeff()) ||
+      !kFix_m.contains(accepted.p_datum.maxCoeff()))
+    return refuse(counts_.far_from_datum);
   return accepted;
 }
 
@@ -163,7 +168,7 @@ std::vector<TimedPosition> FixReader::read(const std::filesystem::path& file) {
   if (fixes.empty())
     throw InputFileError(file.string() +
                          ": no usable fix in it: rows need a stamp (ns in a .csv file, s "
-                         "elsewhere) and three coordinates");
+                         "elsewhere) and three coordinates, at most 40 km from the datum");
   return fixes;
 }
 

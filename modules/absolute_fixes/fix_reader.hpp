@@ -26,9 +26,10 @@ struct FixCounts {
   std::uint64_t received = 0;
   std::uint64_t without_position = 0;  ///< The receiver reports that it has no position.
   std::uint64_t not_finite = 0;
-  std::uint64_t too_uncertain = 0;  ///< See max_sigma_m.
-  std::uint64_t out_of_order = 0;   ///< The stamp is not after that of the fix before.
-  std::uint64_t malformed = 0;      ///< Messages of another type, and faulty rows.
+  std::uint64_t too_uncertain = 0;   ///< See max_sigma_m.
+  std::uint64_t far_from_datum = 0;  ///< Beyond kFix_m.
+  std::uint64_t out_of_order = 0;    ///< The stamp is not after that of the fix before.
+  std::uint64_t malformed = 0;       ///< Messages of another type, and faulty rows.
   std::uint64_t far_from_keyframe =
       0;  ///< Another fix is nearer to the keyframe, or no pose is known at the time.
 };

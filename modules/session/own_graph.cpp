@@ -109,7 +109,7 @@ bool OwnGraph::add(const PositionFix& fix) {
   const double variance = 3.0 * fix.sigma_m * fix.sigma_m;
   if (fix.keyframe.robot != self_ || index == 0 || index >= keyframes_ || !is_next ||
       fix.datum == 0 || !fix.p_datum.allFinite() || !fix.p_kf.allFinite() ||
-      !kStep_m.contains(fix.p_datum.minCoeff()) || !kStep_m.contains(fix.p_datum.maxCoeff()) ||
+      !kFix_m.contains(fix.p_datum.minCoeff()) || !kFix_m.contains(fix.p_datum.maxCoeff()) ||
       !kVariance.contains(variance))
     return false;
   fixes_.push_back(fix);

@@ -75,18 +75,22 @@ TEST_CASE("unusable fixes are counted by reason", "[absolute_fixes]") {
   CHECK_FALSE(read(reader, bad));
   CHECK_FALSE(read(reader, nav_sat_fix(100)));
   CHECK_FALSE(read(reader, RosPoseStamped{}));
+  bad = nav_sat_fix(200);
+  bad.latitude += 1.0;  // 111 km
+  CHECK_FALSE(read(reader, bad));
   RosNavSatFix unknown = nav_sat_fix(300);
   unknown.position_covariance_type = kRosUnknownCovariance;
   const auto usual = read(reader, unknown);
   REQUIRE(usual);
   CHECK(usual->sigma_m == 3.0);
   const FixCounts& counts = reader.counts();
-  CHECK(counts.received == 8);
+  CHECK(counts.received == 9);
   CHECK(counts.without_position == 1);
   CHECK(counts.not_finite == 2);
   CHECK(counts.too_uncertain == 1);
   CHECK(counts.out_of_order == 1);
   CHECK(counts.malformed == 1);
+  CHECK(counts.far_from_datum == 1);
 }
 
 TEST_CASE("without a configured datum the first fix is the datum", "[absolute_fixes]") {

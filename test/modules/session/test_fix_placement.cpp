@@ -306,7 +306,7 @@ TEST_CASE("false closures between robots in one datum are rejected", "[pose_grap
   }
 }
 
-TEST_CASE("fixes of one robot that are 900 km away leave the other robots in their frame",
+TEST_CASE("fixes of one robot that are 39 km away leave others in their frame, with closures",
           "[pose_graph][fixes]") {
   TeamNetwork network;
   const bool is_scattered = GENERATE(true, false), are_joined = GENERATE(true, false);
@@ -318,17 +318,20 @@ TEST_CASE("fixes of one robot that are 900 km away leave the other robots in the
   for (Run* const run : {&low, &high}) run->fix_all();
   std::mt19937 rng(64);
   for (KeyframeIndex i = 1; i < kRunKeyframes; ++i)
-    liar.fix(i, 9e5 * (is_scattered ? random_vector<3>(rng).normalized().eval()
-                                    : Eigen::Vector3d::UnitX()));
-  close(low, high);
+    liar.fix(i, 3.9e4 * (is_scattered ? random_vector<3>(rng).normalized().eval()
+                                      : Eigen::Vector3d::UnitX()));
+  const auto honest = close(low, high);
   if (are_joined) {
     id < 3 ? close(liar, low) : close(low, liar);
     id < 3 ? close(liar, high) : close(high, liar);
   }
+  const PositionFix beyond{.keyframe = {id, kRunKeyframes - 1}, .p_datum = {0.0, 4.1e4, 0.0}};
+  CHECK_FALSE(liar.agent().add(beyond));
   REQUIRE(each_settles_again(network));
   for (Run* const run : {&low, &high}) {
     REQUIRE(run->state().trajectory);
     CHECK(run->error_m() < kLargest_m);
+    for (const ClosureId& closure : honest) CHECK(run->agent().decided().at(closure));
   }
 }
 
