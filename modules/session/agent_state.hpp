@@ -29,7 +29,8 @@ struct [[nodiscard]] TeamOutput {
   std::optional<Trajectory> trajectory = {};
   std::optional<OptimizerProgress> progress = {};
   std::optional<ClosureVerdicts> verdicts = {};  ///< After a session.
-  std::vector<std::string> notices = {};         ///< Messages for a person.
+  std::vector<std::string> notices = {};         ///< Messages for a person: faults and doubts.
+  std::vector<std::string> news = {};            ///< Messages for a person: ends of doubts.
   bool more = false;  ///< The next step has work even without further input.
 };
 

@@ -202,6 +202,7 @@ TeamOutput TeamAgent::step(double now_s, std::uint64_t sent_bytes) {
   if (is_complete) publish(s, output);
   output.verdicts = s.decisions.take_verdicts();
   output.notices = s.notices.take();
+  output.news = s.notices.take_news();
   return output;
 }
 

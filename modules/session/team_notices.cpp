@@ -105,7 +105,8 @@ void TeamNotices::ties(const FrameTies& ties) {
   std::vector<RobotId> uncertain;
   std::ranges::set_union(ties.tentative, ties.not_joined, std::back_inserter(uncertain));
   if (const std::string robots = added(ties_.tentative, uncertain); !robots.empty())
-    add("no longer joined tentatively, but by closures at several places: with " + robots);
+    news_.push_back("no longer joined tentatively, but by closures at several places: with " +
+                    robots);
   ties_ = ties;
 }
 

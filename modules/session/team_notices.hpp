@@ -40,12 +40,14 @@ class TeamNotices {
   void ties(const FrameTies& ties);
 
   [[nodiscard]] std::vector<std::string> take() { return std::exchange(notices_, {}); }
+  /// States that are certain again.
+  [[nodiscard]] std::vector<std::string> take_news() { return std::exchange(news_, {}); }
   /// Number of refusals by reason.
   [[nodiscard]] const std::map<std::string, std::size_t>& refused() const { return refused_; }
 
  private:
   RobotId self_;
-  std::vector<std::string> notices_;
+  std::vector<std::string> notices_, news_;
   std::map<std::string, std::size_t> refused_;
   double odometry_noise_ = 0.0;                // in the last notice
   std::set<std::size_t> breaks_;               // steps in a notice

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <iterator>
 #include <map>
 #include <memory>
 #include <optional>
@@ -65,7 +66,7 @@ class TeamNetwork {
     std::optional<Trajectory> trajectory = {};
     OptimizerProgress progress = {};
     ClosureVerdicts verdicts = {};
-    std::vector<std::string> notices = {};
+    std::vector<std::string> notices = {}, news = {};
     std::size_t bytes =
         0;  ///< Bytes sent, counted for every reader, including relayed and lost ones.
     std::size_t session_bytes = 0;  ///< The part of them that belongs to sessions.
@@ -288,7 +289,9 @@ class TeamNetwork {
     if (output.trajectory) robot.trajectory = std::move(output.trajectory);
     if (output.progress) robot.progress = std::move(*output.progress);
     if (output.verdicts) robot.verdicts = std::move(*output.verdicts);
-    for (std::string& notice : output.notices) robot.notices.push_back(std::move(notice));
+    for (auto [from, to] :
+         {std::pair(&output.notices, &robot.notices), {&output.news, &robot.news}})
+      std::ranges::move(*from, std::back_inserter(*to));
     for (const TeamMessage& message : output.messages) {
       OverlayMessage sent = overlay_message(message);
       if (is_state(sent.stream))

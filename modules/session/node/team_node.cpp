@@ -85,6 +85,7 @@ void TeamNode::publish(TeamOutput output) {
   for (TeamMessage& message : output.messages) topics_.messages.publish(std::move(message));
   for (const std::string& notice : output.notices)
     log::limited(log::Level::kWarn, name(), notice) << notice;
+  for (const std::string& news : output.news) log::limited(log::Level::kInfo, name(), news) << news;
   if (output.trajectory) topics_.trajectory.publish(std::move(*output.trajectory));
   if (output.progress) topics_.progress.publish(std::move(*output.progress));
   if (!output.verdicts) return;

@@ -141,9 +141,9 @@ TEST_CASE(
   for (const ClosureId& id : later) CHECK(network.agent(2).decided().at(id));
   for (const RobotId robot : {RobotId{2}, RobotId{4}, RobotId{6}})
     CHECK(progress_of(network, robot).tentative.empty());
-  CHECK(has_notice(network, 2,
-                   "no longer joined tentatively, but by closures at several places: with "
-                   "robots 4, 6"));
+  CHECK(network.robots.at(2).news ==
+        std::vector<std::string>{"no longer joined tentatively, but by closures at several places: "
+                                 "with robots 4, 6"});
   const CentralProblem whole(without(all, wrong));
   CHECK(whole.cost(network.trajectories()) ==
         Approx(whole.optimum(all.start)).epsilon(kCostTolerance));
