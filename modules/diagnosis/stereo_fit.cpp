@@ -57,6 +57,21 @@ StereoAlternative best_focal_ratio(std::span<const StereoMatches> images, const 
   return best;
 }
 
+// The best inlier ratio with the right camera turned about its x axis by up to 0.02 rad. The turn
+// moves all points equally. A ratio r of the focal lengths moves a point at the height v above the
+// centre by (r - 1) v. Only points at several heights distinguish the two.
+double best_turned_ratio(std::span<const StereoMatches> images, const StereoRig& rig) {
+  constexpr int kSteps = 40;
+  constexpr double kStep_rad = 0.0005;
+  double best = 0.0;
+  for (int k = -kSteps; k <= kSteps; ++k) {
+    StereoRig turned = rig;
+    turned.cameras[1].T_body_cam.rotate(Eigen::AngleAxisd(kStep_rad * k, Eigen::Vector3d::UnitX()));
+    best = std::max(best, fit_of(images, turned).inlier_ratio);
+  }
+  return best;
+}
+
 }  // namespace
 
 std::optional<StereoPoint> stereo_point(const StereoRig& rig, const SE3& T_right_left,
@@ -151,8 +166,10 @@ StereoAlternative best_alternative(std::span<const StereoMatches> images, const 
       consider({StereoFault::kOtherMode, ratio,
                 fit_of(images, with_scaled_images(rig, ratio), ratio * kEpipolarInlier_px)});
   // Only without such a fault, because another focal length compensates some errors of a fault.
-  if (best.fit.inlier_ratio < given.fit.inlier_ratio + kClearGain)
-    consider(best_focal_ratio(images, rig));
+  if (best.fit.inlier_ratio < given.fit.inlier_ratio + kClearGain) {
+    const StereoAlternative focal = best_focal_ratio(images, rig);
+    if (focal.fit.inlier_ratio > best_turned_ratio(images, rig) + kClearGain) consider(focal);
+  }
   const bool is_clear =
       best.fit.inlier_ratio > given.fit.inlier_ratio + kClearGain && best.fit.inlier_ratio > kFair;
   return is_clear ? best : given;

@@ -29,9 +29,10 @@ StereoRig rig() {
 }
 
 // Points 1 to 10 m away as seen by both cameras, with noise of half a pixel.
-std::vector<StereoMatches> seen_by(const StereoRig& truth, double wrong_share = 0.1) {
+std::vector<StereoMatches> seen_by(const StereoRig& truth, double wrong_share = 0.1,
+                                   double lowest_v = 460.0) {
   std::mt19937 rng(11);
-  std::uniform_real_distribution<double> u(20.0, 730.0), v(20.0, 460.0), inverse(0.1, 1.0), any;
+  std::uniform_real_distribution<double> u(20.0, 730.0), v(20.0, lowest_v), inverse(0.1, 1.0), any;
   std::normal_distribution<double> noise(0.0, 0.5);
   const SE3 T_right_left = truth.T_left_right().inverse();
   StereoMatches matches;
@@ -65,6 +66,15 @@ TEST_CASE("A fault of the pair's calibration is identified", "[diagnosis]") {
   CHECK(best.fit.inlier_ratio == Approx(fit_of(images, rig()).inlier_ratio));
   for (PixelPair& pair : images[0].pairs) std::swap(pair.a, pair.b);
   CHECK(best_alternative(images, rig()).fault == StereoFault::kSwappedImages);
+}
+
+TEST_CASE("A turned right camera is no fault of focal lengths", "[diagnosis]") {
+  constexpr double kTurned_rad = 0.005;  // 2.3 px; a focal length does the same to a stripe
+  StereoRig turned = rig();
+  turned.cameras[1].T_body_cam.rotate(Eigen::AngleAxisd(kTurned_rad, Eigen::Vector3d::UnitX()));
+  const auto images = seen_by(turned, 0.1, 120.0);
+  CHECK(fit_of(images, rig()).inlier_ratio < 0.6);
+  CHECK(best_alternative(images, rig()).fault == StereoFault::kNone);
 }
 
 TEST_CASE("Random matches fit no calibration", "[diagnosis]") {
