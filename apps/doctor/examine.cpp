@@ -75,48 +75,17 @@ SensorSample sample_of(DatasetReader& reader, double live_s, const ReportProgres
   return sampler.sample();
 }
 
-std::string last_name(const std::string& topic) {
-  return topic.substr(topic.rfind('/') + 1);
-}
-
-// Name of a type in ROS 1: "sensor_msgs/Imu" for "sensor_msgs/msg/Imu" too.
-std::string plain(const std::string& type) {
-  return type.substr(0, type.find('/')) + '/' + last_name(type);
-}
-
 Finding silent(const ListenedTopic& wanted, const std::vector<ListenedTopic>& topics,
                const std::vector<TopicPublisher>& publishers) {
-  Finding finding{.id = "live.silent", .severity = kError};
-  const auto same = std::ranges::find(publishers, wanted.topic, &TopicPublisher::topic);
-  // Similarity of a topic to the wanted topic: length of the common prefix, plus 1. It is 0 for
-  // another type, and for a topic that the rig file names.
-  const auto alike = [&](const TopicPublisher& other) {
-    if (std::ranges::find(topics, other.topic, &ListenedTopic::topic) != topics.end()) return 0L;
-    const auto [end, rest] = std::ranges::mismatch(wanted.topic, other.topic);
-    return plain(other.type) == plain(wanted.type) ? 1 + (end - wanted.topic.begin()) : 0;
+  const auto is_named = [&topics](const std::string& name) {
+    return std::ranges::find(topics, name, &ListenedTopic::topic) != topics.end();
   };
-  const auto similar = std::ranges::max_element(publishers, {}, alike);
-  finding.what = "no message on " + wanted.topic + " (" + wanted.type + ')';
-  finding.means = "the robot waits for this topic";
-  if (same != publishers.end() && plain(same->type) != plain(wanted.type)) {
-    finding.id = "live.other_type";
-    finding.what += ": its publisher sends " + same->type;
-    finding.to_do =
-        "name a topic of " + wanted.type + ": those of compressed images end with /compressed";
-  } else if (same != publishers.end()) {
-    finding.what += ", although a program publishes it";
-    finding.to_do =
-        "check that the driver has data; large images need a net.core.rmem_max of several "
-        "megabytes";
-  } else if (similar != publishers.end() && alike(*similar) > 0) {
-    finding.id = "live.similar_name";
-    finding.what += ": no program publishes it, but " + similar->topic + " is of that type";
-    finding.to_do = "name the topic in the rig file as the driver does";
-  } else {
-    finding.what += ": no program publishes it";
-    finding.to_do = "start the driver; check ROS_DOMAIN_ID (ros.domain) and ros.interface";
-  }
-  return finding;
+  const Silence silence = why_silent(wanted.topic, wanted.type, is_named, publishers);
+  return {.id = std::string("live.") + silence.kind,
+          .severity = kError,
+          .what = "no message on " + wanted.topic + " (" + wanted.type + "): " + silence.why,
+          .means = "the robot waits for this topic",
+          .to_do = silence.to_do};
 }
 
 Finding unfinished_run(const fs::path& folder) {

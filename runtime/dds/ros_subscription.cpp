@@ -28,6 +28,7 @@ RosSubscription::RosSubscription(std::shared_ptr<const RosNetwork> network,
                                  std::vector<RosTopic> topics)
     : network_(std::move(network)),
       topics_(std::move(topics)),
+      discovery_(*network_),
       waitset_(dds_create_waitset(network_->participant()), "waitset"),
       guard_(dds_create_guardcondition(network_->participant()), "guard condition") {
   check_dds(dds_waitset_attach(waitset_.handle(), guard_.handle(), -1), "cannot wait for a stop");
@@ -81,16 +82,16 @@ void RosSubscription::report_silence() {
   const double now_s = steady_now_s();
   if (now_s - silence_checked_s_ < kSilence_s) return;
   silence_checked_s_ = now_s;
-  for (std::size_t topic = 0; topic < topics_.size(); ++topic) {
-    if (now_s - last_received_s_[topic] < kSilence_s) continue;
-    dds_subscription_matched_status_t status{};
-    dds_get_subscription_matched_status(readers_[topic].handle(), &status);
-    log::warn("ros") << "nothing on " << topics_[topic].topic << " (" << topics_[topic].type
-                     << ") for " << std::lround(now_s - last_received_s_[topic]) << " s; "
-                     << status.current_count << " publish it on ROS domain " << network_->domain()
-                     << (status.current_count > 0
-                             ? ""
-                             : " (ROS_DOMAIN_ID of its driver: --set ros.domain=N)");
+  const auto is_read = [this](const std::string& name) {
+    return std::ranges::find(topics_, name, &RosTopic::topic) != topics_.end();
+  };
+  for (std::size_t k = 0; k < topics_.size(); ++k) {
+    if (now_s - last_received_s_[k] < kSilence_s) continue;
+    const RosTopic& topic = topics_[k];
+    const Silence silence = why_silent(topic.topic, topic.type, is_read, discovery_.publishers());
+    log::warn("ros") << "nothing on " << topic.topic << " (" << topic.type << ") for "
+                     << std::lround(now_s - last_received_s_[k]) << " s on ROS domain "
+                     << network_->domain() << ": " << silence.why << "; " << silence.to_do;
   }
 }
 

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "modules/core/stamp.hpp"
-#include "runtime/dds/ros_network.hpp"
+#include "runtime/dds/ros_discovery.hpp"
 
 struct ddsi_serdata;
 
@@ -33,7 +33,7 @@ struct RosMessage {
 };
 
 /// Messages of ROS 2 in the order of arrival. From the first next() on, topics that are silent for
-/// kSilence_s are named in the log. Not thread-safe, except for stop().
+/// kSilence_s are named in the log, with the reason. Not thread-safe, except for stop().
 class RosSubscription {
  public:
   static constexpr double kSilence_s = 5.0;
@@ -62,6 +62,7 @@ class RosSubscription {
   std::shared_ptr<const RosNetwork> network_;  // outlives the members below
   std::vector<RosTopic> topics_;
   std::vector<DdsEntity> dds_topics_, readers_;
+  RosDiscovery discovery_;
   DdsEntity waitset_, guard_;
   std::deque<RosMessage> taken_;
   std::vector<std::uint64_t> lost_before_;  // by topic: lost messages before the first next()

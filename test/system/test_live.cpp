@@ -203,14 +203,22 @@ TEST_CASE("A live robot whose topics are silent reports where it listens, and en
   if (!dataset) return;
   const TemporaryFolder folder;
   const int domain = random_domain();
-  Process robot(logged(live_command(folder, euroc_rig(*dataset), domain)));
-  const std::string place = "0 publish it on ROS domain " + std::to_string(domain);
-  const auto states_place = [&place](const std::string& line) {
-    return line.find("nothing on /cam0/image_raw") != line.npos &&
-           line.find(place + " (ROS_DOMAIN_ID") != line.npos &&
-           line.find("--set ros.domain=") != line.npos;
+  std::string rig = euroc_rig(*dataset);
+  rig.insert(rig.find("/cam0/image_raw") + 15, "/compressed");  // its driver sends raw images only
+  const auto network =
+      std::make_shared<const RosNetwork>(RosConfig{.domain = domain, .interface = "lo"});
+  const RosPublisher raw(network, "/cam0/image_raw", RosImage::kType, RosQos::kReliable, 1);
+  Process robot(logged(live_command(folder, rig, domain)));
+  const std::string place = " s on ROS domain " + std::to_string(domain) + ": no program publishes";
+  const auto states = [&](const std::string& topic, const std::string& reason) {
+    return robot.wait_until([&](const std::string& line) {
+      return line.find("nothing on " + topic) != line.npos && line.find(place) != line.npos &&
+             line.find(reason) != line.npos;
+    });
   };
-  REQUIRE(robot.wait_until(states_place).has_value());
+  REQUIRE(states("/cam0/image_raw/compressed (sensor_msgs/CompressedImage)",
+                 "but one publishes /cam0/image_raw (sensor_msgs/msg/Image)"));
+  REQUIRE(states("/imu0", "--set ros.domain="));
   robot.kill(SIGINT);
   CHECK(robot.wait() == 1);
   const RunSummary summary = read_summary(folder.path() / "live/summary.json");

@@ -194,7 +194,7 @@ TEST_CASE("A robot that is not localised publishes no pose in the map", "[ros_dd
   CHECK(counts["/a/pose"] == (is_localised ? 3 : 0));
 }
 
-TEST_CASE("A publisher that has ended does no harm to those who discover it", "[ros_dds]") {
+TEST_CASE("A publisher is discovered as long as it exists", "[ros_dds]") {
   const auto shared = network();
   RosDiscovery discovery(*shared);
   const RosPublisher stays(shared, "/stays", "visualization_msgs/Marker", RosQos::kReliable, 1);
@@ -202,6 +202,7 @@ TEST_CASE("A publisher that has ended does no harm to those who discover it", "[
     const RosPublisher ends(shared, "/ends", "visualization_msgs/Marker", RosQos::kReliable, 1);
     CHECK(std::ranges::count(discovery.publishers(), "/ends", &TopicPublisher::topic) == 1);
   }
+  CHECK(std::ranges::count(discovery.publishers(), "/ends", &TopicPublisher::topic) == 0);
   CHECK(std::ranges::count(discovery.publishers(), "/stays", &TopicPublisher::topic) == 1);
 }
 
