@@ -113,7 +113,9 @@ void Watch::update_phase(double now_s, bool ended, const RunRecord& record) {
 
 void Watch::finish(const RunRecord& record) {
   rounds_csv_.append(record.rounds());
-  write(seconds(), robot_.bridge().traffic());
+  const TrafficSnapshot traffic = robot_.bridge().traffic();
+  write(seconds(), traffic);
+  show_status(record, traffic);
 }
 
 // The robot of a finished run awaits any other robot. A recorded graph has closures to robots that
@@ -147,8 +149,18 @@ bool Watch::leave_notice_sent(double now_s) {
 void Watch::log_progress(double now_s, const RunRecord& record, const TrafficSnapshot& traffic) {
   if (now_s - logged_s_ < kInterval_s) return;
   logged_s_ = now_s;
-  status_line_.update(status_text(robot_.dataset_time_s(), record, robot_.bridge().peers().list(),
-                                  traffic, process_usage().resident_bytes));
+  show_status(record, traffic);
+}
+
+void Watch::show_status(const RunRecord& record, const TrafficSnapshot& traffic) {
+  std::vector<Peer> peers = robot_.bridge().peers().list();
+  for (const RobotStatus& status : robot_.status_node().peers())
+    for (Peer& peer : peers)
+      if (status.phase == RobotPhase::kLeaving && peer.identity.robot == status.robot &&
+          peer.identity.boot == status.boot)
+        peer.state = PeerState::kLeft;  // also before it falls silent
+  status_line_.update(
+      status_text(robot_.dataset_time_s(), record, peers, traffic, process_usage().resident_bytes));
 }
 
 // A peer whose last status announced that it leaves, and that is silent now, has left.

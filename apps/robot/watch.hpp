@@ -43,6 +43,7 @@ class Watch {
   bool awaits_peers(std::span<const RobotId> team);
   bool leave_notice_sent(double now_s);
   void log_progress(double now_s, const RunRecord& record, const TrafficSnapshot& traffic);
+  void show_status(const RunRecord& record, const TrafficSnapshot& traffic);
   [[nodiscard]] std::map<RobotId, Absentees::Known> known_peers() const;
   [[nodiscard]] std::map<RobotId, Departure::Present> present_peers() const;
   void sample(double now_s);

@@ -151,6 +151,8 @@ TEST_CASE(
   const auto second = start(next, survivor, kLap, "next");
   CHECK(second->wait() == 0);
   CHECK(first->wait() == 0);
+  CHECK_THAT(first->lines().back().text, Catch::Contains("peers: next left |"));
+  CHECK_THAT(second->lines().back().text, Catch::Contains("peers: survivor left |"));
 
   const auto place = [&](const KeyframeId& id) {
     return (id.robot == killed ? next : survivor).place(id.index);
