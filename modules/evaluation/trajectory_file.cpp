@@ -232,8 +232,10 @@ std::vector<StampedPose> parse_trajectory(std::string_view text, const std::stri
 }
 
 std::optional<std::filesystem::path> find_trajectory(const std::filesystem::path& place) {
-  for (const auto& file : {place, place / "data.csv", place / "groundtruth_tum.txt"})
-    if (is_file(file)) return file;
+  if (is_file(place)) return place;
+  for (const char* folder : {"", "state_groundtruth_estimate0", "mav0/state_groundtruth_estimate0"})
+    for (const char* name : {"data.csv", "groundtruth_tum.txt"})
+      if (is_file(place / folder / name)) return place / folder / name;
   return std::nullopt;
 }
 

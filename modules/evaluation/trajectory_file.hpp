@@ -10,7 +10,7 @@
 namespace km {
 
 /// The trajectory file at `place`: the file itself, or data.csv (EuRoC) or groundtruth_tum.txt in a
-/// folder. nullopt if there is none.
+/// folder or among the true poses of a recording in EuRoC's layout. nullopt if there is none.
 [[nodiscard]] std::optional<std::filesystem::path> find_trajectory(
     const std::filesystem::path& place);
 

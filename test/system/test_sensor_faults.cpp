@@ -174,8 +174,7 @@ FaultyRun meet(const fs::path& recording, const SensorFault& fault) {
   if (run.exit_code != 0) return outcome;
   outcome.summary = read_summary(folder.path() / "results/summary.json");
   const auto estimate = read_trajectory(folder.path() / "results/odometry.tum");
-  const auto truth =
-      read_trajectory(find_trajectory(recording / "mav0/state_groundtruth_estimate0").value());
+  const auto truth = read_trajectory(recording);
   const auto pairs = associate(truth, estimate, {first, estimate.back().stamp}, 0.1, 0.01);
   std::vector<PosePair> fitted;
   for (const PosePair& pair : pairs)

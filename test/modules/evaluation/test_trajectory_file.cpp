@@ -71,6 +71,13 @@ TEST_CASE("A header names the columns, and sizes of stamps their unit", "[evalua
   CHECK(poses[0].T.linear().isApprox(Eigen::Quaterniond(0.8, 0, 0, 0.6).toRotationMatrix(), 1e-12));
 }
 
+TEST_CASE("The true poses of a recording in EuRoC's layout are found", "[evaluation]") {
+  const TemporaryFolder folder;
+  const auto file = folder.write("mav0/state_groundtruth_estimate0/data.csv", "");
+  for (const auto& place : {folder.path(), folder.path() / "mav0", file.parent_path(), file})
+    CHECK(find_trajectory(place) == file);
+}
+
 TEST_CASE("Stamps in microseconds are refused where nanoseconds are expected", "[evaluation]") {
   std::string text;
   for (int k = 0; k < 20; ++k)
