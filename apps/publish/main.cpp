@@ -8,6 +8,7 @@
 #include "apps/program_options.hpp"
 #include "apps/publish/message_player.hpp"
 #include "modules/absolute_fixes/fix_reader.hpp"
+#include "modules/core/input_file.hpp"
 #include "modules/core/text_table.hpp"
 #include "modules/recordings/open_bag.hpp"
 #include "modules/sensors/node/open_folder.hpp"
@@ -53,7 +54,7 @@ Options options_of(int argc, char** argv) {
   Options options;
   CLI::App app(kAbout, "kimera_multi_publish");
   app.footer(kFooter);
-  app.add_option("RECORDING", options.recording)->required()->check(CLI::ExistingPath);
+  app.add_option("RECORDING", options.recording)->required();
   app.add_option("--rate", options.play.rate, "Speed: 1 real time, 2 twice as fast")
       ->check(CLI::Range(1e-3, 1e3))
       ->capture_default_str();
@@ -74,8 +75,7 @@ Options options_of(int argc, char** argv) {
   app.add_option("--fixes", options.fixes,
                  "File of absolute fixes to play on a topic of their own: rows of a stamp and "
                  "latitude, longitude [deg], altitude [m], or x, y, z [m]; stamps in ns in a .csv "
-                 "file, in s elsewhere")
-      ->check(CLI::ExistingFile);
+                 "file, in s elsewhere");
   app.add_option("--fix-topic", options.fix_topic, "Topic of --fixes")->capture_default_str();
   app.add_option("--fix-type", options.fix_type, "Message type of --fixes")
       ->check(CLI::IsMember({kGnssType, kMotionCaptureType}))
@@ -111,6 +111,9 @@ Options options_of(int argc, char** argv) {
 
 std::unique_ptr<BagReader> open_recording(const std::filesystem::path& recording) {
   if (may_be_bag(recording)) return open_bag(recording);
+  if (const FolderLayout layout = layout_of(recording); layout != FolderLayout::kEuroc)
+    throw InputFileError(recording.string() + ": " + to_string(layout) +
+                         ": only bags and folders in EuRoC's layout can be played");
   const std::filesystem::path mav0 = find_mav0(recording);
   const bool has_depth = std::filesystem::is_directory(mav0 / "depth0");
   return euroc_messages(
@@ -121,6 +124,8 @@ std::unique_ptr<BagReader> open(const Options& options) {
   std::unique_ptr<BagReader> recording = open_recording(options.recording);
   if (options.fixes.empty()) return recording;
   FixRows rows = read_fix_rows(options.fixes);
+  if (rows.fixes.empty())
+    throw InputFileError(options.fixes.string() + ": no row has a stamp and three coordinates");
   if (rows.malformed > 0)
     log::warn("publish") << options.fixes.string() << ": " << rows.malformed
                          << " rows without a stamp and three coordinates are left out";

@@ -125,6 +125,16 @@ TEST_CASE("Waiting for readers ends with the topics that have too few", "[publis
                                 Catch::Contains("of /imu0, /cam0/image_raw, /cam1/image_raw: 1"));
 }
 
+TEST_CASE("A folder that cannot be played is refused with its layout", "[publish]") {
+  const TemporaryFolder folder;
+  folder.write("camera-intrinsics.txt", "");
+  const CommandResult result =
+      run_command(KM_BIN_DIR "/kimera_multi_publish " + folder.path().string());
+  CHECK(result.exit_code == 1);
+  CHECK_THAT(result.output,
+             Catch::Contains("7-Scenes") && Catch::Contains("only bags and folders"));
+}
+
 TEST_CASE("Fixes are played in the order of time with the messages of the recording", "[publish]") {
   constexpr Stamp kLast = kFirst + (kMessages - 1) * kPeriod;
   const auto [type, gnss] =
