@@ -9,8 +9,8 @@
 
 namespace km {
 
-/// Exit codes of all programs, for input or a disk that cannot be used, and for an invalid command
-/// line. Other codes are those of a program.
+/// Exit codes of all programs: for input that is missing or cannot be used, or such a disk; and for
+/// an invalid command line, whatever the files hold. Other codes are those of a program.
 inline constexpr int kBadInput = 1, kBadCommandLine = 2;
 
 /// Adds --version, parses the words and calls the callbacks. Empty if the program continues.
@@ -21,17 +21,13 @@ inline constexpr int kBadInput = 1, kBadCommandLine = 2;
 [[nodiscard]] std::optional<int> parse_options(CLI::App& app, int argc, const char* const* argv,
                                                const std::string& hint_for_unknown = {});
 
-/// Replaces the text of an option by the path that `find(folder, text)` returns. The text of an
-/// exception is the error.
+/// Replaces the text of an option by the path that `find(folder, text)` returns. Exceptions are
+/// passed on: a missing file is bad input.
 template <typename Find>
 [[nodiscard]] CLI::Validator named_file(Find find, const char* folder) {
   return {[find, folder](std::string& text) {
-            try {
-              text = find(folder, text).string();
-              return std::string();
-            } catch (const std::exception& error) {
-              return std::string(error.what());
-            }
+            text = find(folder, text).string();
+            return std::string();
           },
           "FILE|NAME"};
 }

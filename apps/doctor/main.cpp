@@ -82,7 +82,7 @@ Options options_of(int argc, char** argv) {
   RobotOptions& robot = options.robot;
   CLI::App app(kAbout, "kimera_multi_doctor");
   app.footer(kFooter);
-  app.add_option("PATH", options.path, "Recording, or results")->check(CLI::ExistingPath);
+  app.add_option("PATH", options.path, "Recording, or results");
   app.add_option("--live", options.live, "Rig file: look at the live topics that it names (ROS 2)")
       ->transform(named_file(find_named_file, "rigs"));
   add_network(app, options);

@@ -167,9 +167,7 @@ struct ShowCommand {
   fs::path folder;
 
   void define(CLI::App& app) {
-    app.add_option("FOLDER", folder, "Folder of a team, or of a robot's keys")
-        ->required()
-        ->check(CLI::ExistingDirectory);
+    app.add_option("FOLDER", folder, "Folder of a team, or of a robot's keys")->required();
   }
 
   void run() const { fs::exists(folder / kCertificateFile) ? show_robot() : show_team(); }

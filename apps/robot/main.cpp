@@ -8,6 +8,7 @@
 #include "apps/robot/inspect.hpp"
 #include "apps/robot/robot_config.hpp"
 #include "apps/robot/run.hpp"
+#include "modules/core/input_file.hpp"
 #include "runtime/log.hpp"
 #include "runtime/unblocked_output.hpp"
 
@@ -42,13 +43,9 @@ Examples
   The back-end alone, on a recorded pose graph:
     kimera_multi_robot --config config/datasets/tunnels.yaml --robot 3 --graph robot3.csv --rate max --output results/3
 
-Files written to --output: odometry.tum, live.tum, optimized.tum, optimized_keyframes.tum, pose_graph.g2o,
-keyframes.csv, loop_closures.csv, optimizer.csv, traffic.csv, process.csv, timing.csv, config.yaml, summary.json,
-rig_estimated.yaml (for --rig of the next run), run.journal (for --resume and --session); with mapping.mode on also
-mesh.ply, mesh_optimized.ply, label_palette.csv, objects.json, map.yaml and map.pgm; with map.team also team_mesh.ply and
-team_map.*; with --record record.mcap. apps/robot/outputs.md describes all of them.
+Files in --output: see apps/robot/outputs.md.
 Ctrl-C, SIGTERM and SIGHUP end the run in order with everything written; a second Ctrl-C or SIGTERM ends it at once.
-Exit codes: 0 done; 1 bad input or configuration, a recording without a pose, or live sensors without an image;
+Exit codes: 0 done; 1 missing or bad input, a recording without a pose, or live sensors without an image;
 2 bad command line; 3 a module failed, or another robot uses this robot's id; 4 results could not be written (the log
 names each file and the reason); 5 a module was stuck (see run.patience): the results of the other modules are
 written.)";
@@ -67,11 +64,7 @@ PlaybackPace parse_pace(const std::string& text) {
 }
 
 void print_config(const RobotOptions& options) {
-  try {
-    std::cout << load_robot_config(options).effective;
-  } catch (const ConfigError& error) {
-    throw CLI::ValidationError("--print-config", error.what());
-  }
+  std::cout << load_robot_config(options).effective;
   throw CLI::Success();
 }
 
@@ -95,12 +88,11 @@ void print_topics(const RobotOptions& options, CLI::App& app,
 void add_input(CLI::App& app, RobotOptions& options) {
   CLI::App& group = *app.add_option_group("Input", "What the robot perceives");
   group.require_option(1);
-  group
-      .add_option("--dataset", options.dataset,
-                  "Recording: a folder of EuRoC/ASL (cam0, cam1 or depth0, imu0), KITTI odometry, "
-                  "TUM RGB-D or 7-Scenes; with --rig a bag of ROS 1 (.bag) or ROS 2 (folder, .db3, "
-                  ".mcap)")
-      ->check(CLI::ExistingPath);
+  group.add_option(
+      "--dataset", options.dataset,
+      "Recording: a folder of EuRoC/ASL (cam0, cam1 or depth0, imu0), KITTI odometry, "
+      "TUM RGB-D or 7-Scenes; with --rig a bag of ROS 1 (.bag) or ROS 2 (folder, .db3, "
+      ".mcap)");
   group
       .add_option_function<std::vector<std::string>>(
           "--live",
@@ -116,24 +108,18 @@ void add_input(CLI::App& app, RobotOptions& options) {
       ->expected(0, 1)  // --inspect --live needs none
       ->type_name("RIG")
       ->transform(named_file(find_named_file, "rigs"));
-  group
-      .add_option("--graph", options.graph,
-                  "Recorded pose graph of one robot (.g2o or .csv), or of a team (.jrl)")
-      ->check(CLI::ExistingFile);
-  group
-      .add_option("--session", options.session,
-                  "Results of a finished run: its robot stands still, and other robots localise "
-                  "themselves in its map")
-      ->check(CLI::ExistingDirectory);
+  group.add_option("--graph", options.graph,
+                   "Recorded pose graph of one robot (.g2o or .csv), or of a team (.jrl)");
+  group.add_option("--session", options.session,
+                   "Results of a finished run: its robot stands still, and other robots localise "
+                   "themselves in its map");
   app.add_option(
-         "--localize", options.localize,
-         "Results of a finished run: this run localises itself in that map. The map does not "
-         "change, and all poses are in its frame")
-      ->check(CLI::ExistingDirectory);
+      "--localize", options.localize,
+      "Results of a finished run: this run localises itself in that map. The map does not "
+      "change, and all poses are in its frame");
   app.add_option("--extend", options.extend,
                  "Results of a finished run of this robot: poses of both runs are optimised "
-                 "together, and the results of this run contain both")
-      ->check(CLI::ExistingDirectory);
+                 "together, and the results of this run contain both");
   app.add_option(
          "--rig", options.rig,
          "For a bag: file with the topics and the calibration of the sensors; for a EuRoC folder: "
@@ -142,8 +128,7 @@ void add_input(CLI::App& app, RobotOptions& options) {
       ->transform(named_file(find_named_file, "rigs"));
   app.add_option("--odometry", options.odometry,
                  "Poses of the body (TUM: t[s] x y z qx qy qz qw) that replace the robot's visual-"
-                 "inertial odometry; images still give features and depth")
-      ->check(CLI::ExistingFile);
+                 "inertial odometry; images still give features and depth");
   app.add_option("--from", options.from_s, "Start of the part to play [s since the first image]");
   app.add_option("--to", options.to_s, "End of the part to play [s since the first image]");
   app.add_option_function<std::string>(
@@ -187,28 +172,24 @@ void add_network(CLI::App& app, RobotOptions& options) {
       "Allow every program in the domain to watch (kimera_multi_viewer): trajectory, mesh, images");
   app.add_option("--security", options.security,
                  "Folder of this robot's keys (kimera_multi_keys): only robots of the team can "
-                 "read and send messages")
-      ->check(CLI::ExistingDirectory);
+                 "read and send messages");
 }
 
 void add_output(CLI::App& app, RobotOptions& options) {
   CLI::App& group = *app.add_option_group("Output", "Where the results go");
   group.require_option(1);
   group.add_option("--output", options.output, "Folder of the results, made if absent");
-  group
-      .add_option_function<std::string>(
-          "--resume",
-          [&options](const std::string& folder) {
-            options.output = folder;
-            options.resume = true;
-          },
-          "In place of --output: the folder of a run that was killed, which continues where it "
-          "ended; all other options as before")
-      ->check([](const std::string& folder) {
-        return std::filesystem::is_directory(folder)
-                   ? ""
-                   : folder + ": no such folder; --output " + folder + " starts a run there";
-      });
+  group.add_option_function<std::string>(
+      "--resume",
+      [&options](const std::string& folder) {
+        if (!is_folder(folder))
+          throw InputFileError(folder + ": no such folder; --output " + folder +
+                               " starts a run there");
+        options.output = folder;
+        options.resume = true;
+      },
+      "In place of --output: the folder of a run that was killed, which continues where it "
+      "ended; all other options as before");
   app.add_option_function<std::vector<std::string>>(
          "--record", [&options](const std::vector<std::string>& file) { options.record = file[0]; },
          "Also write an MCAP file, for Foxglove, Lichtblick, Rerun, PlotJuggler (default: "

@@ -17,6 +17,7 @@
 #include "apps/team/run_team.hpp"
 #include "apps/team/team_report.hpp"
 #include "apps/team/team_results.hpp"
+#include "modules/core/input_file.hpp"
 #include "modules/core/write_file.hpp"
 #include "modules/mesh/mesh_file.hpp"
 #include "modules/recordings/open_bag.hpp"
@@ -88,14 +89,12 @@ void define(CLI::App& app, TeamOptions& options) {
       ->check(CLI::Range(0, 230));
   app.add_option("--output", options.output, "Results, one folder per robot (default: the file's)");
   app.add_option("--security", options.security,
-                 "Team folder of kimera_multi_keys: each robot uses the keys in its folder there")
-      ->check(CLI::ExistingDirectory);
+                 "Team folder of kimera_multi_keys: each robot uses the keys in its folder there");
   CLI::Option* const links = app.add_option(
       "--links", options.links,
       "File of bad links, see below and config/links, or a link recorded by Mahimahi "
       "(.up, .down): "
       "each robot gets a network of its own");
-  links->check(CLI::ExistingFile);
   app.add_option("--json", options.json, "Also write the results to this file, as JSON");
   app.add_option("--robot-binary", options.robot_binary, "Program of a robot")
       ->capture_default_str();
@@ -126,6 +125,8 @@ km::TeamPlan make_plan(const TeamOptions& options) {
   plan.record = options.record.has_value();
   plan.view = options.view;
   if (!options.security.empty()) plan.security = options.security;
+  if (!plan.security.empty() && !km::is_folder(plan.security))
+    throw std::runtime_error(plan.security.string() + ": no such folder of keys");
   for (km::RobotPlan& robot : plan.robots)
     robot.arguments.insert(robot.arguments.end(), options.arguments.begin(),
                            options.arguments.end());

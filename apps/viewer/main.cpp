@@ -74,9 +74,8 @@ void define(CLI::App& app, ViewerOptions& options) {
       ->delimiter(',')
       ->needs(domain);
   app.add_option(
-         "--palette", options.palette,
-         "label_palette.csv with names and colours of the labels (default: that of RESULTS)")
-      ->check(CLI::ExistingFile);
+      "--palette", options.palette,
+      "label_palette.csv with names and colours of the labels (default: that of RESULTS)");
   app.add_option("--port", options.server.port, "Port of the page; 0: any free port")
       ->check(CLI::Range(0, 65535))
       ->capture_default_str();

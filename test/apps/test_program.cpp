@@ -1,12 +1,16 @@
 #include <catch2/catch.hpp>
 
+#include <algorithm>
+#include <cstring>
 #include <iostream>
+#include <map>
 #include <optional>
 #include <sstream>
 #include <string>
 #include <vector>
 
 #include "apps/program_options.hpp"
+#include "test/modules/sensors/euroc_folder.hpp"
 #include "test/support/command.hpp"
 #include "test/support/temporary_folder.hpp"
 
@@ -123,6 +127,72 @@ TEST_CASE("Without a subcommand the program lists them", "[program]") {
   CHECK(parsed.exit_code == kBadCommandLine);
   CHECK_THAT(parsed.errors, Catch::EndsWith("program: the first word must be a subcommand:\n"
                                             "  count  Counts\n  fail  Fails\n"));
+}
+
+TEST_CASE("An unknown option gives the exit code of bad command lines in every program",
+          "[program]") {
+  for (const std::string& name : words_of(KM_PROGRAMS)) {
+    CAPTURE(name);
+    CHECK(run_command(KM_BIN_DIR "/" + name + " --nosuch").exit_code == kBadCommandLine);
+  }
+}
+
+// The exit code of the doctor is the severity of its findings.
+TEST_CASE("An input that is missing or unreadable gives the exit code of bad input", "[program]") {
+  const EurocFolder recording;
+  const TemporaryFolder folder;
+  std::map<std::string, std::string> values = {
+      {"DATA", recording.root()},
+      {"OUT", folder.path() / "out"},
+      {"TRUTH", folder.write("truth.tum", "1 0 0 0 0 0 0 1\n2 1 0 0 0 0 0 1\n3 2 0 0 0 0 0 1\n")},
+      {"PLAY", "robot --robot 0 --interface lo --output OUT --dataset DATA"},
+      {"TEAM", "team --config config/teams/euroc_two_robots.yaml --dataset DATA --output OUT"}};
+  const std::string garbage = folder.write("garbage", "\1\2");
+  std::vector<std::string> lines = {
+      "robot --robot 0 --dataset DATA --resume INPUT",
+      "robot --inspect INPUT",
+      "robot --config INPUT --print-config",
+      "doctor INPUT",
+      "doctor DATA --rig INPUT",
+      "doctor --live INPUT",
+      "team --config INPUT --output OUT",
+      "TEAM --links INPUT",
+      "TEAM --security INPUT",
+      "evaluate trajectory --truth INPUT --estimate TRUTH",
+      "evaluate trajectory --truth TRUTH --estimate INPUT",
+      "evaluate closures --results INPUT --dataset DATA --truth TRUTH",
+      "evaluate consistency --results INPUT --truth TRUTH",
+      "evaluate mesh --truth INPUT --estimate INPUT",
+      "evaluate objects --truth INPUT --estimate INPUT",
+      "evaluate render --mesh INPUT --output OUT.png",
+      "evaluate glb --mesh INPUT --output OUT.glb",
+      "keys add INPUT --robots a:0",
+      "keys revoke INPUT a",
+      "publish DATA --interface lo --fixes INPUT",
+      "viewer --domain 7 --interface lo --palette INPUT",
+      "vocabulary train INPUT -o OUT.kmvoc",
+      "simulate --config INPUT --output OUT"};
+  for (const std::string& option : words_of("dataset graph session live"))
+    lines.push_back("robot --robot 0 --output OUT --" + option + " INPUT");
+  for (const std::string& option : words_of("localize extend odometry rig config security link"))
+    lines.push_back("PLAY --" + option + " INPUT");
+  for (const char* program :
+       {"publish", "viewer", "keys show", "pgo solve", "pgo pcm", "pgo outliers"})
+    lines.push_back(program + std::string(" INPUT"));
+  for (const std::string& line : lines)
+    for (const std::string& input : {std::string("/nowhere"), garbage}) {
+      values["INPUT"] = input;
+      std::string words = line;
+      for (const char* name : {"PLAY", "TEAM", "DATA", "TRUTH", "OUT", "INPUT"})
+        for (std::size_t at = 0; (at = words.find(name)) != words.npos;)
+          words.replace(at, std::strlen(name), values.at(name));
+      const std::string program = "kimera_multi_" + words.substr(0, words.find(' '));
+      if (std::ranges::count(words_of(KM_PROGRAMS), program) == 0) continue;  // not in this build
+      const CommandResult result = run_command(KM_BIN_DIR "/kimera_multi_" + words);
+      CAPTURE(words, result.output);
+      CHECK(result.exit_code == (words.starts_with("doctor") ? 2 : kBadInput));
+      CHECK_THAT(result.output, Catch::Contains(input) && !Catch::Contains("Run with --help"));
+    }
 }
 
 namespace {

@@ -14,8 +14,7 @@ void GraphInput::define(CLI::App& app) {
          "FILE", file,
          "Pose graph (*.g2o), a team's (*.jrl), or a folder with one file per robot, or a team's\n"
          "results")
-      ->required()
-      ->check(CLI::ExistingPath);
+      ->required();
   app.add_option("--robots", robots, "Number of robots among which a single file is divided")
       ->check(CLI::Range(1, 65535));
   app.add_flag("--keep-steps", keep_steps,

@@ -195,9 +195,7 @@ void add_pcm(CLI::App& parent) {
   app.footer(kPcmDetails);
   app.option_defaults()->always_capture_default();
   const auto command = std::make_shared<PcmCommand>();
-  app.add_option("FILE", command->file, "Pose graph of one robot (*.g2o)")
-      ->required()
-      ->check(CLI::ExistingFile);
+  app.add_option("FILE", command->file, "Pose graph of one robot (*.g2o)")->required();
   define_search(app, *command);
   define_closures(app, command->selection);
   app.add_option("--json", command->json,

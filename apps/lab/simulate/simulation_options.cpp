@@ -99,6 +99,7 @@ void define(CLI::App& app, SimulationOptions& options) {
     try {
       read_options(line->file, line->given, options);
     } catch (const ConfigError& error) {
+      if (!line->file.empty()) throw;
       throw CLI::ValidationError(error.what(), CLI::ExitCodes::ValidationError);
     }
   });

@@ -94,7 +94,6 @@ TEST_CASE("Bad input is refused and named", "[evaluate]") {
   const std::string rest = " --estimate " + files.a;
   const std::string good = "trajectory --truth " + files.truth;
   const std::vector<std::pair<std::string, std::string>> refused = {
-      {"trajectory --truth /none" + rest, "kimera_multi_evaluate: /none: no such file\n"},
       {"trajectory --truth " + bad + rest, "bad.tum line 2: 1 fields, expected 8"},
       {good + rest + " --plot x.svg", "x.svg: --plot writes *.html"},
       {good + " --truth " + files.b + rest, "give one --truth"},

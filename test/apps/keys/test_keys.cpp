@@ -80,7 +80,6 @@ TEST_CASE("kimera_multi_keys ends with 1 and the reason if it fails", "[keys]") 
       {"add survey --robots beta:0", "revoke it first"},
       {"add nowhere --robots beta:0", "nowhere/authority/authority.txt: no such file"},
       {"revoke survey delta", "never had one of this name or id"},
-      {"show nowhere", "nowhere"},
       {"", "subcommand is required"},
   }));
   CAPTURE(arguments);

@@ -288,8 +288,7 @@ TEST_CASE("Input that cannot be run is refused", "[team]") {
       {team.command + " --set a.b=1", "Options of the robots come after --"},
       {elsewhere + " --output /proc/none", "/proc/none: cannot be"},
       {elsewhere + " --json /none/team.json", "/none/team.json: cannot be"},
-      {tool, "--config is required"},
-      {tool + " --config /nowhere.yaml", "kimera_multi_team: /nowhere.yaml: cannot open: no such"}};
+      {tool, "--config is required"}};
   for (const auto& [command, message] : refused) {
     const auto result = run_command(command);
     CAPTURE(command);
