@@ -116,7 +116,8 @@ std::set<std::pair<std::size_t, std::size_t>> near_places(const std::vector<Plac
   for (std::size_t k = 0; k < near.size(); ++k) {
     std::size_t taken = 0;
     for (const auto& [steps, other] : near[k]) {
-      if (steps == 0 || taken++ == kNearestPlaces) continue;
+      if (steps == 0) continue;
+      if (taken++ == kNearestPlaces) break;
       pairs.insert(std::minmax(k, other));
     }
   }
@@ -201,14 +202,19 @@ Levels best_levels(std::span<const PairVote> votes, const std::set<RobotId>& hon
 }
 
 // True if a robot has evidence in several pairs, and without the strongest one of them no pair
-// shows its noise: one wrong peer must not weaken it.
+// shows its noise: one wrong peer must not weaken it. Pairs may differ by one level.
 bool rests_on_one_pair(std::span<const PairVote> votes, const Levels& levels, RobotId robot) {
-  std::vector<double> gains;
-  for (const PairVote& v : votes)
-    if (v.a == robot || v.b == robot)
-      gains.push_back(evidence_at(v, levels) - evidence_at(v, with(levels, robot, 0)));
-  std::ranges::sort(gains);
-  return gains.size() > 1 && !(std::reduce(gains.begin(), gains.end() - 1) > 0.0);
+  const auto shown_by_others = [&](std::size_t level) {
+    std::vector<double> gains;
+    for (const PairVote& v : votes)
+      if (v.a == robot || v.b == robot)
+        gains.push_back(evidence_at(v, with(levels, robot, level)) -
+                        evidence_at(v, with(levels, robot, 0)));
+    std::ranges::sort(gains);
+    return gains.size() < 2 || std::reduce(gains.begin(), gains.end() - 1) > 0.0;
+  };
+  const std::size_t level = levels.at(robot);
+  return !shown_by_others(level) && !(level > 1 && shown_by_others(level - 1));
 }
 
 // The robot whose noise is the least likely one, if the odds are below 1000 to 1.
