@@ -12,7 +12,9 @@
 #include "apps/lab/pgo/solvers.hpp"
 #include "apps/lab/pgo/truth_score.hpp"
 #include "modules/core/json.hpp"
+#include "modules/core/precision.hpp"
 #include "modules/core/text_table.hpp"
+#include "modules/recorded_graph/g2o_io.hpp"
 
 namespace km {
 namespace {
@@ -322,6 +324,19 @@ void write_tum(std::ostream& out, const std::vector<SE3>& T_world_kf) {
   }
 }
 
+// The graph with these poses and isotropic weights, in 3D even if it is planar.
+void write_solved(std::ostream& out, const TeamGraph& graph, const std::vector<SE3>& T_world_kf) {
+  const auto id = [&](Eigen::Index pose) { return graph.ids[static_cast<std::size_t>(pose)]; };
+  G2oGraph result{.dimension = 3, .vertices = {}, .edges = {}};
+  for (std::size_t i = 0; i < T_world_kf.size(); ++i)
+    result.vertices.push_back({graph.ids[i], T_world_kf[i]});
+  for (const BlockEdge& e : graph.edges)
+    result.edges.push_back({id(e.i), id(e.j), e.T_i_j, covariance_of({e.kappa, e.tau})});
+  for (const VerticalPrior& v : graph.verticals)
+    result.verticals.push_back({id(v.pose), {v.up, 1.0 / std::sqrt(v.weight)}});
+  write_g2o(out, result);
+}
+
 std::vector<bool> kept_by(const Solution& solution) {
   return solution.run.decision ? solution.run.decision->kept : std::vector<bool>();
 }
@@ -340,7 +355,10 @@ void run(CLI::App& app, SolveCommand& command) {
   std::cout << left_out_text(team) << solution_text(graph, solution) << score_text(truth);
   write_output(command.json,
                [&](std::ostream& out) { write_solution_json(out, graph, solution, truth); });
-  write_output(command.output, [&](std::ostream& out) { write_tum(out, solution.T_world_kf); });
+  write_output(command.output, [&](std::ostream& out) {
+    command.output.extension() == ".tum" ? write_tum(out, solution.T_world_kf)
+                                         : write_solved(out, graph, solution.T_world_kf);
+  });
 }
 
 }  // namespace
@@ -355,7 +373,12 @@ void add_solve(CLI::App& parent) {
   app.option_defaults()->group("Output");
   app.add_option("--json", command->json, "Also write every round to this file, as JSON");
   app.add_option("--output", command->output,
-                 "Also write the poses as a *.tum, with their numbers as times");
+                 "Also write the rounded poses: *.tum (numbers of the poses as times) or *.g2o")
+      ->check([](const std::string& file) {
+        return file.ends_with(".tum") || file.ends_with(".g2o")
+                   ? std::string()
+                   : file + ": --output writes *.tum or *.g2o";
+      });
   app.callback([&app, command] { run(app, *command); });
 }
 
