@@ -1,9 +1,5 @@
 #include <yaml-cpp/yaml.h>
 
-#include <catch2/catch.hpp>
-#include <filesystem>
-#include <string>
-
 #include "modules/evaluation/association.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
 #include "modules/map_2d/map_2d.hpp"
@@ -13,6 +9,7 @@
 #include "test/support/demo_world.hpp"
 #include "test/support/nav2_map.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 // apps/demo from end to end: a world is rendered, and three robots localise themselves in it over
 // DDS.
@@ -31,7 +28,7 @@ bool is_near(const OccupancyGrid& truth, const Eigen::Vector2d& point, std::int8
 
 // Compares the 2D map of robot 0 with that of the true room, moved to the frame of the team, whose
 // anchor is robot 0.
-void check_map_2d(const std::filesystem::path& robot, const std::filesystem::path& world) {
+void check_map_2d(const fs::path& robot, const fs::path& world) {
   const StampedPose first = read_trajectory(robot / "optimized.tum").front();
   const auto truth_poses =
       read_trajectory(world / "robot0/mav0/state_groundtruth_estimate0/data.csv");
@@ -77,10 +74,10 @@ TEST_CASE("The demo joins three robots of a simulated world into one frame", "[d
   const auto demo = succeeded(run_command(
       "apps/demo --short --rate max --programs " KM_BIN_DIR " --output " + folder.path().string()));
   keep_demo_world(folder.path() / "world_short");
-  CHECK_THAT(demo.output, Catch::Contains("240 of 240 frames, 100 %") &&
-                              Catch::Contains("8 s of recording each, as fast as this") &&
-                              Catch::Contains("team, one frame") &&
-                              Catch::Contains("To look at, in " + folder.path().string()));
+  CHECK_THAT(demo.output, Contains("240 of 240 frames, 100 %") &&
+                              Contains("8 s of recording each, as fast as this") &&
+                              Contains("team, one frame") &&
+                              Contains("To look at, in " + folder.path().string()));
 
   const YAML::Node team = YAML::Load(folder.read("team.json"));  // JSON is YAML
   REQUIRE(team["robots"].size() == 3);
@@ -104,7 +101,7 @@ TEST_CASE("The demo joins three robots of a simulated world into one frame", "[d
        {"report.html", "team_mesh.ply", "team_mesh.png", "robot0/mesh.ply",
         "robot0/mesh_optimized.ply", "robot0/label_palette.csv", "robot0/optimized.tum",
         "robot0/loop_closures.csv", "robot0/traffic.csv", "robot0/robot.log", "robot0/config.yaml"})
-    CHECK(std::filesystem::exists(folder.path() / file));
+    CHECK(fs::exists(folder.path() / file));
 }
 
 TEST_CASE("The demo prints the commands to play a bag, to be pasted", "[demo]") {
@@ -125,10 +122,10 @@ TEST_CASE("The demo prints the commands to play a bag, to be pasted", "[demo]") 
   CHECK(demo.exit_code == 1);
   const std::string robot = KM_BIN_DIR "/kimera_multi_robot ",
                     name = (folder.path() / pasted).string();
-  CHECK_THAT(demo.output, Catch::StartsWith("demo: " + path + " is a bag of ROS.") &&
-                              Catch::Contains(robot + "--inspect " + name + " rig.yaml\n") &&
-                              Catch::Contains(robot + "--robot 0 --dataset " + name +
-                                              " --rig rig.yaml --output results/robot0\n"));
+  CHECK_THAT(demo.output, StartsWith("demo: " + path + " is a bag of ROS.") &&
+                              Contains(robot + "--inspect " + name + " rig.yaml\n") &&
+                              Contains(robot + "--robot 0 --dataset " + name +
+                                       " --rig rig.yaml --output results/robot0\n"));
 }
 
 // A recording of 10 s, and programs that print their command lines.
@@ -145,7 +142,7 @@ struct StubbedDemo {
   }
   void add(const std::string& program, const std::string& script) const {
     const auto file = folder.write("bin/kimera_multi_" + program, "#!/bin/sh\n" + script + '\n');
-    std::filesystem::permissions(file, std::filesystem::perms::owner_all);
+    fs::permissions(file, fs::perms::owner_all);
   }
   CommandResult run(const std::string& arguments) const {
     const std::string root = folder.path().string() + '/';
@@ -158,14 +155,14 @@ TEST_CASE("The demo builds and draws a map of a recording with --map only", "[de
   const StubbedDemo demo;
   const std::string settings = "--set mapping.mode=metric";
   const CommandResult without = succeeded(demo.run(""));
-  CHECK_THAT(without.output, !Catch::Contains(settings) && !Catch::Contains("team_mesh.png"));
+  CHECK_THAT(without.output, !Contains(settings) && !Contains("team_mesh.png"));
 
   const CommandResult none = demo.run("--map");
   CAPTURE(none.output);
   CHECK(none.exit_code == 1);
-  CHECK_THAT(none.output, Catch::Contains("report.html") && !Catch::Contains("team_mesh.png ") &&
-                              Catch::EndsWith("demo: the team built no mesh: the notes above and "
-                                              "robot0/robot.log have the reason\n"));
+  CHECK_THAT(none.output, Contains("report.html") && !Contains("team_mesh.png ") &&
+                              EndsWith("demo: the team built no mesh: the notes above and "
+                                       "robot0/robot.log have the reason\n"));
 
   demo.folder.write(
       "recording/mav0/cam0/sensor.yaml",
@@ -175,18 +172,16 @@ TEST_CASE("The demo builds and draws a map of a recording with --map only", "[de
                        "' && mkdir -p robot0 && : >team_mesh.ply && echo 5 1 2 3 0 0 0 1 "
                        ">robot0/optimized.tum");
   const CommandResult with = succeeded(demo.run("--map"));
-  CHECK_THAT(with.output, Catch::Contains("/out/team.json -- " + settings + '\n') &&
-                              Catch::Contains("team_mesh.png ") &&
-                              Catch::Contains("team_mesh.ply "));
+  CHECK_THAT(with.output, Contains("/out/team.json -- " + settings + '\n') &&
+                              Contains("team_mesh.png ") && Contains("team_mesh.ply "));
   const std::string render = demo.folder.read("out/render.log");
-  CHECK_THAT(render, Catch::Contains("/out/team_mesh.ply --output ") &&
-                         !Catch::Contains("--palette") &&
-                         Catch::Contains("--view=0.60,2.00,3.00,0.0,0.0 "));
+  CHECK_THAT(render, Contains("/out/team_mesh.ply --output ") && !Contains("--palette") &&
+                         Contains("--view=0.60,2.00,3.00,0.0,0.0 "));
 
-  std::filesystem::remove(demo.folder.path() / "bin/kimera_multi_evaluate");
+  fs::remove(demo.folder.path() / "bin/kimera_multi_evaluate");
   CHECK(demo.run("").exit_code == 0);
   CHECK_THAT(demo.run("--map").output,
-             Catch::StartsWith("demo: --programs: no kimera_multi_evaluate in "));
+             StartsWith("demo: --programs: no kimera_multi_evaluate in "));
 }
 
 TEST_CASE("The demo lets robots be watched with --view only", "[demo]") {
@@ -194,11 +189,10 @@ TEST_CASE("The demo lets robots be watched with --view only", "[demo]") {
   demo.add("viewer", "echo Open http://here");
   const CommandResult without = demo.run("");
   CHECK(without.exit_code == 0);
-  CHECK_THAT(without.output, !Catch::Contains("--view"));
+  CHECK_THAT(without.output, !Contains("--view"));
   const CommandResult with = succeeded(demo.run("--view"));
-  CHECK_THAT(with.output, Catch::Contains("To watch the team, open http://here") &&
-                              Catch::Contains("/kimera_multi_team --config") &&
-                              Catch::Contains(" --view\n"));
+  CHECK_THAT(with.output, Contains("To watch the team, open http://here") &&
+                              Contains("/kimera_multi_team --config") && Contains(" --view\n"));
 }
 
 TEST_CASE("The demo refuses unusable input", "[demo]") {
@@ -207,28 +201,26 @@ TEST_CASE("The demo refuses unusable input", "[demo]") {
     CHECK(result.exit_code != 0);
     return result.output;
   };
-  CHECK_THAT(refusal("/no/such/folder"), Catch::Contains("no such folder: /no/such/folder"));
+  CHECK_THAT(refusal("/no/such/folder"), Contains("no such folder: /no/such/folder"));
   const TemporaryFolder recordings;
-  const std::filesystem::path one = recordings.path() / "one";
-  std::filesystem::create_directories(one / "mav0");
-  CHECK_THAT(
-      refusal(recordings.path().string()),
-      Catch::Contains("is a folder of recordings: name one, such as " + one.string() + "\n"));
-  CHECK_THAT(refusal(one.string()), Catch::Contains("cam0/data.csv is missing"));
-  CHECK_THAT(refusal("--robots none"), Catch::Contains("--robots none is not a number"));
+  const fs::path one = recordings.path() / "one";
+  fs::create_directories(one / "mav0");
+  CHECK_THAT(refusal(recordings.path().string()),
+             Contains("is a folder of recordings: name one, such as " + one.string() + "\n"));
+  CHECK_THAT(refusal(one.string()), Contains("cam0/data.csv is missing"));
+  CHECK_THAT(refusal("--robots none"), Contains("--robots none is not a number"));
   for (const std::string rate : {"fast", "0", "-1", "1.0x", ""})
     CHECK_THAT(refusal("--rate '" + rate + "'"),
-               Catch::StartsWith("demo: --rate " + rate + " is neither a positive number nor max"));
-  CHECK_THAT(refusal("--output"), Catch::Contains("--output needs a value"));
-  CHECK_THAT(refusal("--fast"), Catch::Contains("unknown option --fast"));
-  CHECK_THAT(refusal("--programs /nope"),
-             Catch::StartsWith("demo: --programs: no such folder: /nope"));
+               StartsWith("demo: --rate " + rate + " is neither a positive number nor max"));
+  CHECK_THAT(refusal("--output"), Contains("--output needs a value"));
+  CHECK_THAT(refusal("--fast"), Contains("unknown option --fast"));
+  CHECK_THAT(refusal("--programs /nope"), StartsWith("demo: --programs: no such folder: /nope"));
   CHECK_THAT(refusal("--programs config"),
-             Catch::StartsWith("demo: --programs: no kimera_multi_robot in "));
-  CHECK_THAT(refusal("--short config"), Catch::Contains("--short is for the simulated world"));
+             StartsWith("demo: --programs: no kimera_multi_robot in "));
+  CHECK_THAT(refusal("--short config"), Contains("--short is for the simulated world"));
   CHECK_THAT(refusal("--output /proc/none --programs " KM_BIN_DIR),
-             Catch::Contains("demo: --output /proc/none: cannot be written to"));
-  CHECK_THAT(refusal("config --programs " KM_BIN_DIR), Catch::Contains("cam0/data.csv is missing"));
+             Contains("demo: --output /proc/none: cannot be written to"));
+  CHECK_THAT(refusal("config --programs " KM_BIN_DIR), Contains("cam0/data.csv is missing"));
 }
 
 }  // namespace km

@@ -1,24 +1,14 @@
-#include <catch2/catch.hpp>
-
 #include <malloc.h>
 #include <sys/mman.h>
-#include <cstring>
-#include <filesystem>
-#include <iostream>
-#include <memory>
-#include <sstream>
-#include <string>
-#include <vector>
 
 #include "apps/result_files.hpp"
 #include "apps/robot/growing_files.hpp"
 #include "test/support/captured_log.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
-
-namespace fs = std::filesystem;
 
 TEST_CASE("Rows for which there was no room are written once there is room", "[robot]") {
   const CapturedLog log;
@@ -66,7 +56,7 @@ TEST_CASE("Rows wait while the folder is gone, and a deleted file begins again w
   file.rows() << "3\n";
   file.flush();
   CHECK(folder.read("out/a.csv") == "time\n2\n3\n");
-  CHECK_THAT(results.lost().at((out / "a.csv").string()), Catch::Contains("rows are missing"));
+  CHECK_THAT(results.lost().at((out / "a.csv").string()), Contains("rows are missing"));
 }
 
 TEST_CASE("A disk that is full for too long costs rows, and the file is reported as incomplete",
@@ -84,7 +74,7 @@ TEST_CASE("A disk that is full for too long costs rows, and the file is reported
   fs::remove(path);
   file.flush();
   CHECK(fs::file_size(path) == GrowingFile::kMaxWaiting_bytes);
-  CHECK_THAT(results.lost().at(path.string()), Catch::Contains("rows are missing"));
+  CHECK_THAT(results.lost().at(path.string()), Contains("rows are missing"));
 }
 
 TEST_CASE("A file that is continued loses its incomplete row and no other", "[robot]") {
@@ -121,8 +111,7 @@ TEST_CASE("Results replace an empty file of no run, and no other", "[result_file
   folder.write("traffic.csv", "");  // as one who watches the file creates it before the run
   CHECK_NOTHROW(expect_no_other_files(folder.path()));
   folder.write("traffic.csv", "mine");
-  CHECK_THROWS_WITH(remove_results(folder.path()),
-                    Catch::Contains("traffic.csv: would be replaced"));
+  CHECK_THROWS_WITH(remove_results(folder.path()), Contains("traffic.csv: would be replaced"));
   CHECK(folder.read("traffic.csv") == "mine");
 }
 

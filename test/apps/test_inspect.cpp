@@ -1,16 +1,10 @@
-#include <catch2/catch.hpp>
-
-#include <iterator>
-#include <sstream>
-#include <string>
-#include <vector>
-
 #include "apps/robot/inspect.hpp"
 #include "modules/core/input_file.hpp"
 #include "modules/recordings/ros_messages.hpp"
 #include "test/support/corrupted_input.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -65,11 +59,10 @@ TEST_CASE("A EuRoC folder needs no rig file, and the message names the alternati
   const TemporaryFolder folder;
   folder.write("mav0/cam0/data.csv", "1000000000,a\n");
   const auto rig = folder.path() / "rig.yaml";
-  CHECK_THROWS_WITH(
-      inspect_recording(folder.path(), rig),
-      Catch::Contains("is a EuRoC folder, whose calibration is its own sensor.yaml") &&
-          Catch::Contains("--dataset " + folder.path().string()));
-  CHECK_FALSE(std::filesystem::exists(rig));
+  CHECK_THROWS_WITH(inspect_recording(folder.path(), rig),
+                    Contains("is a EuRoC folder, whose calibration is its own sensor.yaml") &&
+                        Contains("--dataset " + folder.path().string()));
+  CHECK_FALSE(fs::exists(rig));
 }
 
 TEST_CASE("Skipped parts of a recording are reported with their place", "[robot]") {
@@ -79,8 +72,8 @@ TEST_CASE("Skipped parts of a recording are reported with their place", "[robot]
   const std::string whole = read_input_file(*file);
   const auto cut = folder.write("a.mcap", whole.substr(0, whole.size() - 100));
   const std::string text = inspect_recording(cut);
-  CHECK_THAT(text, Catch::Contains("/odom ") &&
-                       Catch::Contains("truncated parts, first: " + cut.string() + " byte "));
+  CHECK_THAT(text,
+             Contains("/odom ") && Contains("truncated parts, first: " + cut.string() + " byte "));
   CHECK(text.find("\n\n") == text.npos);  // no cameras
 }
 
@@ -160,8 +153,7 @@ TEST_CASE("Aligned depth is proposed, or depth is reported as not aligned", "[ro
                                       framed("/camera/color/image_raw", "rgb8", "color"),
                                       topic("/imu", RosImu::kType, 200.0)};
   CHECK_THAT(depth_problem(topics, propose_rig(topics)),
-             Catch::Contains("its frame is depth, not color") &&
-                 Catch::Contains("align_depth.enable:=true"));
+             Contains("its frame is depth, not color") && Contains("align_depth.enable:=true"));
   topics.push_back(framed("/camera/aligned_depth_to_color/image_raw", "16UC1", "color"));
   const RigFile rig = propose_rig(topics);
   CHECK(rig.left.topic == "/camera/color/image_raw");
@@ -186,11 +178,11 @@ TEST_CASE("A rig file is written for a recording, once", "[robot]") {
   if (!bag) return;
   const TemporaryFolder folder;
   const auto file = folder.path() / "rig.yaml";
-  CHECK_THAT(inspect_recording(*bag, file), Catch::Contains("written: " + file.string()));
+  CHECK_THAT(inspect_recording(*bag, file), Contains("written: " + file.string()));
   const std::string text = read_input_file(file);
-  CHECK_THAT(text, Catch::Contains("topic: \"/Alpha/left_camera/compressed\"") &&
-                       Catch::Contains("topic: \"/Alpha/right_camera/compressed\"") &&
-                       Catch::Contains("topic: \"/Alpha/imu/data\""));
+  CHECK_THAT(text, Contains("topic: \"/Alpha/left_camera/compressed\"") &&
+                       Contains("topic: \"/Alpha/right_camera/compressed\"") &&
+                       Contains("topic: \"/Alpha/imu/data\""));
   CHECK_THROWS_WITH(inspect_recording(*bag, file),
                     file.string() + ": is there already: name another file");
   // Topics have the rest of the calibration.

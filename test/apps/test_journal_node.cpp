@@ -1,17 +1,9 @@
-#include <catch2/catch.hpp>
-
-#include <algorithm>
-#include <string>
-#include <string_view>
-#include <utility>
-#include <variant>
-#include <vector>
-
 #include "apps/result_files.hpp"
 #include "apps/robot/journal_node.hpp"
 #include "apps/robot/wiring.hpp"
 #include "test/support/inbox.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -49,7 +41,7 @@ struct Journal {
   }
 
   const TemporaryFolder folder;
-  const std::filesystem::path file = folder.path() / kJournal;
+  const fs::path file = folder.path() / kJournal;
   Topics topics;
   Topic<PeerEvent> peer_events;
   ResultWriter results;
@@ -85,7 +77,7 @@ TEST_CASE("The journal knows a published keyframe as long as its file exists", "
   REQUIRE(recalled != nullptr);
   CHECK(recalled->stamp == 17);
   CHECK(journal.node.recall(1) == nullptr);
-  std::filesystem::remove(journal.file);
+  fs::remove(journal.file);
   CHECK(journal.node.recall(0) == nullptr);
 }
 

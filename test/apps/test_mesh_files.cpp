@@ -1,11 +1,10 @@
-#include <catch2/catch.hpp>
-
 #include "apps/robot/mesh_files_node.hpp"
 #include "modules/core/lie.hpp"
 #include "modules/mesh/mesh_file.hpp"
 #include "test/support/captured_log.hpp"
 #include "test/support/nav2_map.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -80,8 +79,8 @@ TEST_CASE("The 2D map and the slice of the distance field are written", "[robot]
 TEST_CASE("A mesh that cannot be written is named, and no end of the run", "[robot][mapping]") {
   Bench bench;
   const CapturedLog log;
-  const std::filesystem::path file = bench.folder.path() / "mesh.ply";
-  std::filesystem::create_directory(file);
+  const fs::path file = bench.folder.path() / "mesh.ply";
+  fs::create_directory(file);
   bench.node.start();
   bench.maps.publish(triangle());
   bench.optimized.publish(OptimizedMesh{{.mesh = triangle().mesh, .report = {}, .superseded = {}}});
@@ -90,9 +89,9 @@ TEST_CASE("A mesh that cannot be written is named, and no end of the run", "[rob
   CHECK(bench.written("mesh_optimized.ply").vertices == triangle().mesh.vertices);
   const std::string why = file.string() + ": cannot be written: Is a directory";
   CHECK(bench.results.lost() == std::map<std::string, std::string>{{file.string(), why}});
-  CHECK_THAT(log.text(), Catch::Contains("error results: " + why));
+  CHECK_THAT(log.text(), Contains("error results: " + why));
 
-  std::filesystem::remove(file);
+  fs::remove(file);
   bench.node.finish({});
   CHECK(bench.results.lost().empty());
   CHECK(bench.written("mesh.ply").vertices == triangle().mesh.vertices);

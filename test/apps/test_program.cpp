@@ -1,18 +1,8 @@
-#include <catch2/catch.hpp>
-
-#include <algorithm>
-#include <cstring>
-#include <iostream>
-#include <map>
-#include <optional>
-#include <sstream>
-#include <string>
-#include <vector>
-
 #include "apps/program_options.hpp"
 #include "test/modules/sensors/euroc_folder.hpp"
 #include "test/support/command.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -91,8 +81,8 @@ TEST_CASE("An invalid command line gives the exit code and a message with the op
   const Parsed parsed = parse(program.app, words, hint);
   CAPTURE(parsed.errors);
   CHECK(parsed.exit_code == kBadCommandLine);
-  CHECK_THAT(parsed.errors, Catch::Contains(named));
-  CHECK_THAT(parsed.errors, Catch::Contains("NAME") || !Catch::Contains("is required"));
+  CHECK_THAT(parsed.errors, Contains(named));
+  CHECK_THAT(parsed.errors, Contains("NAME") || !Contains("is required"));
 }
 
 TEST_CASE("A callback can refuse its option, or end the program", "[program]") {
@@ -105,7 +95,7 @@ TEST_CASE("A callback can refuse its option, or end the program", "[program]") {
   CHECK(program.number == 2);
   const Parsed refused = parse(program.app, {"a", "--refused"});
   CHECK(refused.exit_code == kBadCommandLine);
-  CHECK_THAT(refused.errors, Catch::StartsWith("--refused: why\n"));
+  CHECK_THAT(refused.errors, StartsWith("--refused: why\n"));
   const Parsed done = parse(program.app, {"a", "--done"});
   CHECK(done.exit_code == 0);
   CHECK(done.errors.empty());
@@ -125,8 +115,8 @@ TEST_CASE("Without a subcommand the program lists them", "[program]") {
       GENERATE(std::vector<std::string>{}, std::vector<std::string>{"cont"});
   const Parsed parsed = run_program(words);
   CHECK(parsed.exit_code == kBadCommandLine);
-  CHECK_THAT(parsed.errors, Catch::EndsWith("program: the first word must be a subcommand:\n"
-                                            "  count  Counts\n  fail  Fails\n"));
+  CHECK_THAT(parsed.errors, EndsWith("program: the first word must be a subcommand:\n"
+                                     "  count  Counts\n  fail  Fails\n"));
 }
 
 TEST_CASE("An unknown option gives the exit code of bad command lines in every program",
@@ -191,7 +181,7 @@ TEST_CASE("An input that is missing or unreadable gives the exit code of bad inp
       const CommandResult result = run_command(KM_BIN_DIR "/kimera_multi_" + words);
       CAPTURE(words, result.output);
       CHECK(result.exit_code == (words.starts_with("doctor") ? 2 : kBadInput));
-      CHECK_THAT(result.output, Catch::Contains(input) && !Catch::Contains("Run with --help"));
+      CHECK_THAT(result.output, Contains(input) && !Contains("Run with --help"));
     }
 }
 
@@ -208,10 +198,10 @@ TEST_CASE("Every program prints its version, its commit and its build settings",
     CAPTURE(name);
     const CommandResult result = run_command(KM_BIN_DIR "/" + name + " --version");
     CHECK(result.exit_code == 0);
-    CHECK_THAT(result.output, Catch::Matches(name + " " KM_VERSION "\ncommit " + kCommitPattern +
-                                             "\nbuilt with [A-Za-z]+ [0-9.]+, [A-Za-z]+, "
-                                             "Cyclone DDS [0-9.]+, Eigen [0-9.]+, "
-                                             "OpenCV [0-9.]+, Ceres [0-9.]+\n"));
+    CHECK_THAT(result.output, Matches(name + " " KM_VERSION "\ncommit " + kCommitPattern +
+                                      "\nbuilt with [A-Za-z]+ [0-9.]+, [A-Za-z]+, "
+                                      "Cyclone DDS [0-9.]+, Eigen [0-9.]+, "
+                                      "OpenCV [0-9.]+, Ceres [0-9.]+\n"));
   }
   CHECK(count >= 9);  // without simulator and viewer
 }
@@ -256,7 +246,7 @@ TEST_CASE("The build knows the commit of its sources, and whether they differ", 
   }
   sources.commit();
   const std::string commit = sources.found();
-  CHECK_THAT(commit, Catch::Matches("[0-9a-f]{10,40}"));
+  CHECK_THAT(commit, Matches("[0-9a-f]{10,40}"));
   sources.folder.write("tree/build/x.o", "not tracked");
   CHECK(sources.found() == commit);
   sources.folder.write("tree/CMakeLists.txt", "two");
@@ -270,10 +260,10 @@ TEST_CASE("The header of an unchanged commit is not written again", "[version]")
   const Sources sources;
   static_cast<void>(sources.found());
   const auto header = sources.folder.path() / "commit.hpp";
-  const auto written = std::filesystem::file_time_type{};
-  std::filesystem::last_write_time(header, written);
+  const auto written = fs::file_time_type{};
+  fs::last_write_time(header, written);
   static_cast<void>(sources.found());
-  CHECK(std::filesystem::last_write_time(header) == written);
+  CHECK(fs::last_write_time(header) == written);
 }
 
 }  // namespace km

@@ -1,16 +1,10 @@
-#include <catch2/catch.hpp>
-
-#include <filesystem>
-#include <fstream>
-#include <iterator>
-#include <string>
 #include <type_traits>
-#include <vector>
 
 #include "apps/robot/robot_config.hpp"
 #include "apps/robot/robot_input.hpp"
 #include "runtime/config_text.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -98,7 +92,7 @@ TEST_CASE("Later sources have priority: profile, files, settings, options", "[ro
 
 TEST_CASE("Every shipped configuration loads", "[robot]") {
   std::vector<std::string> files = {"config/robot.yaml"};
-  for (const auto& entry : std::filesystem::directory_iterator("config/datasets"))
+  for (const auto& entry : fs::directory_iterator("config/datasets"))
     files.push_back(entry.path().string());
   CHECK(files.size() > 3);
   for (const std::string& file : files)
@@ -114,11 +108,9 @@ TEST_CASE("Every shipped configuration loads", "[robot]") {
 TEST_CASE("A link profile that does not exist is named with the places looked at", "[robot]") {
   RobotOptions options;
   options.link = "pigeon";
-  CHECK_THROWS_WITH(load_robot_config(options), Catch::Contains("qos/pigeon.yaml") &&
-                                                    Catch::Contains("config/qos/pigeon.yaml"));
+  CHECK_THROWS_WITH(load_robot_config(options),
+                    Contains("qos/pigeon.yaml") && Contains("config/qos/pigeon.yaml"));
 }
-
-namespace fs = std::filesystem;
 
 constexpr const char* kPalette = "name,red,green,blue,alpha,id\nroad,1,2,3,255,1\n";
 
@@ -200,7 +192,7 @@ TEST_CASE("A bag has the images that its rig file names", "[robot][mapping]") {
   topics.depth = "/depth";
   CHECK(plan(topics, metric)->reads_depth());
   CHECK_THROWS_WITH(plan(topics, {.mode = MappingMode::kSemantic}),
-                    Catch::Contains("no label images in rig.yaml"));
+                    Contains("no label images in rig.yaml"));
 }
 
 TEST_CASE("A map that is not possible is refused with the missing inputs", "[robot][mapping]") {
@@ -210,7 +202,7 @@ TEST_CASE("A map that is not possible is refused with the missing inputs", "[rob
                           const std::string& words) {
     CAPTURE(words);
     CHECK_THROWS_AS(recording.plan(config), ConfigError);
-    CHECK_THROWS_WITH(recording.plan(config), Catch::Contains(words));
+    CHECK_THROWS_WITH(recording.plan(config), Contains(words));
   };
   refused(stereo, {.mode = MappingMode::kMetric, .depth = DenseSource::kRecorded},
           "no depth images");
@@ -225,8 +217,7 @@ TEST_CASE("A map that is not possible is refused with the missing inputs", "[rob
   refused(depth, {.mode = MappingMode::kSemantic}, "label_palette.csv");
   fs::remove(depth.folder.path() / "mav0" / "label_palette.csv");
   refused(depth, {.mode = MappingMode::kSemantic}, "needs a table of the labels");
-  CHECK_THROWS_WITH(plan_mapping({.mode = MappingMode::kMetric}, {}, {}, {}),
-                    Catch::Contains("--graph"));
+  CHECK_THROWS_WITH(plan_mapping({.mode = MappingMode::kMetric}, {}, {}, {}), Contains("--graph"));
 }
 
 }  // namespace

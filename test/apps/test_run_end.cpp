@@ -1,13 +1,7 @@
-#include <catch2/catch.hpp>
-
-#include <functional>
-#include <string>
-#include <tuple>
-#include <vector>
-
 #include "apps/robot/robot_config.hpp"
 #include "apps/robot/run_end.hpp"
 #include "apps/robot/unmet_peers.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -195,7 +189,7 @@ TEST_CASE("A run is judged by the gravest that happened to it", "[run_end]") {
     for (const auto& change : changes) change(end);
     CAPTURE(reason);
     CHECK(verdict_of(end).exit_code == exit_code);
-    CHECK_THAT(verdict_of(end).reason, Catch::StartsWith(reason));
+    CHECK_THAT(verdict_of(end).reason, StartsWith(reason));
   }
 }
 

@@ -1,8 +1,6 @@
-#include <catch2/catch.hpp>
-#include <functional>
-
 #include "apps/robot/run_findings.hpp"
 #include "modules/diagnosis/doubt_finding.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -52,7 +50,6 @@ TEST_CASE("Runs of robots that joined have no findings", "[robot][findings]") {
 
 TEST_CASE("Why two robots did not join is one sentence with the counts of both",
           "[robot][findings]") {
-  using Catch::Equals;
   std::vector<RunFacts> team = {run_of(0, false, tally_of(400, 100, 30, 2)),
                                 run_of(2, false, tally_of(12, 5, 1, 0))};
   for (RunFacts& run : team) run.pcm.selection = ClosureSelection::kPcm;
@@ -74,13 +71,13 @@ TEST_CASE("If robots share enough closures, a lost link is named as the reason w
     REQUIRE(found != findings.end());
     return found->what;
   };
-  CHECK_THAT(what(), Catch::StartsWith("alice and bob did not join: "));
+  CHECK_THAT(what(), StartsWith("alice and bob did not join: "));
   run.summary.lost_peers = {{"bob", 12.0}};
-  CHECK_THAT(what(), Catch::StartsWith("alice and bob are in different frames at the end: ") &&
-                         Catch::Contains("20 kept, but one robot was not received"));
+  CHECK_THAT(what(), StartsWith("alice and bob are in different frames at the end: ") &&
+                         Contains("20 kept, but one robot was not received"));
   run.closures[2] = tally_of(400, 100, 0, 0);  // without candidates, that is the reason
-  CHECK_THAT(what(), Catch::StartsWith("alice and bob did not join: ") &&
-                         !Catch::Contains("one robot was not received"));
+  CHECK_THAT(what(),
+             StartsWith("alice and bob did not join: ") && !Contains("one robot was not received"));
 }
 
 TEST_CASE("Two robots did not join for the first stage that stopped their closures",
@@ -91,7 +88,6 @@ TEST_CASE("Two robots did not join for the first stage that stopped their closur
     CHECK(findings.front().id == "team.not_joined");
     return findings.front().what;
   };
-  using Catch::Contains;
   CHECK_THAT(why({}), Contains("did not join: 0 candidates: no place of one robot looks like"));
   RunFacts other = run_of(0, false, {});
   other.summary.other_vocabulary["bob"] = 77;
@@ -135,7 +131,7 @@ TEST_CASE("Robots that one place or no closure ties are reported as such", "[rob
   runs[1].summary.pgo.tentative.clear();
   runs[0].summary.pgo.not_joined = {2};
   CHECK(findings_of(runs).size() == 1);
-  CHECK_THAT(findings_of(runs)[0].what, Catch::Contains("did not join"));
+  CHECK_THAT(findings_of(runs)[0].what, Contains("did not join"));
 }
 
 TEST_CASE("A tally counts the stages that a closure came through, and why it stopped",
@@ -253,19 +249,19 @@ TEST_CASE("A finding on a run is reported with its severity and its number", "[r
     if (row.id == nullptr) continue;
     CHECK(findings[0].id == row.id);
     CHECK(findings[0].severity == row.severity);
-    CHECK_THAT(findings[0].what, Catch::Contains(row.number));
+    CHECK_THAT(findings[0].what, Contains(row.number));
   }
 }
 
 TEST_CASE("The advice on pauses and holes depends on skipped frames", "[robot][findings]") {
   RunFacts run = run_of(0, true, tally_of(40, 30, 10, 10));
   run.summary.paused_s = 3.0;
-  CHECK_THAT(the_finding_of(run).means, Catch::Contains("every image was used"));
+  CHECK_THAT(the_finding_of(run).means, Contains("every image was used"));
   run.summary.paused_s = 0.0;
   run.summary.holes = HolesSummary{.count = 1, .longest_s = 6.3};
-  CHECK_THAT(the_finding_of(run).to_do, Catch::Contains("sensor_faults"));
+  CHECK_THAT(the_finding_of(run).to_do, Contains("sensor_faults"));
   run.summary.frames_skipped = 1;
-  CHECK_THAT(findings_of_one(run).at(0).to_do, Catch::Contains("--rate auto"));
+  CHECK_THAT(findings_of_one(run).at(0).to_do, Contains("--rate auto"));
 }
 
 }  // namespace km

@@ -1,9 +1,8 @@
-#include <catch2/catch.hpp>
-
 #include "apps/robot/results.hpp"
 #include "apps/robot/run_record.hpp"
 #include "modules/session/own_graph.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -281,8 +280,8 @@ TEST_CASE("a closure is the same from whichever end it was found", "[robot]") {
   write_results(folder.path(), record, results);
   CHECK(results.lost().empty());
   CHECK_THAT(folder.read("loop_closures.csv"),
-             Catch::Contains("\n1,4,2,3,0,inlier,0,0,-1.000000,-2.000000,-3.000000,"
-                             "0.00000000,0.00000000,0.00000000,1.00000000,1,1,1,3.74,3.32,2.45,"));
+             Contains("\n1,4,2,3,0,inlier,0,0,-1.000000,-2.000000,-3.000000,"
+                      "0.00000000,0.00000000,0.00000000,1.00000000,1,1,1,3.74,3.32,2.45,"));
 }
 
 }  // namespace km

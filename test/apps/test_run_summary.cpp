@@ -1,13 +1,10 @@
-#include <catch2/catch.hpp>
-
-#include <cmath>
-#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "apps/robot/results.hpp"
 #include "apps/robot/run_summary.hpp"
 #include "apps/robot/status.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -123,15 +120,13 @@ TEST_CASE("A cost that is no number is null, and none again", "[robot][summary]"
   RunSummary summary;
   summary.pgo.cost = std::numeric_limits<double>::quiet_NaN();
   const std::string text = json_text(summary);
-  CHECK_THAT(text, Catch::Contains("\"cost\": null"));
+  CHECK_THAT(text, Contains("\"cost\": null"));
   CHECK(std::isnan(read_summary(folder.write("summary.json", text)).pgo.cost));
 }
 
 TEST_CASE("A summary that is missing or broken is named, with the key", "[robot][summary]") {
-  using Catch::Contains;
   const TemporaryFolder folder;
-  CHECK_THROWS_WITH(read_summary(folder.path() / "x.json"),
-                    Catch::EndsWith("x.json: no such file"));
+  CHECK_THROWS_WITH(read_summary(folder.path() / "x.json"), EndsWith("x.json: no such file"));
   for (const auto& [text, words] :
        {std::pair("[1, 2", "y.json: "),
         {"7", "y.json: not a JSON object"},

@@ -1,11 +1,9 @@
-#include <catch2/catch.hpp>
-
 #include <malloc.h>
-#include <cstdlib>
 
 #include "runtime/dds/codec.hpp"
 #include "test/fuzz/all_messages.hpp"
 #include "test/support/corrupted_input.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

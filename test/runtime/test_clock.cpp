@@ -1,10 +1,6 @@
-#include <atomic>
-#include <catch2/catch.hpp>
-#include <future>
-#include <limits>
-
 #include "runtime/clock.hpp"
 #include "runtime/periodic.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

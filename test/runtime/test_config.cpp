@@ -1,13 +1,6 @@
-#include <catch2/catch.hpp>
-
-#include <cstdint>
-#include <string>
-#include <vector>
-
 #include "runtime/config_layers.hpp"
 #include "test/support/corrupted_input.hpp"
-
-using Catch::Contains;
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

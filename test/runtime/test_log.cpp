@@ -1,16 +1,11 @@
 #include <fcntl.h>
 #include <sys/wait.h>
 #include <unistd.h>
-#include <array>
-#include <catch2/catch.hpp>
 #include <regex>
-#include <sstream>
-#include <string>
-#include <thread>
-#include <vector>
 
 #include "runtime/log.hpp"
 #include "test/support/captured_log.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

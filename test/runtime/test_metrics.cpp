@@ -1,10 +1,5 @@
-#include <algorithm>
-#include <catch2/catch.hpp>
-#include <cmath>
-#include <random>
-#include <vector>
-
 #include "runtime/metrics.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

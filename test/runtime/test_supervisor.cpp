@@ -1,18 +1,11 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <catch2/catch.hpp>
-#include <csignal>
-#include <future>
-#include <memory>
-#include <stdexcept>
-#include <string>
-#include <vector>
-
 #include "runtime/guarded_thread.hpp"
 #include "runtime/supervisor.hpp"
 #include "runtime/worker_node.hpp"
 #include "test/support/captured_log.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -96,7 +89,7 @@ TEST_CASE("An exception in any thread of a node ends the run with the name of th
   REQUIRE(result.failure.has_value());
   CHECK(result.failure->node == "threads");
   CHECK(result.failure->message == "the reason");
-  CHECK_THAT(run.log.text(), Catch::Contains("threads failed: the reason"));
+  CHECK_THAT(run.log.text(), Contains("threads failed: the reason"));
 }
 
 TEST_CASE("A node that fails while it finishes its work is still reported", "[supervisor]") {
@@ -154,7 +147,7 @@ TEST_CASE("A node that hangs is abandoned and keeps no other from ending", "[sup
   REQUIRE(result.failure.has_value());
   CHECK(result.failure->node == "hanging");
   CHECK(result.failure->hung);
-  CHECK_THAT(result.failure->message, Catch::StartsWith("has not finished one step for"));
+  CHECK_THAT(result.failure->message, StartsWith("has not finished one step for"));
   CHECK(result.left_behind == std::vector<std::string>{"hanging"});
   CHECK(result.is_left_behind("hanging"));
   CHECK(diary.back() == "stop last");

@@ -1,9 +1,6 @@
-#include <catch2/catch.hpp>
-#include <string>
-#include <vector>
-
 #include "runtime/watchdog.hpp"
 #include "test/support/captured_log.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -41,8 +38,7 @@ TEST_CASE("A step that does not end is named within 5 s and given up after its l
   bench.pass(3.0);
   CHECK(bench.log.text().empty());
   bench.pass(2.0);
-  CHECK_THAT(bench.log.text(),
-             Catch::Contains("warn supervisor: toy has not finished one step for 4 s"));
+  CHECK_THAT(bench.log.text(), Contains("warn supervisor: toy has not finished one step for 4 s"));
   bench.pass(14.0);
   CHECK_FALSE(bench.watchdog.given_up().has_value());
   CHECK_FALSE(bench.node.freed);

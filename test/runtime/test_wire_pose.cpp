@@ -1,9 +1,6 @@
-#include <catch2/catch.hpp>
-#include <limits>
-#include <random>
-
 #include "runtime/dds/wire_pose.hpp"
 #include "test/support/random_pose.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

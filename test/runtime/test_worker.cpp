@@ -1,19 +1,11 @@
-#include <algorithm>
-#include <atomic>
-#include <catch2/catch.hpp>
-#include <future>
-#include <memory>
-#include <stdexcept>
-#include <string>
-#include <thread>
 #include <type_traits>
-#include <vector>
 
 #include "runtime/bounded_queue.hpp"
 #include "runtime/latest.hpp"
 #include "runtime/thread.hpp"
 #include "runtime/topic.hpp"
 #include "runtime/worker_node.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

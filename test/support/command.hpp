@@ -2,14 +2,7 @@
 
 #include <sys/wait.h>
 
-#include <array>
-#include <catch2/catch.hpp>
-#include <cstdio>
-#include <sstream>
-#include <stdexcept>
-#include <string>
-#include <utility>
-#include <vector>
+#include "test/support/test.hpp"
 
 namespace km {
 

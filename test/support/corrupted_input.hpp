@@ -1,19 +1,9 @@
 #pragma once
 
-#include <catch2/catch.hpp>
-
-#include <algorithm>
-#include <array>
-#include <cstdint>
-#include <cstdlib>
 #include <exception>
-#include <filesystem>
-#include <random>
-#include <string>
-#include <string_view>
-#include <vector>
 
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 
@@ -219,8 +209,8 @@ void check_corrupted(const std::string& good, const std::string& name, const Rea
 }
 
 /// Paths without a readable file.
-[[nodiscard]] inline std::vector<std::filesystem::path> no_files(const TemporaryFolder& folder,
-                                                                 const std::string& extension) {
+[[nodiscard]] inline std::vector<fs::path> no_files(const TemporaryFolder& folder,
+                                                    const std::string& extension) {
   namespace fs = std::filesystem;
   const fs::path loop = folder.path() / ("loop" + extension);
   fs::create_symlink(loop.filename(), loop);
@@ -234,13 +224,13 @@ void check_corrupted(const std::string& good, const std::string& name, const Rea
 template <typename Error, typename Read>
 void check_no_files(const std::string& extension, const Read& read) {
   const TemporaryFolder folder;
-  for (const std::filesystem::path& place : no_files(folder, extension)) {
+  for (const fs::path& place : no_files(folder, extension)) {
     CAPTURE(place);
     try {
       read(place);
       FAIL_CHECK("was read");
     } catch (const Error& error) {
-      CHECK_THAT(error.what(), Catch::Contains(place.string().substr(0, 150)));
+      CHECK_THAT(error.what(), Contains(place.string().substr(0, 150)));
     } catch (const std::exception& error) {
       FAIL_CHECK("not an error of input: " << error.what());
     }

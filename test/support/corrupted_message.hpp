@@ -1,11 +1,7 @@
 #pragma once
 
-#include <catch2/catch.hpp>
-#include <functional>
-#include <string>
-#include <vector>
-
 #include "runtime/dds/codec.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 

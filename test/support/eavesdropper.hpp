@@ -1,19 +1,11 @@
 #pragma once
 
-#include <catch2/catch.hpp>
-#include <functional>
-#include <map>
-#include <memory>
-#include <set>
-#include <span>
-#include <utility>
-#include <vector>
-
 #include "apps/lab/pgo/member_team.hpp"
 #include "modules/robust/member_solver.hpp"
 #include "modules/robust/tree_messages.hpp"
 #include "modules/robust/tree_newton.hpp"
 #include "modules/tree_newton/chordal.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 

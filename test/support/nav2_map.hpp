@@ -2,11 +2,8 @@
 
 #include <yaml-cpp/yaml.h>
 
-#include <catch2/catch.hpp>
-#include <sstream>
-#include <string>
-
 #include "modules/core/occupancy_grid.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 

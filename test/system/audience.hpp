@@ -1,17 +1,9 @@
 #pragma once
 
-#include <atomic>
-#include <catch2/catch.hpp>
-#include <cstdint>
-#include <filesystem>
-#include <map>
-#include <string>
-#include <thread>
-#include <vector>
-
 #include "modules/view/node/view_listener_node.hpp"
 #include "test/modules/view/watcher.hpp"
 #include "test/support/process.hpp"
+#include "test/support/test.hpp"
 #include "test/system/team_run.hpp"
 #include "test/system/walk.hpp"
 
@@ -60,16 +52,16 @@ class Audience {
 
 /// Command of a robot that walks, 20 keyframes a second. It ends by itself.
 inline std::vector<std::string> robot_on(const Walk& walk, const Walk& other,
-                                         const std::filesystem::path& folder, int domain) {
+                                         const fs::path& folder, int domain) {
   const std::string name = robot_name(walk.robot);
-  const std::filesystem::path graph = write_walk(walk, other, kLap, folder / (name + ".g2o"));
+  const fs::path graph = write_walk(walk, other, kLap, folder / (name + ".g2o"));
   return words_of(KM_BIN_DIR "/kimera_multi_robot --robot " + std::to_string(walk.robot) +
                   " --name " + name + " --graph " + graph.string() + " --rate 20 --output " +
                   (folder / name).string() + " --domain " + std::to_string(domain));
 }
 
 /// Runs two robots that meet, watched from beginning to end.
-inline void run_two_robots(const std::filesystem::path& folder, int domain) {
+inline void run_two_robots(const fs::path& folder, int domain) {
   const Walk a{0, 0}, b{1, 40};
   const auto watched = [&](const Walk& walk, const Walk& other) {
     auto command = robot_on(walk, other, folder, domain);

@@ -4,14 +4,9 @@
 #include <poll.h>
 #include <unistd.h>
 
-#include <array>
-#include <catch2/catch.hpp>
-#include <filesystem>
-#include <fstream>
-#include <string>
-
 #include "modules/recorded_graph/g2o_io.hpp"
 #include "test/support/patience.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 
@@ -39,7 +34,7 @@ class FullPipe {
 };
 
 /// A walk of one robot that takes longer than any test, in `folder`.
-inline std::filesystem::path long_walk(const std::filesystem::path& folder, RobotId robot) {
+inline fs::path long_walk(const fs::path& folder, RobotId robot) {
   G2oGraph graph;
   RelativePose step;
   step.T_from_to.translation() = Eigen::Vector3d(1.0, 0.0, 0.0);
@@ -49,13 +44,13 @@ inline std::filesystem::path long_walk(const std::filesystem::path& folder, Robo
     step.to = {robot, i + 1};
     graph.edges.push_back(step);
   }
-  std::filesystem::path file = folder / ("walk" + std::to_string(robot) + ".g2o");
+  fs::path file = folder / ("walk" + std::to_string(robot) + ".g2o");
   write_g2o(file, graph);
   return file;
 }
 
 /// Waits until `file` has `lines` lines.
-inline bool wait_for_lines(const std::filesystem::path& file, int lines) {
+inline bool wait_for_lines(const fs::path& file, int lines) {
   const auto end = std::chrono::steady_clock::now() + kPatience;
   while (std::chrono::steady_clock::now() < end) {
     std::ifstream in(file);

@@ -2,16 +2,7 @@
 
 #include <unistd.h>
 
-#include <catch2/catch.hpp>
-#include <chrono>
-#include <filesystem>
-#include <fstream>
-#include <map>
 #include <nlohmann/json.hpp>
-#include <stdexcept>
-#include <string>
-#include <thread>
-#include <vector>
 
 #include "apps/robot/run_summary.hpp"
 #include "modules/recorded_graph/g2o_io.hpp"
@@ -22,6 +13,7 @@
 #include "test/support/pose_graph_problems.hpp"
 #include "test/support/split_graph.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 
@@ -45,7 +37,7 @@ inline std::string euroc_robot(int robot, const std::string& options,
 }
 
 /// Makes a team's folder of keys for `robots`, such as "robot0:0,robot1:1".
-inline void make_keys(const std::filesystem::path& folder, const std::string& robots) {
+inline void make_keys(const fs::path& folder, const std::string& robots) {
   const CommandResult made =
       run_command(KM_BIN_DIR "/kimera_multi_keys make " + folder.string() + " --robots " + robots);
   CAPTURE(made.output);
@@ -53,7 +45,7 @@ inline void make_keys(const std::filesystem::path& folder, const std::string& ro
 }
 
 /// Lines of a file; 0 if there is none.
-inline std::size_t line_count(const std::filesystem::path& file) {
+inline std::size_t line_count(const fs::path& file) {
   std::ifstream in(file);
   return static_cast<std::size_t>(std::count(std::istreambuf_iterator<char>(in), {}, '\n'));
 }
@@ -71,10 +63,10 @@ struct TeamRun {  // NOLINT(bugprone-exception-escape): JSON checks itself as it
 
 /// Runs a team file on `dataset` as fast as it can, in a random DDS domain. Results go to `folder`.
 /// `options` of the program, and of its robots, come in addition.
-inline TeamRun run_team(const std::filesystem::path& team, const std::filesystem::path& dataset,
+inline TeamRun run_team(const fs::path& team, const fs::path& dataset,
                         const TemporaryFolder& folder, const std::string& options = {},
                         const std::string& robot_options = {}) {
-  const std::filesystem::path json = folder.path() / "team.json";
+  const fs::path json = folder.path() / "team.json";
   TeamRun run;
   run.result = run_command(std::string(KM_BIN_DIR "/kimera_multi_team --config ") + team.string() +
                            " --dataset " + dataset.string() + " --rate max --output " +
@@ -90,8 +82,7 @@ inline TeamRun run_team(const std::filesystem::path& team, const std::filesystem
 
 /// Writes what `robot` has recorded, its odometry and every closure that touches it, to
 /// part<id>.g2o.
-inline void write_part(const SplitGraph& graph, RobotId robot,
-                       const std::filesystem::path& folder) {
+inline void write_part(const SplitGraph& graph, RobotId robot, const fs::path& folder) {
   G2oGraph part;
   for (const RelativePose& e : graph.odometry)
     if (e.from.robot == robot) part.edges.push_back(e);
@@ -102,8 +93,8 @@ inline void write_part(const SplitGraph& graph, RobotId robot,
 
 /// Writes the parts of all robots of `graph`, whose ids are 0, 1, ..., and a team file that begins
 /// with `settings`; the file. The robots are robot0, robot1, ...
-inline std::filesystem::path write_team(const SplitGraph& graph, const TemporaryFolder& folder,
-                                        const std::string& settings = {}) {
+inline fs::path write_team(const SplitGraph& graph, const TemporaryFolder& folder,
+                           const std::string& settings = {}) {
   std::string team = settings + "robots:\n";
   for (const auto& [robot, keyframes] : graph.keyframes) {
     write_part(graph, robot, folder.path());
@@ -122,7 +113,7 @@ struct TeamResult {
 };
 
 /// Results of robots 0 to `robots` - 1, from robot0, robot1, ...
-inline TeamResult read_team(const std::filesystem::path& folder, int robots) {
+inline TeamResult read_team(const fs::path& folder, int robots) {
   std::vector<G2oGraph> parts;
   std::map<KeyframeId, Eigen::Index> index_of;
   TeamResult team;
@@ -155,14 +146,14 @@ inline double cost_of(const WholeGraph& graph, const std::vector<SE3>& poses) {
 
 /// The cost that kimera_multi_pgo reaches for the edges that robots 0 to `robots` - 1 have kept,
 /// whose results are in robot0, robot1, ... of `folder`.
-inline double solved_in_one_process(const std::filesystem::path& folder, int robots) {
-  const std::filesystem::path parts = folder / "kept";
-  std::filesystem::create_directory(parts);
+inline double solved_in_one_process(const fs::path& folder, int robots) {
+  const fs::path parts = folder / "kept";
+  fs::create_directory(parts);
   for (int k = 0; k < robots; ++k) {
     const std::string name = robot_name(k);
-    std::filesystem::copy_file(folder / name / "pose_graph.g2o", parts / (name + ".g2o"));
+    fs::copy_file(folder / name / "pose_graph.g2o", parts / (name + ".g2o"));
   }
-  const std::filesystem::path json = folder / "pgo.json";
+  const fs::path json = folder / "pgo.json";
   const CommandResult result =
       run_command(std::string(KM_BIN_DIR "/kimera_multi_pgo solve ") + parts.string() +
                   " --method newton --trust-all --json " + json.string());

@@ -1,21 +1,12 @@
-#include <catch2/catch.hpp>
-
-#include <filesystem>
-#include <fstream>
-#include <functional>
-#include <string>
-#include <vector>
-
 #include "test/support/command.hpp"
 #include "test/support/euroc_copy.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 #include "test/system/team_run.hpp"
 
 namespace km {
 namespace {
-
-namespace fs = std::filesystem;
 
 constexpr std::size_t kImages = 40;  // 2 s
 
@@ -97,7 +88,7 @@ TEST_CASE("A robot skips broken parts of its recording, reports them, and contin
         run_command(euroc_robot(0, "--rate max --serve-limit 0 --interface lo --dataset " +
                                        (folder.path() / "recording").string() + " --output " +
                                        (folder.path() / "results").string())));
-    CHECK_THAT(result.output, Catch::Contains(fault.message));
+    CHECK_THAT(result.output, Contains(fault.message));
     if (fault.poses > 0) CHECK(line_count(folder.path() / "results/odometry.tum") == fault.poses);
   }
 }
@@ -142,8 +133,8 @@ TEST_CASE("A folder that results cannot go to is refused before any other output
                              ": cannot be written to: Not a directory; choose another folder for "
                              "the results\n");
   const fs::path map = folder.write("map.yaml", "mine");  // no run has written it
-  CHECK_THAT(refusal(folder.path()), Catch::Contains(map.string() + ": would be replaced") &&
-                                         Catch::Contains("choose another folder"));
+  CHECK_THAT(refusal(folder.path()),
+             Contains(map.string() + ": would be replaced") && Contains("choose another folder"));
   CHECK(folder.read("map.yaml") == "mine");
 }
 

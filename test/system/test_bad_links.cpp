@@ -1,25 +1,14 @@
-#include <catch2/catch.hpp>
-
-#include <iostream>
-#include <map>
-#include <optional>
-#include <string>
-#include <thread>
-#include <utility>
-#include <vector>
-
 #include "modules/core/text_rows.hpp"
 #include "test/support/own_networks.hpp"
 #include "test/support/random_team.hpp"
 #include "test/support/shared_data.hpp"
+#include "test/support/test.hpp"
 #include "test/system/team_run.hpp"
 
 // Teams over links that lose frames: the team program carries the frames (--links).
 
 namespace km {
 namespace {
-
-namespace fs = std::filesystem;
 
 // barc as in test_links.cpp. Outages are shorter than the time for which robots wait for each
 // other.
@@ -111,7 +100,7 @@ TEST_CASE("A team in two parts ends in two frames and its table of links gives t
     CHECK(run.summary(robot).pgo.members == std::vector<RobotId>{robot});
     CHECK(run.summary(robot).pgo.anchor == robot);
   }
-  CHECK_THAT(run.team.result.output, Catch::Contains("never joined the other robot"));
+  CHECK_THAT(run.team.result.output, Contains("never joined the other robot"));
   REQUIRE(run.links.size() == 2);
   for (const auto& [pair, link] : run.links) {
     CHECK(link.at("frames_in") > 0);

@@ -2,14 +2,10 @@
 #include <sched.h>
 #include <sys/mount.h>
 
-#include <catch2/catch.hpp>
-#include <chrono>
-#include <csignal>
-#include <iostream>
-
 #include "apps/robot/run_summary.hpp"
 #include "test/support/process.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 #include "test/system/long_run.hpp"
 #include "test/system/team_run.hpp"
 
@@ -17,8 +13,6 @@
 
 namespace km {
 namespace {
-
-namespace fs = std::filesystem;
 
 std::vector<std::string> robot_on_walk(const fs::path& walk, const fs::path& output) {
   return words_of(KM_BIN_DIR "/kimera_multi_robot --robot 0 --graph " + walk.string() +
@@ -128,7 +122,7 @@ TEST_CASE("On a full or read-only disk a robot continues, names lost results, an
   if (full) CHECK(line_count(run.output / "optimized.tum") > 2);
   for (const auto& entry : fs::directory_iterator(run.output)) {
     CHECK(entry.path().extension() != ".part");
-    if (full) CHECK_THAT(entry.path().filename().string(), !Catch::StartsWith("."));
+    if (full) CHECK_THAT(entry.path().filename().string(), !StartsWith("."));
   }
 }
 
@@ -139,8 +133,7 @@ TEST_CASE("A robot whose results folder is read-only does not start", "[system][
   REQUIRE(run.disk.make_read_only());
   Process robot(robot_on_walk(long_walk(run.folder.path(), 0), run.output), 0, run.log);
   CHECK(robot.wait() == 1);
-  CHECK_THAT(run.folder.read("log"),
-             Catch::Contains("cannot be written to: Read-only file system"));
+  CHECK_THAT(run.folder.read("log"), Contains("cannot be written to: Read-only file system"));
 }
 
 TEST_CASE(
@@ -163,7 +156,7 @@ TEST_CASE(
                            "loop_closures.csv", "timing.csv", "config.yaml"})
     CHECK(fs::exists(output / file));
   const std::string reason = read_summary(output / "summary.json").exit_reason;
-  CHECK_THAT(reason, Catch::StartsWith(is_back ? "interrupted" : "interrupted; "));
+  CHECK_THAT(reason, StartsWith(is_back ? "interrupted" : "interrupted; "));
   CHECK(fs::exists(output / "run.journal") == is_back);
 }
 

@@ -1,7 +1,5 @@
 #include <sys/stat.h>
 
-#include <catch2/catch.hpp>
-#include <iostream>
 #include <list>
 
 #include "apps/robot/run_summary.hpp"
@@ -9,6 +7,7 @@
 #include "test/support/process.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 #include "test/system/long_run.hpp"
 #include "test/system/team_run.hpp"
 
@@ -16,8 +15,6 @@
 
 namespace km {
 namespace {
-
-namespace fs = std::filesystem;
 
 // With less patience than by default, so that the tests take less time: 9 s, or 36 s. With much
 // less, a module on a loaded computer would count as hung.
@@ -48,13 +45,13 @@ void check_end(FaultyRobot& robot, const std::string& module, const std::string&
   const std::optional<int> exit_code = robot.process->wait_within(3 * kPatience);
   CAPTURE(robot.log_text());
   CHECK(exit_code == (how == "hang" ? 5 : 3));
-  CHECK_THAT(robot.log_text(), Catch::Contains(how == "hang" ? "supervisor: " + module + " has not"
-                                                             : module + " failed: injected"));
+  CHECK_THAT(robot.log_text(), Contains(how == "hang" ? "supervisor: " + module + " has not"
+                                                      : module + " failed: injected"));
   for (const char* file : {"odometry.tum", "optimized.tum", "pose_graph.g2o", "keyframes.csv",
                            "loop_closures.csv", "optimizer.csv", "timing.csv", "process.csv"})
     CHECK(fs::is_regular_file(robot.output / file));
   const RunSummary summary = read_summary(robot.output / "summary.json");
-  CHECK_THAT(summary.exit_reason, Catch::StartsWith(module + ": "));
+  CHECK_THAT(summary.exit_reason, StartsWith(module + ": "));
 }
 
 // For each module a robot in which it throws and one in which it hangs. Those in which it hangs
@@ -100,11 +97,10 @@ TEST_CASE("A disk that stands still under the map leaves the other results", "[s
   REQUIRE(mkfifo((robot.output / "mesh.ply.part").c_str(), 0600) == 0);
   CHECK(robot.process->wait_within(3 * kPatience) == 5);
   CAPTURE(robot.log_text());
-  CHECK_THAT(robot.log_text(), Catch::Contains("mesh_files has not"));
+  CHECK_THAT(robot.log_text(), Contains("mesh_files has not"));
   CHECK(fs::is_regular_file(robot.output / "pose_graph.g2o"));
   CHECK_THAT(read_summary(robot.output / "summary.json").exit_reason,
-             Catch::StartsWith("mesh_files: ") && Catch::Contains("1 result lost") &&
-                 Catch::Contains("mesh.ply"));
+             StartsWith("mesh_files: ") && Contains("1 result lost") && Contains("mesh.ply"));
 }
 
 // Hidden: for test/endure lies.

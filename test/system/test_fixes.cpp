@@ -1,16 +1,8 @@
-#include <catch2/catch.hpp>
-
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <csignal>
-#include <fstream>
-#include <random>
-
 #include "modules/absolute_fixes/geodetic.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
 #include "test/support/process.hpp"
 #include "test/support/shared_data.hpp"
+#include "test/support/test.hpp"
 #include "test/system/live_run.hpp"
 #include "test/system/team_run.hpp"
 
@@ -18,8 +10,6 @@
 
 namespace km {
 namespace {
-
-namespace fs = std::filesystem;
 
 constexpr double kSigma_m = 0.05;
 

@@ -1,15 +1,3 @@
-#include <catch2/catch.hpp>
-
-#include <algorithm>
-#include <array>
-#include <atomic>
-#include <csignal>
-#include <fstream>
-#include <functional>
-#include <future>
-#include <string>
-#include <thread>
-
 #include "apps/robot/robot_config.hpp"
 #include "modules/mesh/team_mesh.hpp"
 #include "modules/place_recognition/vocabulary_file.hpp"
@@ -22,6 +10,7 @@
 #include "test/support/process.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 #include "test/system/flood_peers.hpp"
 #include "test/system/long_run.hpp"
 
@@ -195,7 +184,7 @@ std::int64_t now_s() {
 // A flooded robot process, and the other robot that it serves meanwhile.
 class Scene {
  public:
-  Scene(const Flood& flood, const std::optional<std::filesystem::path>& images)
+  Scene(const Flood& flood, const std::optional<fs::path>& images)
       : domain_(std::make_shared<const DdsDomain>(loopback_config())),
         log_(open((folder_.path() / "log").c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600)),
         victim_(command(flood, images), 0, log_),
@@ -242,7 +231,7 @@ class Scene {
   }
 
  private:
-  [[nodiscard]] std::filesystem::path keys_of(RobotId robot) const {
+  [[nodiscard]] fs::path keys_of(RobotId robot) const {
     return folder_.path() / "keys" / robot_name(robot);
   }
   [[nodiscard]] FloodPeer peer(const Flood& flood, RobotId robot) const {
@@ -253,8 +242,7 @@ class Scene {
             {robot, robot_name(robot), kProtocolVersion, random_boot_id()},
             flood.sealed ? make_seal : TestRobot::MakeSeal()};
   }
-  std::vector<std::string> command(const Flood& flood,
-                                   const std::optional<std::filesystem::path>& images) {
+  std::vector<std::string> command(const Flood& flood, const std::optional<fs::path>& images) {
     const DdsConfig& dds = domain_->config();
     std::string line = KM_BIN_DIR "/kimera_multi_robot --robot " + std::to_string(kVictim) +
                        " --domain " + std::to_string(dds.domain) + " --output " +
@@ -341,7 +329,7 @@ Costs measure(Scene& scene, const Flood& flood) {
   return costs;
 }
 
-void check(const Flood& flood, const std::optional<std::filesystem::path>& images = {}) {
+void check(const Flood& flood, const std::optional<fs::path>& images = {}) {
   CAPTURE(flood.name);
   Scene scene(flood, images);
   const Costs costs = measure(scene, flood);

@@ -1,13 +1,6 @@
-#include <catch2/catch.hpp>
-
-#include <filesystem>
-#include <fstream>
-#include <iterator>
-#include <map>
 #include <regex>
-#include <set>
-#include <string>
-#include <vector>
+
+#include "test/support/test.hpp"
 
 // The layers of the tree, by what files include (the linker checks the rest: a pure module links
 // neither threads nor DDS nor YAML):
@@ -22,8 +15,6 @@
 
 namespace km {
 namespace {
-
-namespace fs = std::filesystem;
 
 constexpr const char* kLab = "apps/lab/";
 

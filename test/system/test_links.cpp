@@ -1,18 +1,10 @@
-#include <catch2/catch.hpp>
-
-#include <algorithm>
-#include <csignal>
-#include <iostream>
-#include <iterator>
-#include <map>
-#include <memory>
-
 #include "modules/core/config.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
 #include "test/support/network.hpp"
 #include "test/support/process.hpp"
 #include "test/support/random_team.hpp"
 #include "test/support/shared_data.hpp"
+#include "test/support/test.hpp"
 #include "test/system/team_run.hpp"
 
 // Teams on recorded pose graphs: a process for each robot, in one network, and in separate networks
@@ -20,8 +12,6 @@
 
 namespace km {
 namespace {
-
-namespace fs = std::filesystem;
 
 using Links = std::vector<std::pair<int, int>>;
 
@@ -228,11 +218,11 @@ TEST_CASE("A team that splits in two ends, and both sides report the robots they
   for (const auto& [robot, names] : missed) {
     const RunSummary summary = read_summary(folder.path() / robot_name(robot) / "summary.json");
     CAPTURE(robot, summary.exit_reason);
-    CHECK_THAT(summary.exit_reason, Catch::StartsWith("settled without "));
+    CHECK_THAT(summary.exit_reason, StartsWith("settled without "));
     CHECK(summary.lost_peers.size() == names.size());
     CHECK(summary.apart_peers.empty());
     for (const std::string& name : names)
-      CHECK_THAT(summary.exit_reason, Catch::Matches(".*" + name + " \\(not received for .*"));
+      CHECK_THAT(summary.exit_reason, Matches(".*" + name + " \\(not received for .*"));
     for (const auto& [name, missed_s] : summary.lost_peers) CHECK(missed_s > 0.0);
   }
 }
@@ -250,8 +240,8 @@ TEST_CASE("A path that drops large packets is a finding of the run with their si
   CHECK(summary.pgo.members.size() < 2);
   const auto found = std::ranges::find(summary.findings, "network.path_mtu", &Finding::id);
   REQUIRE(found != summary.findings.end());
-  CHECK_THAT(found->what, Catch::Contains("answers packets of up to 9") ||
-                              Catch::Contains("answers packets of up to 1000 B"));
+  CHECK_THAT(found->what,
+             Contains("answers packets of up to 9") || Contains("answers packets of up to 1000 B"));
 }
 
 // Bytes sent by the interfaces of a host, headers included.

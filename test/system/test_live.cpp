@@ -1,23 +1,15 @@
-#include <catch2/catch.hpp>
-
-#include <csignal>
-#include <filesystem>
-#include <fstream>
-#include <sstream>
-
 #include "modules/recordings/ros_messages.hpp"
 #include "modules/sensors/node/rig_file.hpp"
 #include "runtime/dds/ros_publisher.hpp"
 #include "test/modules/sensors/euroc_folder.hpp"
 #include "test/support/process.hpp"
 #include "test/support/shared_data.hpp"
+#include "test/support/test.hpp"
 #include "test/system/live_run.hpp"
 #include "test/system/team_run.hpp"
 
 namespace km {
 namespace {
-
-namespace fs = std::filesystem;
 
 // A recorded run's poses up to the n-th.
 std::string first_lines(const fs::path& file, int count) {
@@ -222,7 +214,7 @@ TEST_CASE("A live robot whose topics are silent reports where it listens, and en
   robot.kill(SIGINT);
   CHECK(robot.wait() == 1);
   const RunSummary summary = read_summary(folder.path() / "live/summary.json");
-  CHECK_THAT(summary.exit_reason, Catch::StartsWith("no image came"));
+  CHECK_THAT(summary.exit_reason, StartsWith("no image came"));
   CHECK(std::ranges::count(summary.findings, "frames.none", &Finding::id) == 1);
 }
 

@@ -1,19 +1,13 @@
-#include <catch2/catch.hpp>
-#include <iostream>
-#include <string>
-#include <vector>
-
 #include "modules/core/stamp.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
 #include "test/support/shared_data.hpp"
+#include "test/support/test.hpp"
 #include "test/system/team_run.hpp"
 
 // Processor time and memory of a robot, and the frames it skips if the computer is too slow.
 
 namespace km {
 namespace {
-
-namespace fs = std::filesystem;
 
 CommandResult run_alone(const fs::path& dataset, const fs::path& output,
                         const std::string& options) {

@@ -1,11 +1,4 @@
-#include <catch2/catch.hpp>
-
-#include <csignal>
-#include <filesystem>
 #include <nlohmann/json.hpp>
-#include <optional>
-#include <string>
-#include <vector>
 
 #include "apps/lab/pgo/team_graph_file.hpp"
 #include "modules/core/json.hpp"
@@ -17,6 +10,7 @@
 #include "test/support/process.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 #include "test/system/team_run.hpp"
 
 // Records of robots and teams, read by our reader and by others.
@@ -25,13 +19,12 @@ namespace km {
 namespace {
 
 // Content of an MCAP file according to readers of npm; nullopt if they are not available.
-std::optional<Json> read_by_others(const std::filesystem::path& file,
-                                   const TemporaryFolder& folder) {
-  const std::filesystem::path work = folder.path() / "npm";
-  std::filesystem::create_directories(work);
+std::optional<Json> read_by_others(const fs::path& file, const TemporaryFolder& folder) {
+  const fs::path work = folder.path() / "npm";
+  fs::create_directories(work);
   for (const char* source : {"package.json", "read_record.mjs"})
-    std::filesystem::copy_file(std::filesystem::path("test/system/record") / source, work / source,
-                               std::filesystem::copy_options::overwrite_existing);
+    fs::copy_file(fs::path("test/system/record") / source, work / source,
+                  fs::copy_options::overwrite_existing);
   const std::string in_work = "cd " + work.string() + " && ";
   if (run_command(in_work + "npm install --silent --no-audit --no-fund --prefer-offline")
           .exit_code != 0)
@@ -42,8 +35,6 @@ std::optional<Json> read_by_others(const std::filesystem::path& file,
   REQUIRE(result.exit_code == 0);
   return read_json(work / "read.json");
 }
-
-namespace fs = std::filesystem;
 
 std::string record_command(const fs::path& dataset, const std::string& options) {
   return euroc_robot(0, "--name alice --to 12 --serve-limit 100 --record --dataset " +
@@ -80,7 +71,7 @@ TEST_CASE("A robot's record has the poses of its results, also for readers that 
                                                " --record-images --set mapping.mode=metric")));
   const fs::path file = folder.path() / "record.mcap";
   Record record(file);
-  CHECK_THAT(to_string(record.reader->report()), Catch::Equals(""));
+  CHECK_THAT(to_string(record.reader->report()), Equals(""));
   const std::size_t rows = line_count(folder.path() / "odometry.tum");
   REQUIRE(rows > 200);
   CHECK(record.counts["/alice/odometry"] == rows);
@@ -148,7 +139,7 @@ TEST_CASE(
   CHECK(robot.wait() == 0);
   CHECK(fs::file_size(first) == size);
   const Record resumed(second);
-  CHECK_THAT(to_string(resumed.reader->report()), Catch::Equals(""));
+  CHECK_THAT(to_string(resumed.reader->report()), Equals(""));
   check_equal(resumed.last<RosPath>("/alice/path"),
               read_trajectory(folder.path() / "optimized.tum"));
 }
@@ -188,7 +179,7 @@ TEST_CASE("Two robots on the halves of a recording localise together, and their 
   CHECK(ear.derivable().empty());
 
   Record team(folder.path() / "team.mcap");
-  CHECK_THAT(to_string(team.reader->report()), Catch::Equals(""));
+  CHECK_THAT(to_string(team.reader->report()), Equals(""));
   std::size_t messages = 1;  // begins with the message that places `map`
   for (const char* name : {"a", "b"}) {
     const Record own(folder.path() / name / "record.mcap");

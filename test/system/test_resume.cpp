@@ -1,20 +1,10 @@
-#include <catch2/catch.hpp>
-
-#include <array>
-#include <csignal>
-#include <cstdlib>
-#include <map>
-#include <memory>
-#include <random>
-#include <set>
-#include <thread>
-
 #include "modules/core/input_file.hpp"
 #include "modules/core/text_rows.hpp"
 #include "modules/journal/restored_run.hpp"
 #include "modules/mesh/map_file.hpp"
 #include "test/support/process.hpp"
 #include "test/support/shared_data.hpp"
+#include "test/support/test.hpp"
 #include "test/system/team_run.hpp"
 #include "test/system/walk.hpp"
 
@@ -22,8 +12,6 @@
 
 namespace km {
 namespace {
-
-namespace fs = std::filesystem;
 
 struct Part {
   int robot = 0;
@@ -361,9 +349,8 @@ TEST_CASE("A journal with flipped bytes is continued or replaced, and a copy is 
                         output + " --output " + output + " --domain " +
                         std::to_string(random_domain()))
           : run_command(command + " --resume " + output));
-  CHECK_THAT(again.output, Catch::Contains("run.journal: ") &&
-                               Catch::Contains(" on are damaged and left out") &&
-                               Catch::Contains("run.journal.damaged"));
+  CHECK_THAT(again.output, Contains("run.journal: ") && Contains(" on are damaged and left out") &&
+                               Contains("run.journal.damaged"));
   CHECK(folder.read("run/run.journal.damaged") == journal);
   CHECK(read_summary(fs::path(output) / "summary.json").keyframes == kLap);
 }
@@ -388,7 +375,7 @@ TEST_CASE("A finished run is joined by another robot, and continued by its own r
                     " --resume " + yesterday.string() + " --dataset " + recording.string());
     CAPTURE(other.output);
     CHECK(other.exit_code == 1);
-    CHECK_THAT(other.output, Catch::Contains("run.journal: is of robot 7 on MH_01_easy"));
+    CHECK_THAT(other.output, Contains("run.journal: is of robot 7 on MH_01_easy"));
   }
   const int domain = random_domain();
   const fs::path silent_output = folder.path() / "silent";

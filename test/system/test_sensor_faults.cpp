@@ -1,26 +1,14 @@
-#include <algorithm>
-#include <catch2/catch.hpp>
-#include <cmath>
-#include <csignal>
-#include <filesystem>
-#include <functional>
-#include <optional>
-#include <sstream>
-#include <string>
-#include <vector>
-
 #include "modules/evaluation/trajectory_error.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
 #include "test/support/euroc_copy.hpp"
 #include "test/support/process.hpp"
 #include "test/support/shared_data.hpp"
+#include "test/support/test.hpp"
 #include "test/system/live_run.hpp"
 #include "test/system/team_run.hpp"
 
 namespace km {
 namespace {
-
-namespace fs = std::filesystem;
 
 // A robot without peers.
 std::string lone_robot(const std::string& options) {
@@ -198,7 +186,7 @@ TEST_CASE("A robot survives what happens to its sensors", "[faults]") {
     const FaultyRun outcome = meet(fs::absolute(*recording), fault);
     CAPTURE(fault.name, fault.lasts_s, outcome.output);
     CHECK(outcome.exit_code == 0);
-    CHECK_THAT(outcome.output, Catch::Contains(fault.event));
+    CHECK_THAT(outcome.output, Contains(fault.event));
     CHECK(outcome.worst_m < fault.bound_m);
     CHECK(outcome.last_m < fault.bound_m);
     CHECK(outcome.back_s.value_or(1e9) <= 1.0);
@@ -226,7 +214,7 @@ TEST_CASE("A run names the unit and the sign that made its odometry fail", "[fau
   const auto found = std::ranges::find(findings, "imu.accel_negated", &Finding::id);
   REQUIRE(found != findings.end());
   CHECK(found->severity == Severity::kError);
-  CHECK_THAT(found->what, Catch::Contains("its sign is inverted"));
+  CHECK_THAT(found->what, Contains("its sign is inverted"));
 }
 
 TEST_CASE("A driver that restarts does not end a live robot", "[faults][live]") {

@@ -1,16 +1,9 @@
-#include <algorithm>
-#include <array>
-#include <catch2/catch.hpp>
-#include <csignal>
-#include <cstdlib>
-#include <memory>
-#include <string>
-
 #include "modules/core/input_file.hpp"
 #include "modules/evaluation/mesh/sampled_surface.hpp"
 #include "modules/mesh/mesh_file.hpp"
 #include "test/support/process.hpp"
 #include "test/support/shared_data.hpp"
+#include "test/support/test.hpp"
 #include "test/system/audience.hpp"
 #include "test/system/live_run.hpp"
 #include "test/system/team_run.hpp"
@@ -18,8 +11,6 @@
 
 namespace km {
 namespace {
-
-namespace fs = std::filesystem;
 
 TEST_CASE("Two robots end with the same map of their team", "[system]") {
   const auto dataset = shared_data("euroc/MH_01_easy");
@@ -85,7 +76,7 @@ TEST_CASE("A robot whose id is taken reports it and ends, and the first owner of
   Process twin(command("b", ""));
   CHECK(twin.wait() == 3);
   CHECK_THAT(read_summary(folder.path() / "b/summary.json").exit_reason,
-             Catch::Contains("give every robot its own --robot"));
+             Contains("give every robot its own --robot"));
   incumbent.kill(SIGINT);
   CHECK(incumbent.wait() == 0);
 }
@@ -151,8 +142,8 @@ TEST_CASE(
   const auto second = start(next, survivor, kLap, "next");
   CHECK(second->wait() == 0);
   CHECK(first->wait() == 0);
-  CHECK_THAT(first->lines().back().text, Catch::Contains("peers: next left |"));
-  CHECK_THAT(second->lines().back().text, Catch::Contains("peers: survivor left |"));
+  CHECK_THAT(first->lines().back().text, Contains("peers: next left |"));
+  CHECK_THAT(second->lines().back().text, Contains("peers: survivor left |"));
 
   const auto place = [&](const KeyframeId& id) {
     return (id.robot == killed ? next : survivor).place(id.index);

@@ -1,9 +1,4 @@
-#include <catch2/catch.hpp>
-
-#include <filesystem>
 #include <nlohmann/json.hpp>
-#include <random>
-#include <string>
 
 #include "modules/core/json.hpp"
 #include "modules/recordings/ros_messages.hpp"
@@ -15,11 +10,10 @@
 #include "test/support/process.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
-
-namespace fs = std::filesystem;
 
 const std::string kDoctor = KM_BIN_DIR "/kimera_multi_doctor";
 
@@ -59,7 +53,7 @@ TEST_CASE("The doctor finds a recording sound, or names its fault", "[doctor]") 
   }
   SECTION("no right image at all") {
     for (EurocCopy::Image& image : right) image.file = "/nowhere.png";
-    CHECK_THAT(ids_of(hall, 2), Catch::StartsWith("recording."));
+    CHECK_THAT(ids_of(hall, 2), StartsWith("recording."));
   }
 }
 
@@ -71,12 +65,11 @@ TEST_CASE("The doctor gives the reason why no robot can play a file", "[doctor]"
     return run.output;
   };
   folder.write("world.ply", "ply\nformat ascii 1.0\n");
-  CHECK_THAT(output_of("world.ply"),
-             Catch::Contains("does not begin like a .bag, .mcap or .db3 file"));
+  CHECK_THAT(output_of("world.ply"), Contains("does not begin like a .bag, .mcap or .db3 file"));
   McapSink record(folder.path() / "record.mcap", [](const std::string& why) { FAIL(why); });
   record.put(record.open({"/rosout", RosLog::kType}), Stamp{1}, encode_ros(RosLog{}));
   record.finish();
-  CHECK_THAT(output_of("record.mcap"), Catch::Contains("no topic of it has images"));
+  CHECK_THAT(output_of("record.mcap"), Contains("no topic of it has images"));
 }
 
 TEST_CASE("The doctor's exit code is 2 for unusable input, with a line that gives the reason",
@@ -84,7 +77,7 @@ TEST_CASE("The doctor's exit code is 2 for unusable input, with a line that give
   const TemporaryFolder folder;
   const CommandResult empty = run_command(kDoctor + ' ' + folder.path().string());
   CHECK(empty.exit_code == 2);
-  CHECK_THAT(empty.output, Catch::Contains("recording.refused"));
+  CHECK_THAT(empty.output, Contains("recording.refused"));
   for (const char* options :
        {"", "--live x.yaml", ". --network", "/nowhere", ". --from 5 --to 2"}) {
     CAPTURE(options);
@@ -93,7 +86,7 @@ TEST_CASE("The doctor's exit code is 2 for unusable input, with a line that give
   CHECK(run_command(kDoctor + " --help").exit_code == 0);
   const CommandResult domain = run_command(kDoctor + " . --domain 7");
   CHECK(domain.exit_code == 2);
-  CHECK_THAT(domain.output, Catch::Contains("--set ros.domain=N"));
+  CHECK_THAT(domain.output, Contains("--set ros.domain=N"));
 }
 
 TEST_CASE("The doctor listens to the topics of a rig file, and examines their messages",
@@ -184,11 +177,11 @@ TEST_CASE("The doctor finds that a peer is out of reach, or that no robot runs t
   const std::string peer = VirtualNetwork::address(2);
   const Look reached(network, {"--peers", peer});
   CHECK(reached.ids() == "network.no_peers ");
-  CHECK_THAT(reached.figure("peer " + peer), Catch::Contains("0 of 20 lost"));
+  CHECK_THAT(reached.figure("peer " + peer), Contains("0 of 20 lost"));
   network.set_link(2, false);
   const Look lost(network, {"--peers", peer});
   CHECK(lost.exit_code() == 1);
-  CHECK_THAT(lost.ids(), Catch::Contains("network.unreachable"));
+  CHECK_THAT(lost.ids(), Contains("network.unreachable"));
 }
 
 TEST_CASE("The doctor states the largest packet that a peer answers", "[doctor]") {
@@ -197,8 +190,7 @@ TEST_CASE("The doctor states the largest packet that a peer answers", "[doctor]"
   network.set_path_mtu(2, 1280);
   const Look look(network, {"--peers", VirtualNetwork::address(2)});
   CHECK(look.ids() == "network.path_mtu network.no_peers ");
-  CHECK_THAT(look.what("network.path_mtu"),
-             Catch::Contains("of up to 128") || Catch::Contains("of up to 127"));
+  CHECK_THAT(look.what("network.path_mtu"), Contains("of up to 128") || Contains("of up to 127"));
 }
 
 }  // namespace km

@@ -1,11 +1,4 @@
-#include <catch2/catch.hpp>
-
-#include <algorithm>
-#include <functional>
 #include <nlohmann/json.hpp>
-#include <random>
-#include <string>
-#include <vector>
 
 #include "apps/doctor/examine.hpp"
 #include "apps/doctor/network_facts.hpp"
@@ -13,6 +6,7 @@
 #include "modules/diagnosis/finding.hpp"
 #include "test/support/process.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -32,12 +26,10 @@ TEST_CASE("Live topics that are received are sound", "[doctor]") {
   const auto result =
       examine_topics({{"/left", kImage, 60}, {"/imu", kImu, 600}}, publishers, 3.0, 0);
   CHECK(result.findings.empty());
-  CHECK_THAT(to_text(result.figures),
-             Catch::Contains("60 messages of sensor_msgs/msg/Image in 3.0"));
+  CHECK_THAT(to_text(result.figures), Contains("60 messages of sensor_msgs/msg/Image in 3.0"));
 }
 
 TEST_CASE("The reason why a live topic is silent follows from the publishers", "[doctor]") {
-  using Catch::Contains;
   const std::vector<ListenedTopic> wanted = {{"/left", kImage, 0}};
   const auto why = [&](const std::vector<TopicPublisher>& publishers) {
     return the_finding(examine_topics(wanted, publishers, 3.0, 0));
@@ -64,7 +56,7 @@ TEST_CASE("If there is no publisher at all, one finding reports it, whatever top
   REQUIRE(result.findings.size() == 1);
   CHECK(result.figures.size() == 2);
   CHECK(result.findings[0].id == "live.no_publishers");
-  CHECK_THAT(result.findings[0].what, Catch::Contains("domain 7"));
+  CHECK_THAT(result.findings[0].what, Contains("domain 7"));
 }
 
 namespace {
@@ -114,8 +106,8 @@ TEST_CASE("The doctor gives the reason why robots did not join, from all files",
   CHECK(are_results(results.folder.path()));
   const Examination result = examine_results(results.folder.path());
   CHECK_THAT(to_text(result.findings),
-             Catch::Contains("alice and bob did not join: 4 candidates, 2 verified (see "
-                             "loop_closures.csv), 1 kept: below pcm.min_inliers 4"));
+             Contains("alice and bob did not join: 4 candidates, 2 verified (see "
+                      "loop_closures.csv), 1 kept: below pcm.min_inliers 4"));
   CHECK(has(result, "closures.rejected"));
   CHECK(exit_code_of(result.findings) == 1);
 }
@@ -135,7 +127,7 @@ TEST_CASE("The folder of a robot that was killed is no recording, and the messag
           "[doctor]") {
   const Results results;
   const auto bob = results.folder.path() / "bob";
-  std::filesystem::remove(bob / "summary.json");
+  fs::remove(bob / "summary.json");
   results.folder.write("bob/run.journal", "");
   for (const auto& folder : {bob, results.folder.path()}) {
     CAPTURE(folder);
@@ -143,7 +135,7 @@ TEST_CASE("The folder of a robot that was killed is no recording, and the messag
     const Examination result = examine_results(folder);
     const auto found = std::ranges::find(result.findings, "run.unfinished", &Finding::id);
     REQUIRE(found != result.findings.end());
-    CHECK_THAT(found->to_do, Catch::Contains("--resume " + bob.string()));
+    CHECK_THAT(found->to_do, Contains("--resume " + bob.string()));
     CHECK(exit_code_of(result.findings) == 1);
   }
 }
@@ -151,14 +143,14 @@ TEST_CASE("The folder of a robot that was killed is no recording, and the messag
 TEST_CASE("Results with files that are missing or broken are examined as far as possible",
           "[doctor]") {
   const Results results;
-  std::filesystem::remove(results.folder.path() / "alice/config.yaml");
+  fs::remove(results.folder.path() / "alice/config.yaml");
   results.folder.write("bob/loop_closures.csv", std::string(kHeader) + "0,1\n");
   const Examination result = examine_results(results.folder.path());
   CHECK(has(result, "results.config"));
   CHECK(has(result, "results.loop_closures"));
   CHECK(has(result, "team.not_joined"));
   results.folder.write("bob/summary.json", "{");
-  CHECK_THROWS_WITH(examine_results(results.folder.path()), Catch::Contains("bob/summary.json"));
+  CHECK_THROWS_WITH(examine_results(results.folder.path()), Contains("bob/summary.json"));
   CHECK_FALSE(are_results(results.folder.path() / "nowhere"));
 }
 
@@ -300,9 +292,9 @@ TEST_CASE("On loopback alone the finding depends on whether the host has another
   NetworkFacts facts = sound();
   facts.chosen = NetworkInterface{"lo", "127.0.0.1", true, true};
   facts.config.interface = "lo";
-  CHECK_THAT(examine_network(facts).findings.at(0).what, Catch::Equals("lo is loopback"));
+  CHECK_THAT(examine_network(facts).findings.at(0).what, Equals("lo is loopback"));
   facts.interfaces = {*facts.chosen};
-  CHECK_THAT(examine_network(facts).findings.at(0).what, Catch::Equals("only loopback is up"));
+  CHECK_THAT(examine_network(facts).findings.at(0).what, Equals("only loopback is up"));
 }
 
 TEST_CASE("The doctor finds a robot on its domain, and its address on another one", "[doctor]") {
@@ -322,7 +314,7 @@ TEST_CASE("The doctor finds a robot on its domain, and its address on another on
   };
   std::string last;
   for (int tries = 0; tries < 20 && last.find(found) == last.npos; ++tries) last = text();
-  CHECK_THAT(last, Catch::Contains(found));
+  CHECK_THAT(last, Contains(found));
 }
 
 }  // namespace km

@@ -1,11 +1,8 @@
-#include <catch2/catch.hpp>
-#include <cmath>
-#include <string>
-
 #include "test/modules/sensors/euroc_folder.hpp"
 #include "test/support/command.hpp"
 #include "test/support/page_text.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -39,9 +36,9 @@ TEST_CASE("trajectory prints a table and writes JSON and a plot", "[evaluate]") 
   const auto result =
       succeeded(run_command(kTool + "trajectory --truth " + files.truth + " --estimate " + files.a +
                             ' ' + files.b + " --json " + json + " --plot " + plot));
-  CHECK_THAT(result.output, Catch::Contains("a/optimized") && Catch::Contains("b/optimized") &&
-                                Catch::Contains("\nteam") && Catch::Contains(" 50.0%"));
-  CHECK_THAT(files.folder.read("out.json"), Catch::Contains("\"joint\""));
+  CHECK_THAT(result.output, Contains("a/optimized") && Contains("b/optimized") &&
+                                Contains("\nteam") && Contains(" 50.0%"));
+  CHECK_THAT(files.folder.read("out.json"), Contains("\"joint\""));
   const Json plots = data_of_page(files.folder.read("out.html"), "plots")["charts"];
   REQUIRE(plots.size() == 1);
   CHECK(plots[0]["map"] == true);
@@ -53,7 +50,7 @@ TEST_CASE("Several truths belong to the estimates one by one", "[evaluate]") {
   const std::string two = kTool + "trajectory --truth " + files.a + " --truth " + files.b;
   const auto result = run_command(two + " --estimate " + files.a + ' ' + files.b);
   CHECK(result.exit_code == 0);
-  CHECK_THAT(result.output, Catch::Contains(" 0.0000"));
+  CHECK_THAT(result.output, Contains(" 0.0000"));
 }
 
 TEST_CASE("closures judges the folders of a run", "[evaluate]") {
@@ -76,16 +73,16 @@ TEST_CASE("closures judges the folders of a run", "[evaluate]") {
   const std::string command = kTool + "closures --dataset " + recording.root().string() +
                               " --truth " + files.truth + " --json " + json + " --results ";
   const auto result = succeeded(run_command(command + a + ' ' + b));
-  CHECK_THAT(result.output, Catch::Contains("inliers          2     1              1      50.0%"));
-  CHECK_THAT(files.folder.read("closures.json"), Catch::Contains("\"pair_recall\": 1"));
+  CHECK_THAT(result.output, Contains("inliers          2     1              1      50.0%"));
+  CHECK_THAT(files.folder.read("closures.json"), Contains("\"pair_recall\": 1"));
   CHECK_THAT(result.output,
-             Catch::Contains("note: " + files.truth + " is taken for the true poses of robot 1 (" +
-                             a + ") and of robot 2 (" + b + ") at the same times"));
+             Contains("note: " + files.truth + " is taken for the true poses of robot 1 (" + a +
+                      ") and of robot 2 (" + b + ") at the same times"));
   const auto own = files.folder.write("own.tum", "1 0 0 0 0 0 0 1\n2 0 0 0 0 0 0 1\n").string();
   const auto apart = run_command(command + a + ' ' + b + " --truth " + own);
-  CHECK_THAT(apart.output, Catch::Contains("note: none of the 1 keyframes of robot 2 (" + b +
-                                           ") lies within " + own) &&
-                               !Catch::Contains("at the same times"));
+  CHECK_THAT(apart.output,
+             Contains("note: none of the 1 keyframes of robot 2 (" + b + ") lies within " + own) &&
+                 !Contains("at the same times"));
 }
 
 TEST_CASE("Bad input is refused and named", "[evaluate]") {
@@ -107,11 +104,11 @@ TEST_CASE("Bad input is refused and named", "[evaluate]") {
     const auto result = run_command(kTool + arguments);
     CAPTURE(arguments);
     CHECK(is_refused(result));
-    CHECK_THAT(result.output, Catch::Contains(message));
+    CHECK_THAT(result.output, Contains(message));
   }
   const auto help = run_command(kTool + "trajectory --help");
   CHECK(help.exit_code == 0);
-  CHECK_THAT(help.output, Catch::Contains("Examples:"));
+  CHECK_THAT(help.output, Contains("Examples:"));
 }
 
 }  // namespace km

@@ -1,20 +1,14 @@
 #include <Eigen/Geometry>
-#include <catch2/catch.hpp>
-#include <cmath>
 #include <opencv2/core.hpp>
-#include <string>
-#include <utility>
-#include <vector>
 
 #include "modules/mesh/mesh_file.hpp"
 #include "test/modules/evaluation/mesh/shapes.hpp"
 #include "test/support/command.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
-
-using Catch::Contains;
 
 // A folder with a room, true and as two robots have it: one shifted by 3 cm, the other only its
 // floor.

@@ -2,17 +2,15 @@
 #define TINYGLTF_NO_INCLUDE_STB_IMAGE_WRITE
 #include <tiny_gltf.h>
 
-#include <catch2/catch.hpp>
-#include <cstring>
-
 #include "apps/evaluate/glb_file.hpp"
 #include "test/modules/evaluation/mesh/shapes.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
 
-tinygltf::Model read_glb(const std::filesystem::path& file) {
+tinygltf::Model read_glb(const fs::path& file) {
   tinygltf::Model model;
   tinygltf::TinyGLTF reader;
   std::string errors, warnings;
@@ -91,7 +89,7 @@ TEST_CASE("A mesh without labels has one material and the colours of its vertice
   const auto colors =
       values_of<float>(model, model.meshes[0].primitives[0].attributes.at("COLOR_0"), 3);
   CHECK(std::vector(colors.end() - 3, colors.end()) == std::vector<float>{1, 0, 0});
-  CHECK_THROWS_WITH(write_glb("none.glb", {}, {}), Catch::Contains("none.glb"));
+  CHECK_THROWS_WITH(write_glb("none.glb", {}, {}), Contains("none.glb"));
 }
 
 }  // namespace

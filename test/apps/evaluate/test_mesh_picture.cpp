@@ -1,11 +1,8 @@
-#include <algorithm>
-#include <catch2/catch.hpp>
-#include <cmath>
-
 #include "apps/evaluate/mesh_picture.hpp"
 #include "apps/evaluate/picture_view.hpp"
 #include "apps/evaluate/surface_image.hpp"
 #include "test/modules/evaluation/mesh/shapes.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -183,7 +180,7 @@ TEST_CASE("Other views are refused with their text", "[mesh_picture]") {
        {"", "up", "1,2,3", "1,2,3,4,x", "1,2,3,4,5,6", "1,,3,4,5", "nan,0,0,0,0"}) {
     CAPTURE(text);
     CHECK_THROWS_WITH(parse_view(text, kBox, 100, 100),
-                      Catch::StartsWith("no view '" + std::string(text) + "'"));
+                      StartsWith("no view '" + std::string(text) + "'"));
   }
 }
 

@@ -1,16 +1,10 @@
-#include <catch2/catch.hpp>
-
-#include <chrono>
-#include <filesystem>
-
 #include "modules/security/key_folder.hpp"
 #include "test/support/command.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
-
-namespace fs = std::filesystem;
 
 struct Shell {
   [[nodiscard]] CommandResult operator()(const std::string& arguments) const {
@@ -23,8 +17,8 @@ struct Shell {
 TEST_CASE("kimera_multi_keys makes a team whose robots' folders can be used", "[keys]") {
   const Shell keys;
   const auto made = succeeded(keys("make survey --robots alpha:0,beta:12"));
-  CHECK_THAT(made.output, Catch::Contains("survey/beta  for robot 12, valid 365 days") &&
-                              Catch::Contains("whoever has it can admit anyone"));
+  CHECK_THAT(made.output, Contains("survey/beta  for robot 12, valid 365 days") &&
+                              Contains("whoever has it can admit anyone"));
   const RobotKeys beta = load_robot_keys(keys.folder.path() / "survey" / "beta");
   CHECK(beta.certificate.robot == 12);
   const auto now_s = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
@@ -45,15 +39,15 @@ TEST_CASE("kimera_multi_keys adds, revokes and shows robots", "[keys]") {
   REQUIRE(keys("add survey --robots gamma:2").exit_code == 0);
   const auto revoked = keys("revoke survey beta");
   CHECK(revoked.exit_code == 0);
-  CHECK_THAT(revoked.output, Catch::Contains("revoked: beta (id 1)") &&
-                                 Catch::Contains("copy survey/authority/revocations.txt"));
+  CHECK_THAT(revoked.output,
+             Contains("revoked: beta (id 1)") && Contains("copy survey/authority/revocations.txt"));
   const auto shown = succeeded(keys("show survey"));
-  CHECK_THAT(shown.output, Catch::Contains("alpha") && Catch::Contains("gamma") &&
-                               Catch::Contains("certificate is revoked"));
+  CHECK_THAT(shown.output,
+             Contains("alpha") && Contains("gamma") && Contains("certificate is revoked"));
   const std::string secret = keys.folder.read("survey/alpha/secret_key.txt");
-  CHECK_THAT(shown.output, !Catch::Contains(secret.substr(secret.find("secret_key: ") + 12, 64)));
+  CHECK_THAT(shown.output, !Contains(secret.substr(secret.find("secret_key: ") + 12, 64)));
   CHECK_THAT(keys("show survey/gamma").output,
-             Catch::Contains("holds") && Catch::Contains("revoked: beta (id 1)"));
+             Contains("holds") && Contains("revoked: beta (id 1)"));
 }
 
 TEST_CASE("kimera_multi_keys shows what is wrong with a robot's folder", "[keys]") {
@@ -63,7 +57,7 @@ TEST_CASE("kimera_multi_keys shows what is wrong with a robot's folder", "[keys]
                   fs::perm_options::add);
   const auto team = keys("show survey");
   CHECK(team.exit_code == 0);
-  CHECK_THAT(team.output, Catch::Contains("unusable: survey/alpha/secret_key.txt: has mode 0604"));
+  CHECK_THAT(team.output, Contains("unusable: survey/alpha/secret_key.txt: has mode 0604"));
   CHECK(keys("show survey/alpha").exit_code == 1);
 }
 
@@ -85,7 +79,7 @@ TEST_CASE("kimera_multi_keys ends with 1 and the reason if it fails", "[keys]") 
   CAPTURE(arguments);
   const CommandResult result = keys(arguments);
   CHECK(is_refused(result));
-  CHECK_THAT(result.output, Catch::Contains(reason, Catch::CaseSensitive::No));
+  CHECK_THAT(result.output, Contains(reason, Catch::CaseSensitive::No));
   CHECK_FALSE(fs::exists(keys.folder.path() / "other"));
 }
 
@@ -96,7 +90,7 @@ TEST_CASE("Every subcommand of kimera_multi_keys has a help with an example", "[
     CAPTURE(command);
     const auto help = keys(command + " --help");
     CHECK(help.exit_code == 0);
-    CHECK_THAT(help.output, Catch::Contains("  kimera_multi_keys " + command + " "));
+    CHECK_THAT(help.output, Contains("  kimera_multi_keys " + command + " "));
   }
 }
 

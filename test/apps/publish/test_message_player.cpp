@@ -1,15 +1,10 @@
-#include <catch2/catch.hpp>
-
-#include <map>
-#include <random>
-#include <thread>
-
 #include "apps/publish/message_player.hpp"
 #include "modules/recordings/ros_messages.hpp"
 #include "runtime/dds/ros_subscription.hpp"
 #include "test/modules/sensors/euroc_folder.hpp"
 #include "test/modules/sensors/listed_bag.hpp"
 #include "test/support/command.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -121,8 +116,8 @@ TEST_CASE("Waiting for readers ends with the topics that have too few", "[publis
                   " --interface lo --wait 1 --patience 0.1 --domain " +
                   std::to_string(std::random_device()() % 100));
   CHECK(result.exit_code == 1);
-  CHECK_THAT(result.output, Catch::Contains("still too few readers on ROS domain") &&
-                                Catch::Contains("of /imu0, /cam0/image_raw, /cam1/image_raw: 1"));
+  CHECK_THAT(result.output, Contains("still too few readers on ROS domain") &&
+                                Contains("of /imu0, /cam0/image_raw, /cam1/image_raw: 1"));
 }
 
 TEST_CASE("A folder that cannot be played is refused with its layout", "[publish]") {
@@ -131,8 +126,7 @@ TEST_CASE("A folder that cannot be played is refused with its layout", "[publish
   const CommandResult result =
       run_command(KM_BIN_DIR "/kimera_multi_publish " + folder.path().string());
   CHECK(result.exit_code == 1);
-  CHECK_THAT(result.output,
-             Catch::Contains("7-Scenes") && Catch::Contains("only bags and folders"));
+  CHECK_THAT(result.output, Contains("7-Scenes") && Contains("only bags and folders"));
 }
 
 TEST_CASE("Fixes are played in the order of time with the messages of the recording", "[publish]") {
@@ -166,7 +160,7 @@ TEST_CASE("Fixes are played in the order of time with the messages of the record
   REQUIRE(fixes.size() == 2);
   CHECK(fixes[0] == Eigen::Vector3d(47.0, 8.0, 500.0));
   CHECK(fixes[1] == Eigen::Vector3d(48.0, 9.0, 600.0));
-  CHECK_THROWS_WITH(with_fixes(samples("/i"), {}, "/i", type), Catch::Contains("--fix-topic"));
+  CHECK_THROWS_WITH(with_fixes(samples("/i"), {}, "/i", type), Contains("--fix-topic"));
 }
 
 TEST_CASE("A EuRoC folder becomes the messages of its drivers", "[publish]") {

@@ -1,20 +1,17 @@
-#include <catch2/catch.hpp>
-
 #include "apps/team/closure_images.hpp"
 #include "modules/images/image_codec.hpp"
 #include "modules/recordings/mcap_writer.hpp"
 #include "modules/recordings/ros_messages.hpp"
 #include "test/modules/sensors/euroc_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
 
-using Catch::Contains;
-
 constexpr ClosureImageOptions kSmall{.width_px = 16};
 
 // Keyframe k of the robot is image k of the recording, which is 10 * (k + 1) all over.
-RobotResult robot_on(const std::filesystem::path& dataset, RobotId id) {
+RobotResult robot_on(const fs::path& dataset, RobotId id) {
   RobotResult robot;
   robot.plan.id = id;
   robot.plan.name = "r" + std::to_string(id);
@@ -79,7 +76,7 @@ TEST_CASE("A recording that is gone is a note, a pose graph none", "[closure_ima
   CHECK(images.jpegs.size() == 1);
   REQUIRE(images.notes.size() == 1);
   CHECK_THAT(images.notes[0],
-             Catch::StartsWith("r1: no images of its closures: ") && Contains("/no/such/place"));
+             StartsWith("r1: no images of its closures: ") && Contains("/no/such/place"));
 }
 
 TEST_CASE("A corrected camera clock is the clock of the keyframes", "[closure_images]") {

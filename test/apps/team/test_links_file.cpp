@@ -1,15 +1,11 @@
 #include "apps/team/links_file.hpp"
 
-#include <catch2/catch.hpp>
-#include <limits>
-
 #include "test/support/corrupted_input.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
-
-namespace fs = std::filesystem;
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
@@ -75,7 +71,7 @@ TEST_CASE("A trace takes the place of rate and delay, and they of it", "[links]"
   CHECK(trace(script.link(0, 2), 20.0) == std::pair(300.0, 0.7));
   CHECK(trace(script.link(0, 1), 20.0) == std::pair(50.0, 0.1));
   team.folder.write("radio.csv", "0,100,0.5\n10,300\n");
-  CHECK_THAT(team.problems("trace: radio.csv\n"), Catch::Contains("radio.csv:2: 2 fields"));
+  CHECK_THAT(team.problems("trace: radio.csv\n"), Contains("radio.csv:2: 2 fields"));
 }
 
 TEST_CASE("A recording takes the place of the rate, and the rate of a pair takes its place",
@@ -89,7 +85,7 @@ TEST_CASE("A recording takes the place of the rate, and the rate of a pair takes
   CHECK(script.link(0, 2).trace.delay_s(0.0) == 0.1);
   CHECK_FALSE(script.link(0, 1).packets);
 
-  CHECK_THROWS_WITH(read_links_file(up, team.plan), Catch::Contains("radio.down"));
+  CHECK_THROWS_WITH(read_links_file(up, team.plan), Contains("radio.down"));
   team.folder.write("radio.down", "10\n10\n20\n");
   LinkScript recorded = read_links_file(up, team.plan);
   for (const auto& [from, to] : {std::pair(0, 1), {0, 2}, {1, 2}}) {
@@ -129,12 +125,12 @@ TEST_CASE("Range follows the true poses at the time of the recordings", "[links]
   CHECK(team.script("range_m: 5\n").rate == 1.0);
   team.plan.rate = "max";
   CHECK_THAT(team.problems("range_m: 5\n"),
-             Catch::Contains("links.yaml: range_m") && Catch::Contains("--rate that is not max"));
+             Contains("links.yaml: range_m") && Contains("--rate that is not max"));
   team.plan.robots[2].truth.clear();
-  CHECK_THAT(team.problems("range_m: 5\n"), Catch::Contains("range_m needs"));
+  CHECK_THAT(team.problems("range_m: 5\n"), Contains("range_m needs"));
   team.plan.rate = "1";
   CHECK_THAT(team.problems("pairs:\n  - {from: a, to: b, range_m: 5}\n"),
-             Catch::Contains("links.yaml: range_m needs the true poses of c"));
+             Contains("links.yaml: range_m needs the true poses of c"));
 }
 
 TEST_CASE("Every problem of a file of links is reported with its line", "[links]") {
@@ -160,7 +156,7 @@ TEST_CASE("Every problem of a file of links is reported with its line", "[links]
         ":11: partitions name e, which is no robot of the team", ":12: partitions name a twice",
         ":13: partitions.groups is missing"}) {
     CAPTURE(expected);
-    CHECK_THAT(problems, Catch::Contains(expected));
+    CHECK_THAT(problems, Contains(expected));
   }
 }
 

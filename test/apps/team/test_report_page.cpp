@@ -1,5 +1,3 @@
-#include <catch2/catch.hpp>
-#include <iostream>
 #include <nlohmann/json.hpp>
 
 #include "apps/team/report_page.hpp"
@@ -7,11 +5,10 @@
 #include "test/apps/viewer/small_run.hpp"
 #include "test/support/command.hpp"
 #include "test/support/page_text.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
-
-using Catch::Contains;
 
 // SmallRun as kimera_multi_team ran it. Robot r0 drove 10 m along x, by its truth and by its
 // `optimized` poses; r1 is 3 m beside it. r0 has a finding.
@@ -74,7 +71,7 @@ TEST_CASE("The report has the numbers that the robots left", "[report_page]") {
   CHECK(robot["closures"][1] == Json::parse("[0, 1, 1, 2, 2, 9, 0, 1]"));
   CHECK(data["reasons"] == Json::parse(R"(["", "no pose"])"));
   CHECK(data["team"]["robots"][0]["findings"][0]["id"] == "closures.few");
-  CHECK_THAT(data["map"].get<std::string>(), Catch::StartsWith("data:image/jpeg;base64,"));
+  CHECK_THAT(data["map"].get<std::string>(), StartsWith("data:image/jpeg;base64,"));
 }
 
 TEST_CASE("If there is a truth, the report has it and the error over time", "[report_page]") {
@@ -142,7 +139,7 @@ TEST_CASE("A table that cannot be used is a note of the report, a missing one no
           "[report_page]") {
   const ReportedRun reported;
   reported.run.folder.write("r1/traffic.csv", "time_s\nsoon,out\n");
-  std::filesystem::remove(reported.plan.output / "r1/optimizer.csv");
+  fs::remove(reported.plan.output / "r1/optimizer.csv");
   const Json data = reported.data();
   CHECK(data["robots"][1]["sent"].empty());
   CHECK(data["robots"][1]["rounds"].empty());

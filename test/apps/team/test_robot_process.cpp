@@ -2,10 +2,9 @@
 
 #include <poll.h>
 
-#include <catch2/catch.hpp>
-
 #include "apps/team/run_team.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -47,7 +46,7 @@ TEST_CASE("A process that a signal ended names the signal", "[team]") {
   Script script("kill -9 $$");
   script.wait();
   CHECK_FALSE(script.process.exit()->ok());
-  CHECK_THAT(to_string(*script.process.exit()), Catch::Contains("signal 9"));
+  CHECK_THAT(to_string(*script.process.exit()), Contains("signal 9"));
 }
 
 TEST_CASE("A program that cannot be started fails with a reason", "[team]") {
@@ -56,7 +55,7 @@ TEST_CASE("A program that cannot be started fails with a reason", "[team]") {
   while (!process.exit()) process.read();
   CHECK(process.exit()->code == 127);
   REQUIRE(process.last_log_lines().size() == 1);
-  CHECK_THAT(process.last_log_lines().back(), Catch::StartsWith("cannot be started: No such file"));
+  CHECK_THAT(process.last_log_lines().back(), StartsWith("cannot be started: No such file"));
 }
 
 TEST_CASE("A process does not outlive its owner", "[team]") {

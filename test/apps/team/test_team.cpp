@@ -1,23 +1,16 @@
-#include <catch2/catch.hpp>
-#include <csignal>
-#include <filesystem>
-#include <iostream>
 #include <nlohmann/json.hpp>
-#include <string>
-#include <thread>
 
 #include "apps/robot/run_summary.hpp"
 #include "apps/team/run_team.hpp"
 #include "test/support/command.hpp"
 #include "test/support/own_networks.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 // kimera_multi_team as a program, with a shell script in the robots' place.
 
 namespace km {
 namespace {
-
-namespace fs = std::filesystem;
 
 RunSummary finished_summary() {
   RunSummary summary;
@@ -72,13 +65,13 @@ TEST_CASE("A team runs its robots, shows their lines and prints the table", "[te
   const std::string json = (team.folder.path() / "out/team.json").string();
   const auto result = succeeded(
       run_command(team.command + " --rate max --domain 5 --json " + json + " -- --set a.b=1"));
-  CHECK_THAT(result.output, Catch::Contains("alice | status of alice: --robot 1 --name alice"));
-  CHECK_THAT(result.output, Catch::Contains("--rate max --domain 5"));
-  CHECK_THAT(result.output, Catch::Contains("--set a.b=1"));
-  CHECK_THAT(result.output, Catch::Contains("bob   | status of bob"));
-  CHECK_THAT(result.output, Catch::Contains("77") && Catch::Contains("finished"));
-  CHECK_THAT(team.folder.read("out/team.json"), Catch::Contains("\"frames\": 77"));
-  CHECK_THAT(team.folder.read("out/bob/robot.log"), Catch::Contains("status of bob"));
+  CHECK_THAT(result.output, Contains("alice | status of alice: --robot 1 --name alice"));
+  CHECK_THAT(result.output, Contains("--rate max --domain 5"));
+  CHECK_THAT(result.output, Contains("--set a.b=1"));
+  CHECK_THAT(result.output, Contains("bob   | status of bob"));
+  CHECK_THAT(result.output, Contains("77") && Contains("finished"));
+  CHECK_THAT(team.folder.read("out/team.json"), Contains("\"frames\": 77"));
+  CHECK_THAT(team.folder.read("out/bob/robot.log"), Contains("status of bob"));
 }
 
 TEST_CASE("A robot that fails fails the team, with its last words", "[team]") {
@@ -87,9 +80,9 @@ TEST_CASE("A robot that fails fails the team, with its last words", "[team]") {
   const auto result = run_command(team.command);
   CAPTURE(result.output);
   CHECK(result.exit_code == 3);
-  CHECK_THAT(result.output, Catch::Contains("bob   | FAILED: exit code 9, out of luck\n") &&
-                                Catch::Contains("bob failed, exit code 9; its last words:") &&
-                                Catch::Contains("  out of luck"));
+  CHECK_THAT(result.output, Contains("bob   | FAILED: exit code 9, out of luck\n") &&
+                                Contains("bob failed, exit code 9; its last words:") &&
+                                Contains("  out of luck"));
 }
 
 TEST_CASE("A program that is no robot fails the team", "[team]") {
@@ -99,7 +92,7 @@ TEST_CASE("A program that is no robot fails the team", "[team]") {
                                   (team.folder.path() / "out").string());
   CAPTURE(result.output);
   CHECK(result.exit_code == 3);
-  CHECK_THAT(result.output, Catch::Contains("is /bin/true kimera_multi_robot?"));
+  CHECK_THAT(result.output, Contains("is /bin/true kimera_multi_robot?"));
 }
 
 TEST_CASE("Results of an earlier run are not shown for a robot that fails", "[team]") {
@@ -112,8 +105,7 @@ TEST_CASE("Results of an earlier run are not shown for a robot that fails", "[te
   const auto result = run_command(team.command);
   CAPTURE(result.output);
   CHECK(result.exit_code == 3);
-  CHECK_THAT(result.output,
-             Catch::Contains("in place of an earlier run's") && !Catch::Contains("4711"));
+  CHECK_THAT(result.output, Contains("in place of an earlier run's") && !Contains("4711"));
   CHECK_FALSE(fs::exists(team.folder.path() / "out/bob/optimized.tum"));
   CHECK_FALSE(fs::exists(team.folder.path() / "out/bob/exit_code"));
   for (const char* file : {"out/team_mesh.ply", "out/label_palette.csv"})
@@ -125,7 +117,7 @@ TEST_CASE("The domain is drawn once for the whole team", "[team]") {
   const ScriptedTeam team("exit 0");
   const std::string output = run_command(team.command).output;
   CAPTURE(output);
-  CHECK_THAT(output, !Catch::Contains("in place of"));
+  CHECK_THAT(output, !Contains("in place of"));
   const auto domain_after = [&](std::size_t at) {
     const std::string key = "--domain ";
     const std::size_t begin = output.find(key, at) + key.size();
@@ -142,9 +134,8 @@ TEST_CASE("An interrupt is passed on once and the table still printed", "[team]"
       "[ $name = alice ] && kill -INT $PPID\n"
       "while :; do sleep 0.05; done");
   const auto result = succeeded(run_command("exec " + team.command));
-  CHECK_THAT(result.output,
-             Catch::Contains("alice interrupted") && Catch::Contains("bob   | bob interrupted"));
-  CHECK_THAT(result.output, Catch::Contains("team, one frame"));
+  CHECK_THAT(result.output, Contains("alice interrupted") && Contains("bob   | bob interrupted"));
+  CHECK_THAT(result.output, Contains("team, one frame"));
 }
 
 TEST_CASE("With bad links each robot is in a network of its own", "[team][namespaces]") {
@@ -156,11 +147,11 @@ TEST_CASE("With bad links each robot is in a network of its own", "[team][namesp
   if (!had_own_networks(result.output)) return;
   CAPTURE(result.output);
   CHECK(result.exit_code == 0);
-  CHECK_THAT(result.output, Catch::Contains("alice has 10.77.0.1 on lo eth0\n") &&
-                                Catch::Contains("bob has 10.77.0.2 on lo eth0\n"));
+  CHECK_THAT(result.output, Contains("alice has 10.77.0.1 on lo eth0\n") &&
+                                Contains("bob has 10.77.0.2 on lo eth0\n"));
   const std::string table = team.folder.read("out/links.csv");
-  CHECK_THAT(table, Catch::StartsWith("from,to,frames_in,") && Catch::Contains("\nalice,bob,") &&
-                        Catch::Contains("\nbob,alice,"));
+  CHECK_THAT(table, StartsWith("from,to,frames_in,") && Contains("\nalice,bob,") &&
+                        Contains("\nbob,alice,"));
 }
 
 TEST_CASE("A robot whose interface is down loses frames and nothing else", "[team][namespaces]") {
@@ -178,7 +169,7 @@ TEST_CASE("A robot whose interface is down loses frames and nothing else", "[tea
   CAPTURE(result.output);
   CHECK(result.exit_code == 0);
   const std::string table = team.folder.read("out/links.csv");
-  CHECK_THAT(table, Catch::Contains("\nbob,alice,") && !Catch::Contains("\nbob,alice,0,"));
+  CHECK_THAT(table, Contains("\nbob,alice,") && !Contains("\nbob,alice,0,"));
 }
 
 TEST_CASE("Networks of robots vanish with their team, however it ends", "[team][namespaces]") {
@@ -226,10 +217,10 @@ TEST_CASE("If networks are not allowed, a team with bad links does not start", "
   CAPTURE(result.output);
   CHECK(result.exit_code == 1);
   CHECK_THAT(result.output,
-             Catch::StartsWith("kimera_multi_team: robots cannot have networks of their own here ("
-                               "a network namespace: ") &&
-                 Catch::Contains("/dev/net/tun"));
-  CHECK_THAT(result.output, !Catch::Contains("started"));
+             StartsWith("kimera_multi_team: robots cannot have networks of their own here ("
+                        "a network namespace: ") &&
+                 Contains("/dev/net/tun"));
+  CHECK_THAT(result.output, !Contains("started"));
 }
 
 TEST_CASE("How a robot ended elsewhere is read from its folder", "[team]") {
@@ -266,12 +257,12 @@ TEST_CASE("A report starts no robot and fails if one of the run did", "[team]") 
   const CommandResult half = run_command(command);
   CAPTURE(half.output);
   CHECK(half.exit_code == 3);
-  CHECK_THAT(half.output, Catch::Contains("bob failed"));
+  CHECK_THAT(half.output, Contains("bob failed"));
 
   team.folder.write("out/bob/summary.json", json_text(finished_summary()));
   const CommandResult whole = succeeded(run_command(command));
-  CHECK_THAT(whole.output, Catch::Contains("finished") && !Catch::Contains("DDS domain") &&
-                               !Catch::Contains("status of"));
+  CHECK_THAT(whole.output,
+             Contains("finished") && !Contains("DDS domain") && !Contains("status of"));
 }
 
 TEST_CASE("Input that cannot be run is refused", "[team]") {
@@ -293,7 +284,7 @@ TEST_CASE("Input that cannot be run is refused", "[team]") {
     const auto result = run_command(command);
     CAPTURE(command);
     CHECK(is_refused(result));
-    CHECK_THAT(result.output, Catch::Contains(message) && !Catch::Contains("status of alice"));
+    CHECK_THAT(result.output, Contains(message) && !Contains("status of alice"));
   }
   CHECK(run_command(tool + " --help").exit_code == 0);
 }

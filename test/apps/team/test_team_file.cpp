@@ -1,16 +1,12 @@
 #include "apps/team/team_file.hpp"
 
-#include <catch2/catch.hpp>
-#include <sstream>
-
 #include "apps/team/run_team.hpp"
 #include "test/support/corrupted_input.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
-
-namespace fs = std::filesystem;
 
 // A folder with the files that team files name.
 struct Inputs {
@@ -98,8 +94,8 @@ TEST_CASE("A truth may be a folder, and one that is missing is a note", "[team]"
   CHECK(plan.robots[0].truth.empty());
   CHECK(plan.robots[1].truth == inputs.folder.path() / "truth/groundtruth_tum.txt");
   REQUIRE(plan.notes.size() == 1);
-  CHECK_THAT(plan.notes[0], Catch::Contains("no true poses, so no errors: ") &&
-                                Catch::Contains("none.csv is neither"));
+  CHECK_THAT(plan.notes[0],
+             Contains("no true poses, so no errors: ") && Contains("none.csv is neither"));
   inputs.folder.write("truth/data.csv", "");
   CHECK(read_team_file(file, {}).robots[1].truth == inputs.folder.path() / "truth/data.csv");
 }
@@ -156,9 +152,9 @@ TEST_CASE("Every problem of a team file is reported with its line", "[team]") {
       {"just text\n", {"is not a map of keys and values"}}};
   for (const auto& [text, all] : files) {
     const std::string problems = problems_of(inputs.team(text), {});
-    for (const std::string& expected : all) CHECK_THAT(problems, Catch::Contains(expected));
+    for (const std::string& expected : all) CHECK_THAT(problems, Contains(expected));
   }
-  CHECK_THAT(problems_of("/no/team.yaml", {}), Catch::Contains("no such file"));
+  CHECK_THAT(problems_of("/no/team.yaml", {}), Contains("no such file"));
 }
 
 TEST_CASE("Arguments name inputs relative to the team file, and ${DATASET}", "[team]") {
@@ -178,8 +174,8 @@ TEST_CASE("Arguments name inputs relative to the team file, and ${DATASET}", "[t
       inputs.team("robots:\n  - id: 1\n    graph: recording/g.csv\n    arguments:\n      - --rig\n"
                   "      - none.yaml\n      - --set=x.y=${DATASET}\n"),
       {});
-  CHECK_THAT(problems, Catch::Contains("team.yaml:6: arguments: none.yaml is no file or folder") &&
-                           Catch::Contains("team.yaml:7: arguments: --set=x.y=${DATASET} needs"));
+  CHECK_THAT(problems, Contains("team.yaml:6: arguments: none.yaml is no file or folder") &&
+                           Contains("team.yaml:7: arguments: --set=x.y=${DATASET} needs"));
 }
 
 TEST_CASE("The team files that are shipped lack only recordings", "[team]") {
@@ -190,7 +186,7 @@ TEST_CASE("The team files that are shipped lack only recordings", "[team]") {
     ++files;
     std::istringstream problems(problems_of(entry.path(), dataset.path()));
     for (std::string line; std::getline(problems, line);)
-      CHECK_THAT(line, Catch::Contains("there is no " + dataset.path().string()));
+      CHECK_THAT(line, Contains("there is no " + dataset.path().string()));
   }
   CHECK(files == 8);
 }

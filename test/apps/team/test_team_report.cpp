@@ -1,17 +1,14 @@
 #include "apps/team/team_report.hpp"
 
-#include <catch2/catch.hpp>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
 #include "modules/mesh/mesh_file.hpp"
 #include "test/modules/sensors/euroc_folder.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
-
-using Catch::Contains;
 
 std::string straight_line(double lift_m) {
   std::string text;
@@ -66,7 +63,7 @@ struct Team {
       robot.name = static_cast<char>('a' + k);
       robot.graph = "g.csv";
       robot.truth = folder.write(robot.name + ".tum", straight_line(0.0));
-      std::filesystem::create_directories(folder.path() / robot.name);
+      fs::create_directories(folder.path() / robot.name);
     }
   }
   void leave(const std::string& robot, const RunSummary& summary, double odometry_lift_m = 0.0,
@@ -222,7 +219,7 @@ TEST_CASE("One half of a divided team is in the team's frame, and the other half
   CHECK(robots[0].in_team_frame);
   CHECK(robots[1].notes.empty());
   CHECK_FALSE(robots[2].in_team_frame);
-  CHECK_THAT(robots[3].notes.at(0), Catch::StartsWith("ended in the frame of robot 2"));
+  CHECK_THAT(robots[3].notes.at(0), StartsWith("ended in the frame of robot 2"));
   CHECK(robots[4].in_team_frame);  // the frame is unknown without a summary
 }
 
@@ -268,12 +265,12 @@ TEST_CASE("Closures are judged in the robots' common world", "[team]") {
   CHECK_THAT(to_table(team), Contains("1 pairs of keyframes of two robots"));
   CHECK(Json(team)["closures"]["inliers"]["pair_recall"] == 1.0);
 
-  std::filesystem::remove(two.folder.path() / "b/loop_closures.csv");
+  fs::remove(two.folder.path() / "b/loop_closures.csv");
   const TeamResult part = two.collect();
   REQUIRE(part.closures);
   CHECK(part.closures->unjudged == 1);
   REQUIRE(part.notes.size() == 1);
-  CHECK_THAT(part.notes[0], Catch::StartsWith("b: closures are not judged: "));
+  CHECK_THAT(part.notes[0], StartsWith("b: closures are not judged: "));
 }
 
 TEST_CASE("Meshes are compared with the true one, before and after their correction", "[team]") {

@@ -2,14 +2,8 @@
 
 #include <civetweb.h>
 
-#include <array>
-#include <catch2/catch.hpp>
-#include <condition_variable>
-#include <mutex>
-#include <string>
-#include <string_view>
-
 #include "test/support/patience.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 

@@ -1,11 +1,3 @@
-#include <catch2/catch.hpp>
-#include <chrono>
-#include <csignal>
-#include <filesystem>
-#include <iostream>
-#include <string>
-#include <thread>
-
 #include "modules/view/node/view_channel_codec.hpp"
 #include "runtime/dds/participant.hpp"
 #include "test/apps/viewer/page_listener.hpp"
@@ -14,6 +6,7 @@
 #include "test/support/command.hpp"
 #include "test/support/demo_world.hpp"
 #include "test/support/process.hpp"
+#include "test/support/test.hpp"
 #include "test/system/team_run.hpp"
 
 namespace km {
@@ -45,15 +38,14 @@ TEST_CASE("The page opens and turns while another host attacks the viewer", "[pa
 TEST_CASE("The page follows a team that runs, shows its past, and knows how it ended",
           "[page][demo_world]") {
   std::string why = missing_page_program();
-  if (!std::filesystem::exists(KM_BIN_DIR "/kimera_multi_simulate")) why = "no simulator (Embree)";
+  if (!fs::exists(KM_BIN_DIR "/kimera_multi_simulate")) why = "no simulator (Embree)";
   if (!why.empty()) {
     std::cout << "SKIPPED: " << why << '\n';
     return;
   }
   const TemporaryFolder folder;
-  if (std::filesystem::exists(kDemoWorld))  // otherwise the demo renders it
-    std::filesystem::copy(kDemoWorld, folder.path() / "world_short",
-                          std::filesystem::copy_options::recursive);
+  if (fs::exists(kDemoWorld))  // otherwise the demo renders it
+    fs::copy(kDemoWorld, folder.path() / "world_short", fs::copy_options::recursive);
   const CommandResult result =
       run_command("node test/apps/viewer/page_of_team.mjs " KM_BIN_DIR " " +
                   folder.path().string() + " '' --short --rate 0.3");
@@ -75,9 +67,9 @@ TEST_CASE("The viewer refuses unusable input", "[viewer]") {
   const TemporaryFolder empty;
   const auto result = run_command(kViewer + ' ' + empty.path().string());
   CHECK(result.exit_code == 1);
-  CHECK_THAT(result.output, Catch::Contains("no results in it"));
+  CHECK_THAT(result.output, Contains("no results in it"));
   CHECK(run_command(kViewer + " --rate 0 x").exit_code == 2);
-  CHECK_THAT(run_command(kViewer).output, Catch::Contains("--domain of a team that runs"));
+  CHECK_THAT(run_command(kViewer).output, Contains("--domain of a team that runs"));
   CHECK(run_command(kViewer + " --domain 7 x").exit_code == 2);
   CHECK(run_command(kViewer + " --help").exit_code == 0);
   CHECK(run_command(kViewer + " --domain 7 --interface lo --listen 203.0.113.7").exit_code == 1);

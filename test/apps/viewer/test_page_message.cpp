@@ -1,10 +1,8 @@
-#include <catch2/catch.hpp>
-
-#include <cstring>
 #include <nlohmann/json.hpp>
 
 #include "apps/viewer/page_message.hpp"
 #include "test/modules/view/some_updates.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

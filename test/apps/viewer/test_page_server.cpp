@@ -1,22 +1,15 @@
-#include <catch2/catch.hpp>
-
 #include <arpa/inet.h>
 #include <civetweb.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include <algorithm>
-#include <array>
 #include <cerrno>
-#include <condition_variable>
-#include <memory>
-#include <mutex>
 #include <regex>
-#include <set>
 
 #include "apps/viewer/page_server.hpp"
 #include "test/apps/viewer/page_listener.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -68,7 +61,7 @@ TEST_CASE("The page and all its parts are served from the program", "[page_serve
   const PageServer server(store, any_port());
   const int port = port_of(server);
   CHECK(server.url() == "http://127.0.0.1:" + std::to_string(port) + '/');
-  CHECK_THAT(get(port, "/").body, Catch::StartsWith("<!doctype html>"));
+  CHECK_THAT(get(port, "/").body, StartsWith("<!doctype html>"));
   CHECK(page_files().size() > 10);
   for (const PageFile& file : page_files())
     CHECK(get(port, '/' + std::string(file.path)).body == file.bytes);
@@ -153,8 +146,7 @@ TEST_CASE("Other hosts need the token", "[page_server]") {
   const std::string path = path_of(server);
   CHECK(std::regex_match(path, std::regex("/[0-9a-f]{32}/")));
   CHECK(path != path_of(another));
-  CHECK_THAT(get(port, path, "Host: robot.example:80\r\n").body,
-             Catch::StartsWith("<!doctype html>"));
+  CHECK_THAT(get(port, path, "Host: robot.example:80\r\n").body, StartsWith("<!doctype html>"));
   CHECK(get(port, "/").status == 404);
   CHECK(get(port, "/main.js").status == 404);
   CHECK(get(port, "/00000000000000000000000000000000/").status == 404);
@@ -217,7 +209,7 @@ TEST_CASE("A port that is taken is named", "[page_server]") {
   const PageServer server(store, options);
   options.port = port_of(server);
   CHECK_THROWS_WITH(PageServer(store, options),
-                    Catch::Contains(std::to_string(options.port)) && Catch::Contains("--port"));
+                    Contains(std::to_string(options.port)) && Contains("--port"));
 }
 
 }  // namespace

@@ -1,13 +1,8 @@
-#include <array>
-#include <catch2/catch.hpp>
-#include <map>
-#include <set>
-#include <vector>
-
 #include "apps/viewer/run_playback.hpp"
 #include "modules/core/pose_changes.hpp"
 #include "test/apps/viewer/small_run.hpp"
 #include "test/support/process.hpp"
+#include "test/support/test.hpp"
 #include "test/system/audience.hpp"
 
 namespace km {
@@ -106,7 +101,7 @@ TEST_CASE("Damaged layers are noted with their file and left out", "[run_playbac
   files.folder.write(std::string("r0/") + name, bytes);
   const RunPlayback run = read_run(files.folder.path(), kBegin);
   REQUIRE(run.notes.size() == 1);
-  CHECK_THAT(run.notes[0], Catch::Contains(std::string("r0/") + name));
+  CHECK_THAT(run.notes[0], Contains(std::string("r0/") + name));
   CHECK(run.updates.size() < all);
 }
 
@@ -162,32 +157,30 @@ TEST_CASE("Damaged and missing files are noted, and a folder without a run is re
   files.folder.write("r1/mesh_optimized.ply", "no mesh");
   const RunPlayback run = read_run(files.folder.path(), kBegin);
   REQUIRE(run.notes.size() == 2);
-  CHECK_THAT(run.notes[0], Catch::Contains("r0/run.journal: ") && Catch::Contains("are damaged"));
-  CHECK_THAT(run.notes[1], Catch::Contains("r1/mesh_optimized.ply"));
+  CHECK_THAT(run.notes[0], Contains("r0/run.journal: ") && Contains("are damaged"));
+  CHECK_THAT(run.notes[1], Contains("r1/mesh_optimized.ply"));
   CHECK(updates_of<RobotSample>(run, 0).size() == 12);
   CHECK(read_run(files.of(0), kBegin).updates.size() > 10);  // one robot's
 
   const TemporaryFolder empty;
-  CHECK_THROWS_WITH(read_run(empty.path(), 0), Catch::Contains("no results in it"));
-  CHECK_THROWS_WITH(read_run(empty.path() / "none", 0), Catch::Contains("no such folder"));
+  CHECK_THROWS_WITH(read_run(empty.path(), 0), Contains("no results in it"));
+  CHECK_THROWS_WITH(read_run(empty.path() / "none", 0), Contains("no such folder"));
   CHECK_THROWS_WITH(read_run(files.folder.path() / "r0/summary.json", 0),
-                    Catch::Contains("a file, not the folder of a run"));
+                    Contains("a file, not the folder of a run"));
 }
 
 TEST_CASE("A robot that was killed is shown up to its end, and noted with the remedy",
           "[run_playback]") {
   const SmallRun files;
-  std::filesystem::remove(files.of(1) / kSummary);
+  fs::remove(files.of(1) / kSummary);
   const RunPlayback run = read_run(files.folder.path(), kBegin);
   REQUIRE(run.notes.size() == 1);
-  CHECK_THAT(run.notes[0], Catch::Contains("r1: no summary.json: the robot still runs, or was") &&
-                               Catch::Contains("--resume " + files.of(1).string()));
+  CHECK_THAT(run.notes[0], Contains("r1: no summary.json: the robot still runs, or was") &&
+                               Contains("--resume " + files.of(1).string()));
   CHECK(updates_of<RobotSample>(run, 1).size() == 12);
 }
 
 // A viewer of a running team, compared with the results and the playback of its run.
-
-namespace fs = std::filesystem;
 
 void check_same(const std::map<KeyframeIndex, Watcher::Placed>& live,
                 const std::map<KeyframeIndex, Watcher::Placed>& played) {

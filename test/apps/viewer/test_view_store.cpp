@@ -1,8 +1,7 @@
-#include <catch2/catch.hpp>
-
 #include <nlohmann/json.hpp>
 
 #include "apps/viewer/view_store.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,15 +1,10 @@
-#include <catch2/catch.hpp>
-
-#include <cmath>
-#include <fstream>
-#include <limits>
-
 #include "modules/absolute_fixes/fix_association.hpp"
 #include "modules/absolute_fixes/geodetic.hpp"
 #include "modules/absolute_fixes/node/fixes_node.hpp"
 #include "modules/core/lie.hpp"
 #include "modules/recordings/ros_messages.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -107,10 +102,10 @@ TEST_CASE("without a configured datum the first fix is the datum", "[absolute_fi
 TEST_CASE("a configuration that names no source of fixes or two is refused", "[absolute_fixes]") {
   AbsoluteFixesConfig config = gnss_config();
   config.file = "fixes.csv";
-  CHECK_THROWS_WITH(FixReader(config), Catch::Contains("either topic or file"));
+  CHECK_THROWS_WITH(FixReader(config), Contains("either topic or file"));
   config = gnss_config();
   config.datum = {47.0, 8.0};
-  CHECK_THROWS_WITH(FixReader(config), Catch::Contains("latitude, longitude and altitude"));
+  CHECK_THROWS_WITH(FixReader(config), Contains("latitude, longitude and altitude"));
 }
 
 TEST_CASE("files of motion captures have stamps in s, or in ns in a .csv file",
@@ -169,7 +164,7 @@ TEST_CASE("fixes are read from one topic of a recording", "[absolute_fixes]") {
   CHECK(reader.read(bag).size() == 2);
   TwoTopics again({pose_stamped(1)});
   FixReader missing(motion_capture_config("/none"));
-  CHECK_THROWS_WITH(missing.read(again), Catch::Contains("/none"));
+  CHECK_THROWS_WITH(missing.read(again), Contains("/none"));
 }
 
 TEST_CASE("the node publishes live fixes", "[absolute_fixes]") {

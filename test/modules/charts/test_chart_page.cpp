@@ -1,13 +1,11 @@
 #include "modules/charts/chart_page.hpp"
 
-#include <catch2/catch.hpp>
-#include <iostream>
-#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "test/apps/viewer/page_programs.hpp"
 #include "test/support/page_text.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

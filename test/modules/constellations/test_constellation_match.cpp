@@ -1,12 +1,7 @@
-#include <catch2/catch.hpp>
-
-#include <limits>
-#include <random>
-#include <vector>
-
 #include "modules/constellations/constellation_match.hpp"
 #include "modules/core/lie.hpp"
 #include "test/modules/constellations/scenes.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -139,8 +134,8 @@ TEST_CASE("Landmarks that are not finite are refused with their label", "[conste
         Landmark{.label = 7, .size_m = {1.0, 1.0, kInfinity}}, Landmark{.label = 7, .sigma_m = 0.0},
         Landmark{.label = 7, .side_shift_m = kInfinity}}) {
     const std::vector<Landmark> bad = {one};
-    CHECK_THROWS_WITH(match_constellations(good, bad), Catch::Contains("label 7"));
-    CHECK_THROWS_WITH(match_constellations(bad, good), Catch::Contains("label 7"));
+    CHECK_THROWS_WITH(match_constellations(good, bad), Contains("label 7"));
+    CHECK_THROWS_WITH(match_constellations(bad, good), Contains("label 7"));
   }
 }
 

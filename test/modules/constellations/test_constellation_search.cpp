@@ -1,14 +1,10 @@
-#include <catch2/catch.hpp>
-#include <memory>
-#include <random>
-#include <vector>
-
 #include "modules/constellations/constellation_search.hpp"
 #include "modules/constellations/node/constellations_node.hpp"
 #include "modules/objects/map_object.hpp"
 #include "test/modules/constellations/scenes.hpp"
 #include "test/runtime/dds/dds_fixture.hpp"
 #include "test/support/inbox.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

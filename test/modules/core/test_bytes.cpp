@@ -1,11 +1,5 @@
-#include <catch2/catch.hpp>
-
-#include <cmath>
-#include <limits>
-#include <random>
-#include <string>
-
 #include "modules/core/bytes.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,13 +1,9 @@
-#include <catch2/catch.hpp>
-#include <cmath>
-#include <random>
-#include <string>
-
 #include "modules/core/camera.hpp"
 #include "modules/core/camera_calibration.hpp"
 #include "modules/core/image_size.hpp"
 #include "modules/core/lie.hpp"
 #include "test/support/random_pose.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,9 +1,4 @@
 #include <Eigen/Core>
-#include <array>
-#include <catch2/catch.hpp>
-#include <cmath>
-#include <limits>
-#include <random>
 
 #include "modules/core/covariance.hpp"
 #include "modules/core/covariance_root.hpp"
@@ -11,6 +6,7 @@
 #include "modules/core/precision.hpp"
 #include "modules/core/symmetric_eigen.hpp"
 #include "test/support/random_pose.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

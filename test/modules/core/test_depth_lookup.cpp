@@ -1,9 +1,6 @@
 #include "modules/core/depth_lookup.hpp"
 
-#include <catch2/catch.hpp>
-#include <cmath>
-#include <limits>
-#include <random>
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,14 +1,9 @@
 #include <sys/stat.h>
 
-#include <catch2/catch.hpp>
-#include <filesystem>
-#include <fstream>
-#include <future>
-#include <string>
-
 #include "modules/core/input_file.hpp"
 #include "modules/core/text_rows.hpp"
 #include "test/support/corrupted_input.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 
@@ -42,21 +37,21 @@ TEST_CASE("A path that is not a file is refused with its kind", "[core]") {
 TEST_CASE("A text in UTF-16 is refused by name", "[core]") {
   const TemporaryFolder folder;
   CHECK_THROWS_WITH(read_input_file(folder.write("a.csv", std::string("\xFF\xFE\x31\0", 4))),
-                    Catch::Contains("a.csv: a text in UTF-16: save it as UTF-8"));
+                    Contains("a.csv: a text in UTF-16: save it as UTF-8"));
 }
 
 TEST_CASE("A file beyond the limit is not read", "[core]") {
   const TemporaryFolder folder;
   const auto file = folder.write("some", "12345");
   CHECK(read_input_file(file, 5) == "12345");
-  CHECK_THROWS_WITH(read_input_file(file, 4), Catch::Contains("some: larger than"));
-  std::filesystem::resize_file(file, std::uintmax_t{1} << 40U);  // a hole needs no disk space
-  CHECK_THROWS_WITH(read_input_file(file), Catch::Contains("larger than 8192 MiB"));
+  CHECK_THROWS_WITH(read_input_file(file, 4), Contains("some: larger than"));
+  fs::resize_file(file, std::uintmax_t{1} << 40U);  // a hole needs no disk space
+  CHECK_THROWS_WITH(read_input_file(file), Contains("larger than 8192 MiB"));
 }
 
 TEST_CASE("A pipe is read until its writer closes it, and refused without a writer", "[core]") {
   const TemporaryFolder folder;
-  const std::filesystem::path pipe = folder.path() / "pipe";
+  const fs::path pipe = folder.path() / "pipe";
   REQUIRE(mkfifo(pipe.c_str(), 0600) == 0);
   auto writer = std::async(std::launch::async, [&] {
     std::ofstream out(pipe);
@@ -64,7 +59,7 @@ TEST_CASE("A pipe is read until its writer closes it, and refused without a writ
   });
   CHECK(read_input_file(pipe) == "first second");
   writer.get();
-  CHECK_THROWS_WITH(read_input_file(pipe), Catch::Contains("no program has written"));
+  CHECK_THROWS_WITH(read_input_file(pipe), Contains("no program has written"));
 }
 
 TEST_CASE("Text in messages is printable and short", "[core]") {

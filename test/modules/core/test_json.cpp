@@ -1,8 +1,8 @@
 #include "modules/core/json.hpp"
 
-#include <catch2/catch.hpp>
-#include <limits>
 #include <nlohmann/json.hpp>
+
+#include "test/support/test.hpp"
 
 namespace km {
 
@@ -14,8 +14,8 @@ TEST_CASE("JSON text keeps keys in order and numbers exact and is always valid",
                      {"none", {kNone, -std::numeric_limits<double>::infinity()}},
                      {"torn", "\xff!"}};
   const std::string text = json_text(json);
-  CHECK_THAT(text, Catch::StartsWith("{\n  \"z\": 18446744073709551615,\n  \"a \\\"q\\\"\\n\": ") &&
-                       Catch::Contains("[\n    null,\n    null\n  ]") && Catch::EndsWith("\n}\n"));
+  CHECK_THAT(text, StartsWith("{\n  \"z\": 18446744073709551615,\n  \"a \\\"q\\\"\\n\": ") &&
+                       Contains("[\n    null,\n    null\n  ]") && EndsWith("\n}\n"));
   const Json again = Json::parse(text);
   CHECK(again["a \"q\"\n"] == third);
   CHECK(again["torn"] == "\xEF\xBF\xBD!");

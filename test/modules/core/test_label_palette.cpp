@@ -1,21 +1,13 @@
-#include <catch2/catch.hpp>
-#include <filesystem>
-#include <fstream>
-#include <sstream>
-#include <string>
-#include <vector>
-
 #include "modules/core/label_palette.hpp"
 #include "test/support/shared_data.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
 
-using Catch::Contains;
-
 const std::string kHeader = "name,red,green,blue,alpha,id\n";
 
-std::string read(const std::filesystem::path& path) {
+std::string read(const fs::path& path) {
   std::ostringstream text;
   text << std::ifstream(path).rdbuf();
   return text.str();
@@ -101,7 +93,7 @@ TEST_CASE("Kimera-Semantics' tables are read or refused with a reason", "[core][
   const auto folder = shared_data("semantics");
   if (!folder) return;
   int read_count = 0;
-  for (const auto& file : std::filesystem::directory_iterator(*folder)) {
+  for (const auto& file : fs::directory_iterator(*folder)) {
     const std::string name = file.path().filename().string();
     CAPTURE(name);
     const std::string text = read(file.path());

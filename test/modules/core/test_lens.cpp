@@ -1,14 +1,9 @@
 #include <Eigen/LU>
-#include <catch2/catch.hpp>
-#include <cmath>
-#include <limits>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/ccalib/omnidir.hpp>
-#include <random>
-#include <stdexcept>
-#include <vector>
 
 #include "modules/core/lens.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

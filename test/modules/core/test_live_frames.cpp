@@ -1,10 +1,8 @@
-#include <catch2/catch.hpp>
-#include <numbers>
-
 #include "modules/core/lie.hpp"
 #include "modules/core/live_frames.hpp"
 #include "modules/core/odometry_correction.hpp"
 #include "test/support/random_pose.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

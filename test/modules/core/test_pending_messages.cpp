@@ -1,9 +1,5 @@
-#include <algorithm>
-#include <catch2/catch.hpp>
-#include <string>
-#include <vector>
-
 #include "modules/core/pending_messages.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

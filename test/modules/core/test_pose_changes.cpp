@@ -1,9 +1,6 @@
-#include <catch2/catch.hpp>
-#include <limits>
-#include <vector>
-
 #include "modules/core/lie.hpp"
 #include "modules/core/pose_changes.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,9 +1,5 @@
-#include <catch2/catch.hpp>
-#include <cmath>
-#include <string>
-#include <vector>
-
 #include "modules/core/text_rows.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 

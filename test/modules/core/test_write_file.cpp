@@ -1,14 +1,9 @@
-#include <catch2/catch.hpp>
-#include <filesystem>
-#include <string>
-
 #include "modules/core/write_file.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
-
-namespace fs = std::filesystem;
 
 TEST_CASE("A file is replaced as a whole and leaves no other file", "[files]") {
   const TemporaryFolder folder;

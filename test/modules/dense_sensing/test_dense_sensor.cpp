@@ -1,14 +1,9 @@
-#include <algorithm>
-#include <catch2/catch.hpp>
-#include <cmath>
-#include <memory>
-#include <vector>
-
 #include "modules/dense_sensing/dense_sensor.hpp"
 #include "modules/dense_sensing/node/dense_sensing_node.hpp"
 #include "test/modules/vio/textured_plane.hpp"
 #include "test/support/onnx_model.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,8 +1,7 @@
-#include <catch2/catch.hpp>
-
 #include "modules/dense_sensing/segmentation_network.hpp"
 #include "test/support/onnx_model.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -15,7 +14,7 @@ PointwiseNetwork three_levels() {
   return network;
 }
 
-SegmentationConfig config_of(const std::filesystem::path& file) {
+SegmentationConfig config_of(const fs::path& file) {
   SegmentationConfig config;
   config.network = file.string();
   config.width_px = 16;
@@ -95,7 +94,7 @@ TEST_CASE("A network that cannot be used is refused with the reason", "[segmenta
   const auto fails_with = [](const SegmentationConfig& config, const std::string& words) {
     CAPTURE(words);
     CHECK_THROWS_AS(SegmentationNetwork(config), ConfigError);
-    CHECK_THROWS_WITH(SegmentationNetwork(config), Catch::Contains(words));
+    CHECK_THROWS_WITH(SegmentationNetwork(config), Contains(words));
   };
   fails_with(config_of(folder.path() / "none.onnx"), "no such file");
   fails_with(config_of(folder.write("text.onnx", "no network at all")), "cannot be run as ONNX");

@@ -1,10 +1,5 @@
-#include <algorithm>
-#include <catch2/catch.hpp>
-#include <cmath>
-#include <limits>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
-#include <vector>
 
 #include "modules/core/lie.hpp"
 #include "modules/dense_sensing/stereo_depth.hpp"
@@ -13,6 +8,7 @@
 #include "test/modules/vio/textured_plane.hpp"
 #include "test/support/keyframe_pairs.hpp"
 #include "test/support/shared_data.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -121,17 +117,16 @@ TEST_CASE("Rigs and depth ranges without disparities to search are refused", "[s
   CHECK_THROWS_AS(StereoDepth(rgbd_rig(rig.cameras[0], 0.1), {}), std::invalid_argument);
   StereoRig swapped = rig;
   std::swap(swapped.cameras[0].T_body_cam, swapped.cameras[1].T_body_cam);
-  CHECK_THROWS_WITH(StereoDepth(swapped, {}), Catch::Contains("be to its right"));
+  CHECK_THROWS_WITH(StereoDepth(swapped, {}), Contains("be to its right"));
   StereoRig crossed = rig;
   crossed.cameras[1].T_body_cam.linear() = so3_exp(Eigen::Vector3d(0.0, 1.0, 0.0));
-  CHECK_THROWS_WITH(StereoDepth(crossed, {}),
-                    Catch::Contains("must have the direction of the left one"));
+  CHECK_THROWS_WITH(StereoDepth(crossed, {}), Contains("must have the direction of the left one"));
   StereoDepthConfig config{.min_depth_m = 20.0};
   CHECK_THROWS_AS(StereoDepth(rig, config), ConfigError);
   config = {};
   config.min_depth_m = 5.0;
   config.max_depth_m = 4.0;
-  CHECK_THROWS_WITH(StereoDepth(rig, config), Catch::Contains("not below max_depth_m"));
+  CHECK_THROWS_WITH(StereoDepth(rig, config), Contains("not below max_depth_m"));
   config = {};
   config.min_depth_m = 0.1;  // 253 px
   CHECK(StereoDepth(rig, config).disparities() < rig.cameras[0].width / 2 + 17);

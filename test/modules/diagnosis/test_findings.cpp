@@ -1,10 +1,8 @@
-#include <catch2/catch.hpp>
-
 #include <nlohmann/json.hpp>
-#include <random>
 
 #include "modules/diagnosis/examine_sensors.hpp"
 #include "modules/diagnosis/finding.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -109,13 +107,13 @@ TEST_CASE("Faults of a reader become findings by their share", "[diagnosis]") {
   CHECK(with(300) == "error recording.missing_images ");
   ReaderReport report;
   report.add(ReaderFault::kNotFinite, "imu0/data.csv line 9", 15);
-  CHECK_THAT(ids_of(examine_streams(sample, report)), Catch::StartsWith("note recording."));
+  CHECK_THAT(ids_of(examine_streams(sample, report)), StartsWith("note recording."));
   SensorSample stereo = sample;
   stereo.right_size = {752, 480};
   ReaderReport missing;
   missing.add(ReaderFault::kMissingBetween, "here", 20);  // 10 of each of two cameras
   CHECK_THAT(examine_streams(stereo, missing).findings.at(0).what,
-             Catch::Contains("20 images missing between others, 4.8 %"));
+             Contains("20 images missing between others, 4.8 %"));
 }
 
 TEST_CASE("Images that are dark, bright, blurred or empty are found", "[diagnosis]") {
@@ -171,7 +169,7 @@ TEST_CASE("A vocabulary that maps all features to few words is found", "[diagnos
   CHECK(ids_of(examine_words(alike, vocabulary)) == "warning vocabulary.coverage ");
   CHECK(ids_of(examine_words({}, vocabulary)).empty());
   const std::string varied = to_text(examine_words(images, vocabulary).figures);
-  CHECK_THAT(varied, Catch::Contains("words distinguish 4000 features, of 256"));
+  CHECK_THAT(varied, Contains("words distinguish 4000 features, of 256"));
 }
 
 }  // namespace km

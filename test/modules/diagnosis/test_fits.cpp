@@ -1,14 +1,9 @@
-#include <catch2/catch.hpp>
-
-#include <cmath>
-#include <random>
-#include <vector>
-
 #include "modules/core/lie.hpp"
 #include "modules/diagnosis/focal_fit.hpp"
 #include "modules/diagnosis/image_rotation.hpp"
 #include "modules/diagnosis/inertial_fit.hpp"
 #include "modules/diagnosis/stereo_fit.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

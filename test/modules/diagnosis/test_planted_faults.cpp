@@ -1,13 +1,3 @@
-#include <catch2/catch.hpp>
-
-#include <filesystem>
-#include <functional>
-#include <iostream>
-#include <optional>
-#include <set>
-#include <string>
-#include <utility>
-
 #include "modules/diagnosis/examine_sensors.hpp"
 #include "modules/diagnosis/stereo_fit.hpp"
 #include "modules/sensors/node/open_folder.hpp"
@@ -15,11 +5,10 @@
 #include "test/support/euroc_copy.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
-
-namespace fs = std::filesystem;
 
 // Data of a recording and its calibration; faults are inserted in either.
 struct Recorded {
@@ -180,7 +169,7 @@ TEST_CASE("V1_01 at rest gives no findings and no figures that need motion", "[d
   const Recorded recorded = read(folder.path(), 10.0);
   CHECK(found_in(recorded) == Ids{"frames.rate"});  // 5 Hz: every fourth image
   const Examination inertial = examine_inertial(recorded.sample, recorded.rig.stereo);
-  CHECK_THAT(to_text(inertial.figures), Catch::Contains("not determined: the camera turns by"));
+  CHECK_THAT(to_text(inertial.figures), Contains("not determined: the camera turns by"));
 }
 
 TEST_CASE("The world of the demo gives no findings and an inserted fault is the only one",

@@ -1,15 +1,7 @@
 #include "modules/distance_field/distance_field.hpp"
 
-#include <catch2/catch.hpp>
-#include <cmath>
-#include <limits>
-#include <map>
-#include <optional>
-#include <random>
-#include <set>
-#include <tuple>
-
 #include "modules/semantic_mapping/semantic_mapper.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

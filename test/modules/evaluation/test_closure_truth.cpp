@@ -1,9 +1,7 @@
-#include <catch2/catch.hpp>
-#include <numbers>
-
 #include "modules/core/lie.hpp"
 #include "modules/evaluation/closure_truth.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -186,10 +184,9 @@ TEST_CASE("Invalid closures and options are refused", "[closure_truth]") {
   const std::vector<ClosureRecord> none = {
       closure({0, 0}, {1, 0}, ClosureStage::kVerified, std::nullopt)};
   CHECK_THROWS_WITH(score_closures(keyframes, none, camera()),
-                    Catch::Contains("closure 0:0 - 1:0 is verified, but has no pose"));
+                    Contains("closure 0:0 - 1:0 is verified, but has no pose"));
   const std::vector<TrueKeyframe> twice = {keyframes[0], keyframes[0]};
-  CHECK_THROWS_WITH(score_closures(twice, {}, camera()),
-                    Catch::Contains("keyframe 0:0 is given twice"));
+  CHECK_THROWS_WITH(score_closures(twice, {}, camera()), Contains("keyframe 0:0 is given twice"));
   CHECK_THROWS_AS(score_closures(keyframes, {}, camera(), {.min_overlap = 1.5}), ConfigError);
 }
 
@@ -207,9 +204,8 @@ TEST_CASE("Errors in closure files are reported with their line", "[closure_file
        {"1,2,3,4,0.5,inlier,0,0,1,2,x,0,0,0,1,,,,,,,", "x is not a finite number"},
        {"1,2,3,4,0.5,inlier,0,0,1,2,3,0,0,0,2,,,,,,,", "the quaternion's norm is 2"},
        {"1,2,3,4,0.5,inlier,0,0,1,2,3,0,0,0,1,1,1,1,1,,1,", " is not a finite number"}}));
-  CHECK_THROWS_WITH(read_closures(folder.write("c.csv", kHeader + row + '\n')),
-                    Catch::Contains(problem));
-  CHECK_THROWS_WITH(read_keyframes(folder.path() / "none.csv"), Catch::EndsWith("no such file"));
+  CHECK_THROWS_WITH(read_closures(folder.write("c.csv", kHeader + row + '\n')), Contains(problem));
+  CHECK_THROWS_WITH(read_keyframes(folder.path() / "none.csv"), EndsWith("no such file"));
   CHECK(read_closures(folder.write("empty.csv", kHeader)).empty());
 }
 

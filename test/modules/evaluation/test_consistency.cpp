@@ -1,6 +1,4 @@
 #include <Eigen/Cholesky>
-#include <catch2/catch.hpp>
-#include <random>
 
 #include "modules/core/covariance.hpp"
 #include "modules/core/lie.hpp"
@@ -8,6 +6,7 @@
 #include "modules/evaluation/trajectory_file.hpp"
 #include "test/support/random_pose.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,5 +1,3 @@
-#include <catch2/catch.hpp>
-#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "modules/core/input_file.hpp"
@@ -8,6 +6,7 @@
 #include "modules/evaluation/trajectory_error.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
 #include "test/support/corrupted_input.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

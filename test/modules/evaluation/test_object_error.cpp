@@ -1,6 +1,5 @@
-#include <catch2/catch.hpp>
-
 #include "modules/evaluation/objects/object_error.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,10 +1,4 @@
-#include <catch2/catch.hpp>
-#include <limits>
 #include <nlohmann/json.hpp>
-#include <numbers>
-#include <random>
-#include <stdexcept>
-#include <vector>
 
 #include "modules/core/lie.hpp"
 #include "modules/core/stamped_pose.hpp"
@@ -14,6 +8,7 @@
 #include "test/support/page_text.hpp"
 #include "test/support/random_pose.hpp"
 #include "test/support/shared_data.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -143,7 +138,7 @@ TEST_CASE("Trajectories that cannot be compared are refused by name", "[evaluati
   const auto truth = sample(0.0, 10.0, 100, curve);
   const auto elsewhere = sample(100.0, 10.0, 100, curve);
   CHECK_THROWS_WITH(error_of(truth, elsewhere),
-                    Catch::StartsWith("robot: only 0 of its 100 poses fall on the truth's time"));
+                    StartsWith("robot: only 0 of its 100 poses fall on the truth's time"));
   const std::vector<TrajectoryInput> late = {{"late", truth, elsewhere, std::nullopt}};
   CHECK_THROWS_WITH(align_surroundings(late),
                     "late: none of its 100 poses falls on the truth's time");
@@ -152,7 +147,7 @@ TEST_CASE("Trajectories that cannot be compared are refused by name", "[evaluati
   CHECK_THROWS_AS(error_of({}, truth), std::invalid_argument);
   CHECK_THROWS_AS(trajectory_error({}), std::invalid_argument);
   const auto still = sample(0.0, 10.0, 100, [](double) { return SE3::Identity(); });
-  CHECK_THROWS_WITH(scale_of(truth, still), Catch::Contains("do not vary"));
+  CHECK_THROWS_WITH(scale_of(truth, still), Contains("do not vary"));
   CHECK(error_of(truth, still).joint.position_m.rmse > 0.1);
 }
 
@@ -244,7 +239,7 @@ TEST_CASE("Missing relative errors are not perfect errors", "[evaluation]") {
   CHECK(occurrences(to_table(error_of(longer, longer)), "no two compared poses") == 0);
   const std::string text = json_text(none.joint);
   CHECK(occurrences(text, ": null") == 8);  // four figures of translation, four of rotation
-  CHECK_THAT(text, !Catch::Contains("nan"));
+  CHECK_THAT(text, !Contains("nan"));
 }
 
 constexpr TimeWindow kAlways = {std::numeric_limits<Stamp>::min(),

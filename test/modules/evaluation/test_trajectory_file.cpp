@@ -1,10 +1,8 @@
 #include "modules/evaluation/trajectory_file.hpp"
 
-#include <catch2/catch.hpp>
-#include <string>
-
 #include "test/support/shared_data.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 
@@ -43,11 +41,11 @@ TEST_CASE("An impossible trajectory is refused with file and line", "[evaluation
       Case{"two 0 0 0 0 0 0 1\n", "poses.txt line 3: two is not a stamp in seconds"},
       Case{"0.5 0 0 0 0 0 0 1\n", "poses.txt line 3: the stamp is before the last one"});
   CAPTURE(c.text);
-  CHECK_THROWS_WITH(parse_trajectory(good + c.text, "poses.txt"), Catch::Contains(c.message));
+  CHECK_THROWS_WITH(parse_trajectory(good + c.text, "poses.txt"), Contains(c.message));
   CHECK_THROWS_WITH(parse_trajectory("1.5,0,0,0,1,0,0,0\n", "p"),
-                    Catch::Contains("p line 1: 1.5 is not a stamp in nanoseconds"));
+                    Contains("p line 1: 1.5 is not a stamp in nanoseconds"));
   CHECK_THROWS_WITH(parse_trajectory("9223372036854775807,0,0,0,1,0,0,0\n", "a.csv"),
-                    Catch::Contains("line 1: 9223372036854775807 is not a stamp"));
+                    Contains("line 1: 9223372036854775807 is not a stamp"));
   CHECK_THROWS_WITH(parse_trajectory("# nothing\n", "p"), "p: holds no pose");
   CHECK_THROWS_WITH(read_trajectory("/nowhere.txt"), "/nowhere.txt: no such file");
 }
@@ -92,7 +90,7 @@ TEST_CASE("Poses of KITTI have their stamps in times.txt, and a bag is no trajec
   const TemporaryFolder folder;
   folder.write("poses/07.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n0 -1 0 4 1 0 0 5 0 0 1 6\n");
   const auto file = folder.path() / "poses/07.txt";
-  CHECK_THROWS_WITH(read_trajectory(file), Catch::Contains("put times.txt beside it"));
+  CHECK_THROWS_WITH(read_trajectory(file), Contains("put times.txt beside it"));
   folder.write("sequences/07/times.txt", "0.0\n1.036e-01\n");
   const auto poses = read_trajectory(file);
   REQUIRE(poses.size() == 2);
@@ -100,7 +98,7 @@ TEST_CASE("Poses of KITTI have their stamps in times.txt, and a bag is no trajec
   CHECK(poses[1].T.translation() == Eigen::Vector3d(4, 5, 6));
   CHECK(poses[1].T.linear().col(0).isApprox(Eigen::Vector3d::UnitY()));
   folder.write("a.bag", "#ROSBAG V2.0\n");
-  CHECK_THROWS_WITH(read_trajectory(folder.path() / "a.bag"), Catch::Contains("is a recording"));
+  CHECK_THROWS_WITH(read_trajectory(folder.path() / "a.bag"), Contains("is a recording"));
 }
 
 }  // namespace km

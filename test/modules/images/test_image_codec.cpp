@@ -1,10 +1,10 @@
-#include <catch2/catch.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include <zlib.h>
 
 #include "test/support/image_file.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,10 +1,6 @@
-#include <catch2/catch.hpp>
-#include <cmath>
-#include <cstdlib>
-#include <numbers>
-
 #include "modules/images/keypoint_extractor.hpp"
 #include "modules/images/keypoint_patches.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,20 +1,12 @@
 #include <sys/resource.h>
 
-#include <catch2/catch.hpp>
-#include <csignal>
-#include <filesystem>
-#include <limits>
-#include <random>
-#include <string>
-#include <system_error>
-#include <vector>
-
 #include "modules/core/input_file.hpp"
 #include "modules/core/robot_identity.hpp"
 #include "modules/journal/journal_file.hpp"
 #include "modules/journal/restored_run.hpp"
 #include "test/support/random_pose.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -102,9 +94,8 @@ std::vector<JournalEntry> some_run() {
   return run;
 }
 
-std::filesystem::path written(const TemporaryFolder& folder,
-                              const std::vector<JournalEntry>& entries) {
-  std::filesystem::path file = folder.path() / "run.journal";
+fs::path written(const TemporaryFolder& folder, const std::vector<JournalEntry>& entries) {
+  fs::path file = folder.path() / "run.journal";
   JournalFile journal(file);
   for (const JournalEntry& entry : entries) journal.add(entry, kTime);
   journal.sync();
@@ -117,7 +108,7 @@ std::vector<std::vector<std::uint8_t>> bytes_of(const std::vector<JournalEntry>&
   return bytes;
 }
 
-std::pair<JournalExtent, std::vector<JournalEntry>> read(const std::filesystem::path& file) {
+std::pair<JournalExtent, std::vector<JournalEntry>> read(const fs::path& file) {
   std::vector<JournalEntry> entries;
   const JournalExtent extent = read_journal(file, [&](StoredEntry stored) {
     CHECK(stored.time == kTime);
@@ -126,7 +117,7 @@ std::pair<JournalExtent, std::vector<JournalEntry>> read(const std::filesystem::
   return {extent, std::move(entries)};
 }
 
-std::vector<JournalPlace> places_in(const std::filesystem::path& file) {
+std::vector<JournalPlace> places_in(const fs::path& file) {
   std::vector<JournalPlace> places;
   (void)read_journal(file, [&](const StoredEntry& stored) { places.push_back(stored.place); });
   return places;
@@ -341,7 +332,7 @@ TEST_CASE("Decisions and the solution are restored as they were last", "[journal
 TEST_CASE("Files that are no journals are refused by name", "[journal]") {
   const TemporaryFolder folder;
   CHECK_THROWS_WITH(restore_run(folder.write("notes.txt", "Dear diary, today...")),
-                    Catch::Contains("notes.txt") && Catch::Contains("no journal"));
+                    Contains("notes.txt") && Contains("no journal"));
   CHECK_THROWS_AS(restore_run(folder.path() / "missing"), InputFileError);
   CHECK(restore_run(folder.write("empty", "")).keyframes.empty());
   CHECK(restore_run(folder.write("begun", "\x7FKMJ")).keyframes.empty());
@@ -350,8 +341,8 @@ TEST_CASE("Files that are no journals are refused by name", "[journal]") {
 TEST_CASE("A continued journal loses its incomplete end and grows", "[journal]") {
   const TemporaryFolder folder;
   const std::vector<JournalEntry> run = some_run();
-  const std::filesystem::path file = written(folder, run);
-  std::filesystem::resize_file(file, std::filesystem::file_size(file) - 3);
+  const fs::path file = written(folder, run);
+  fs::resize_file(file, fs::file_size(file) - 3);
   const auto [extent, entries] = read(file);
   REQUIRE(entries.size() == run.size() - 1);
   {
@@ -371,13 +362,13 @@ TEST_CASE("A continued journal loses its incomplete end and grows", "[journal]")
 TEST_CASE("An entry can be read at the place that add() returned", "[journal]") {
   const TemporaryFolder folder;
   const std::vector<JournalEntry> run = some_run();
-  const std::filesystem::path file = written(folder, run);
+  const fs::path file = written(folder, run);
   std::vector<JournalPlace> places;
   const JournalExtent extent =
       read_journal(file, [&](const StoredEntry& stored) { places.push_back(stored.place); });
   JournalFile again(file, extent);
   for (const JournalEntry& entry : run) places.push_back(again.add(entry, kTime).value());
-  CHECK_THROWS_WITH(read_journal_entry(file, places.back()), Catch::Contains("run.journal"));
+  CHECK_THROWS_WITH(read_journal_entry(file, places.back()), Contains("run.journal"));
   again.sync();
   for (std::size_t i = 0; i < places.size(); ++i)
     CHECK(encode_journal_entry(read_journal_entry(file, places[i])) ==
@@ -394,7 +385,7 @@ TEST_CASE("An entry can be read at the place that add() returned", "[journal]") 
 
 TEST_CASE("A disk that is full for a while loses no entry", "[journal]") {
   const TemporaryFolder folder;
-  const std::filesystem::path file = folder.path() / "run.journal";
+  const fs::path file = folder.path() / "run.journal";
   const auto before = std::signal(SIGXFSZ, SIG_IGN);
   rlimit limit{};
   REQUIRE(getrlimit(RLIMIT_FSIZE, &limit) == 0);
@@ -405,9 +396,9 @@ TEST_CASE("A disk that is full for a while loses no entry", "[journal]") {
     const rlimit small{1000, limit.rlim_max};
     REQUIRE(setrlimit(RLIMIT_FSIZE, &small) == 0);
     CHECK_THROWS_AS(journal.sync(), std::system_error);
-    CHECK_THROWS_WITH(journal.sync(), Catch::Contains("run.journal"));
+    CHECK_THROWS_WITH(journal.sync(), Contains("run.journal"));
     REQUIRE(setrlimit(RLIMIT_FSIZE, &limit) == 0);
-    CHECK(std::filesystem::file_size(file) <= 1000);
+    CHECK(fs::file_size(file) <= 1000);
     journal.sync();
     CHECK(journal.is_whole());
   }
@@ -499,15 +490,14 @@ TEST_CASE("Contradicting journal entries are named", "[journal]") {
   const TemporaryFolder folder;
   std::mt19937 rng(8);
   const JournalStart start{kRobot, 1, "x"};
-  const auto message = Catch::Contains("run.journal: entry 2");
+  const auto message = Contains("run.journal: entry 2");
   CHECK_THROWS_WITH(restore_run(written(folder, {start, step(1, rng)})), message);
   CHECK_THROWS_WITH(restore_run(written(folder, {start, features(3, rng)})), message);
   CHECK_THROWS_WITH(restore_run(written(folder, {start, JournalStart{kRobot + 1, 1, "x"}})),
                     message);
-  CHECK_THROWS_WITH(restore_run(written(folder, {step(0, rng)})),
-                    Catch::Contains("run.journal: entry 1"));
+  CHECK_THROWS_WITH(restore_run(written(folder, {step(0, rng)})), Contains("run.journal: entry 1"));
   CHECK_THROWS_WITH(restore_run(written(folder, {start, state(5, rng), state(5, rng)})),
-                    Catch::Contains("run.journal: entry 3"));
+                    Contains("run.journal: entry 3"));
 }
 
 }  // namespace

@@ -1,9 +1,6 @@
 #include "modules/link_emulation/link_emulator.hpp"
 
-#include <catch2/catch.hpp>
-#include <cmath>
-#include <set>
-#include <string>
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,13 +1,7 @@
 #include "modules/link_emulation/link_trace.hpp"
 
-#include <catch2/catch.hpp>
-#include <cmath>
-#include <limits>
-#include <random>
-#include <stdexcept>
-#include <string>
-
 #include "test/support/corrupted_input.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

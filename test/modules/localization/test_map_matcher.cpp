@@ -1,10 +1,10 @@
 #include "modules/localization/map_matcher.hpp"
 
 #include <Eigen/LU>
-#include <catch2/catch.hpp>
 
 #include "modules/place_recognition/vocabulary_training.hpp"
 #include "test/modules/loop_closure/synthetic_keyframes.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,12 +1,7 @@
-#include <algorithm>
-#include <catch2/catch.hpp>
-#include <cmath>
-#include <memory>
-#include <random>
-
 #include "modules/images/keypoint_extractor.hpp"
 #include "modules/loop_closure/epipolar_matcher.hpp"
 #include "modules/loop_closure/keyframe_features.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

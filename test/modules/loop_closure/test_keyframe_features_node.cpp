@@ -1,8 +1,7 @@
-#include <catch2/catch.hpp>
-
 #include "modules/loop_closure/node/keyframe_features_node.hpp"
 #include "test/support/onnx_model.hpp"
 #include "test/support/random_pose.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,7 +1,6 @@
-#include <catch2/catch.hpp>
-
 #include "modules/loop_closure/matching.hpp"
 #include "test/modules/loop_closure/loop_closure_robots.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

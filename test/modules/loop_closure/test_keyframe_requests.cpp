@@ -1,6 +1,5 @@
-#include <catch2/catch.hpp>
-
 #include "modules/loop_closure/keyframe_requests.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,15 +1,10 @@
-#include <catch2/catch.hpp>
-#include <cmath>
-#include <cstdlib>
-#include <string>
-#include <vector>
-
 #include "modules/core/config.hpp"
 #include "modules/images/keypoint_patches.hpp"
 #include "modules/loop_closure/keypoint_describer.hpp"
 #include "modules/loop_closure/matching.hpp"
 #include "test/support/onnx_model.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -79,9 +74,8 @@ TEST_CASE("A network of another input or output is refused with its file and the
       std::pair<std::string, std::string>{first_sample(96).onnx(), "not 24 each"},
       std::pair<std::string, std::string>{"no network", "cannot be run as ONNX"});
   const auto file = folder.write("other.onnx", content);
-  CHECK_THROWS_WITH(KeypointDescriber(file), Catch::Contains(reason) &&
-                                                 Catch::Contains(file.string()) &&
-                                                 Catch::Contains("keyframe_features.network"));
+  CHECK_THROWS_WITH(KeypointDescriber(file), Contains(reason) && Contains(file.string()) &&
+                                                 Contains("keyframe_features.network"));
 }
 
 TEST_CASE("The shipped network gives the numbers of its training", "[keypoint_describer]") {

@@ -1,10 +1,7 @@
-#include <catch2/catch.hpp>
-
-#include <cmath>
-
 #include "modules/loop_closure/node/loop_closure_codec.hpp"
 #include "test/support/corrupted_message.hpp"
 #include "test/support/random_pose.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

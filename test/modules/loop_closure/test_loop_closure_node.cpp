@@ -1,7 +1,6 @@
-#include <catch2/catch.hpp>
-
 #include "modules/loop_closure/keyframe_features.hpp"
 #include "test/modules/loop_closure/loop_closure_robots.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -231,7 +230,7 @@ TEST_CASE("a closure inside a robot must be more certain than one between robots
   robot.give(inside.peer);
   robot.give(inside.candidate());
   CHECK(robot.closures.empty());
-  CHECK_THAT(robot.reports.back().reason, Catch::Contains("depends on a few inliers"));
+  CHECK_THAT(robot.reports.back().reason, Contains("depends on a few inliers"));
 
   Scene between = inside;
   between.peer.odometry.id = {kPeer, 5};

@@ -1,12 +1,9 @@
-#include <algorithm>
-#include <array>
 #include <bit>
-#include <catch2/catch.hpp>
-#include <cmath>
 
 #include "modules/loop_closure/keyframe_features.hpp"
 #include "modules/loop_closure/matching.hpp"
 #include "test/modules/loop_closure/synthetic_keyframes.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,10 +1,7 @@
-#include <catch2/catch.hpp>
-#include <cmath>
-#include <limits>
-
 #include "modules/loop_closure/matching.hpp"
 #include "modules/loop_closure/packed_keypoints.hpp"
 #include "test/modules/loop_closure/synthetic_keyframes.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

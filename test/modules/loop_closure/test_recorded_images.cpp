@@ -1,7 +1,4 @@
 #include <Eigen/LU>
-#include <algorithm>
-#include <catch2/catch.hpp>
-#include <numbers>
 
 #include "modules/core/lie.hpp"
 #include "modules/evaluation/association.hpp"
@@ -13,6 +10,7 @@
 #include "test/support/random_pose.hpp"
 #include "test/support/recorded_kitchen.hpp"
 #include "test/support/shared_data.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -27,7 +25,7 @@ struct RecordedKeyframe {
 };
 
 // Every second of the 100 stereo keyframes of EuRoC V1_01_easy.
-std::vector<RecordedKeyframe> load_v1_01(const std::filesystem::path& sequence) {
+std::vector<RecordedKeyframe> load_v1_01(const fs::path& sequence) {
   const SensorRig rig = read_euroc_rig(sequence / "mav0");
   KeyframeFeatureExtractor extractor(rig.stereo, {});
   const auto truth = read_trajectory(sequence / "mav0/state_groundtruth_estimate0");

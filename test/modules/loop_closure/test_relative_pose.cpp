@@ -1,14 +1,10 @@
-#include <algorithm>
-#include <catch2/catch.hpp>
-#include <numeric>
-#include <random>
-
 #include "modules/core/lie.hpp"
 #include "modules/core/symmetric_eigen.hpp"
 #include "modules/loop_closure/keyframe_features.hpp"
 #include "modules/loop_closure/relative_pose.hpp"
 #include "test/modules/loop_closure/synthetic_keyframes.hpp"
 #include "test/support/random_pose.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

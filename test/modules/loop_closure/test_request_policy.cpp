@@ -1,10 +1,6 @@
-#include <algorithm>
-#include <catch2/catch.hpp>
-#include <cmath>
-#include <random>
-
 #include "modules/loop_closure/closure_odds.hpp"
 #include "modules/loop_closure/request_policy.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

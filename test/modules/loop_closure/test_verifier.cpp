@@ -1,10 +1,9 @@
 #include <Eigen/LU>
-#include <catch2/catch.hpp>
-#include <cmath>
 
 #include "modules/core/covariance.hpp"
 #include "modules/loop_closure/verifier.hpp"
 #include "test/modules/loop_closure/synthetic_keyframes.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

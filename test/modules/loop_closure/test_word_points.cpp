@@ -1,10 +1,8 @@
-#include <catch2/catch.hpp>
-#include <vector>
-
 #include "modules/loop_closure/peer_words.hpp"
 #include "modules/loop_closure/word_points.hpp"
 #include "test/modules/loop_closure/synthetic_keyframes.hpp"
 #include "test/modules/place_recognition/toy_vocabulary.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

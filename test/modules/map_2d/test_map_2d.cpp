@@ -1,18 +1,12 @@
 #include <yaml-cpp/yaml.h>
 #include <Eigen/Geometry>
-#include <algorithm>
-#include <array>
-#include <catch2/catch.hpp>
-#include <map>
-#include <set>
-#include <utility>
-#include <vector>
 
 #include "modules/map_2d/map_2d.hpp"
 #include "modules/map_2d/map_server_files.hpp"
 #include "modules/map_2d/node/map_2d_node.hpp"
 #include "test/modules/map_2d/surfaces.hpp"
 #include "test/support/nav2_map.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,14 +1,6 @@
-#include <algorithm>
-#include <array>
-#include <catch2/catch.hpp>
-#include <cstdint>
-#include <random>
-#include <set>
-#include <utility>
-#include <vector>
-
 #include "modules/mesh/chunk_packing.hpp"
 #include "test/modules/mesh/wavy_sheet.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,15 +1,9 @@
-#include <algorithm>
-#include <array>
-#include <catch2/catch.hpp>
-#include <cmath>
-#include <stdexcept>
-#include <vector>
-
 #include "modules/core/lie.hpp"
 #include "modules/mesh/chunk_placement.hpp"
 #include "modules/mesh/mesh_chunks.hpp"
 #include "modules/mesh/mesh_poses.hpp"
 #include "test/modules/mesh/wavy_sheet.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

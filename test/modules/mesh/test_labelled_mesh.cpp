@@ -1,14 +1,10 @@
-#include <catch2/catch.hpp>
-#include <filesystem>
-#include <string>
-#include <system_error>
-
 #include "modules/core/input_file.hpp"
 #include "modules/mesh/labelled_mesh.hpp"
 #include "modules/mesh/mesh_file.hpp"
 #include "test/support/corrupted_input.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -34,9 +30,7 @@ TEST_CASE("Appending keeps faces on their vertices and fills the arrays that one
   CHECK(mesh.colors[3] == LabelledMesh::Color{1, 2, 3});
 }
 
-using Catch::Contains;
-
-std::filesystem::path write_text(const TemporaryFolder& folder, const std::string& text) {
+fs::path write_text(const TemporaryFolder& folder, const std::string& text) {
   return folder.write("mesh.ply", text);
 }
 
@@ -113,10 +107,10 @@ TEST_CASE("A mesh that cannot be written leaves no file") {
   const TemporaryFolder folder;
   CHECK_THROWS_AS(write_mesh(folder.path() / "none" / "a.ply", {}), std::system_error);
   CHECK_THROWS_WITH(write_mesh(folder.path() / "mesh.xyz", {}), Contains("is not .ply"));
-  CHECK_FALSE(std::filesystem::exists(folder.path() / "mesh.xyz"));
-  std::filesystem::create_directory(folder.path() / "taken.ply");
+  CHECK_FALSE(fs::exists(folder.path() / "mesh.xyz"));
+  fs::create_directory(folder.path() / "taken.ply");
   CHECK_THROWS_AS(write_mesh(folder.path() / "taken.ply", {}), std::system_error);
-  CHECK_FALSE(std::filesystem::exists(folder.path() / "taken.ply.part"));
+  CHECK_FALSE(fs::exists(folder.path() / "taken.ply.part"));
 }
 
 const std::string kAscii =

@@ -1,23 +1,12 @@
-#include <algorithm>
-#include <catch2/catch.hpp>
-#include <limits>
-#include <map>
-#include <random>
-#include <set>
-#include <stdexcept>
-#include <tuple>
-#include <vector>
-
 #include "modules/mesh/chunk_placement.hpp"
 #include "modules/mesh/chunk_schedule.hpp"
 #include "modules/mesh/mesh_chunks.hpp"
 #include "test/modules/mesh/assembled_mesh.hpp"
 #include "test/modules/mesh/wavy_sheet.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
-
-using Catch::Contains;
 
 constexpr ChunkGrid kGrid{.cell_m = 2.0, .step_m = 0.001};
 

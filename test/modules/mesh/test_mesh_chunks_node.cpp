@@ -1,13 +1,3 @@
-#include <algorithm>
-#include <array>
-#include <catch2/catch.hpp>
-#include <cstdint>
-#include <functional>
-#include <limits>
-#include <memory>
-#include <utility>
-#include <vector>
-
 #include "modules/core/lie.hpp"
 #include "modules/mesh/chunk_packing.hpp"
 #include "modules/mesh/mesh_chunks.hpp"
@@ -18,6 +8,7 @@
 #include "test/modules/mesh/wavy_sheet.hpp"
 #include "test/runtime/dds/dds_fixture.hpp"
 #include "test/support/corrupted_message.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

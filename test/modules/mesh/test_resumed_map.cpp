@@ -1,10 +1,8 @@
-#include <catch2/catch.hpp>
-#include <string>
-
 #include "modules/core/input_file.hpp"
 #include "modules/mesh/map_file.hpp"
 #include "modules/mesh/resumed_map.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -55,7 +53,7 @@ TEST_CASE("A map file that is truncated or corrupted is refused by name", "[map_
   const std::string bytes = folder.read("run.map");
   const auto refused = [&](const std::string& text) {
     CHECK_THROWS_WITH(read_map_file(folder.write("corrupted.map", text)),
-                      Catch::Contains("corrupted.map"));
+                      Contains("corrupted.map"));
   };
   for (std::size_t size = 0; size < bytes.size(); ++size) refused(bytes.substr(0, size));
   for (std::size_t at = 0; at < bytes.size(); ++at) {
@@ -72,7 +70,7 @@ TEST_CASE("A map file with faces of missing vertices is refused", "[map_file]") 
   MapMesh map = strip(3, 0.0F, 0);
   map.mesh.faces[1][2] = 5;
   write_map_file(folder.path() / "run.map", map);
-  CHECK_THROWS_WITH(read_map_file(folder.path() / "run.map"), Catch::Contains("is not whole"));
+  CHECK_THROWS_WITH(read_map_file(folder.path() / "run.map"), Contains("is not whole"));
   map = strip(3, 0.0F, 0);
   map.ids[2] = map.ids[1];
   write_map_file(folder.path() / "run.map", map);

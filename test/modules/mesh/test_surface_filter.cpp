@@ -1,9 +1,5 @@
-#include <algorithm>
-#include <catch2/catch.hpp>
-#include <cmath>
-#include <random>
-
 #include "modules/mesh/surface_filter.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,11 +1,8 @@
-#include <catch2/catch.hpp>
-#include <random>
-#include <vector>
-
 #include "modules/core/lie.hpp"
 #include "modules/mesh_deformation/deformation_graph.hpp"
 #include "test/support/numeric_jacobian.hpp"
 #include "test/support/random_pose.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

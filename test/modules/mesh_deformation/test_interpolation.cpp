@@ -1,10 +1,6 @@
-#include <algorithm>
-#include <catch2/catch.hpp>
-#include <random>
-#include <vector>
-
 #include "modules/mesh_deformation/interpolation.hpp"
 #include "test/support/random_pose.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

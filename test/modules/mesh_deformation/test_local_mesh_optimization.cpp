@@ -1,19 +1,10 @@
-#include <algorithm>
-#include <catch2/catch.hpp>
-#include <limits>
-#include <random>
-#include <stdexcept>
-#include <string>
-#include <vector>
-
 #include "modules/mesh_deformation/local_mesh_optimization.hpp"
 #include "test/modules/mesh_deformation/corridor.hpp"
 #include "test/support/random_pose.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
-
-using Catch::Contains;
 
 constexpr double kSame = 1e-6;  // [m]; some roundings of floats below 10 m
 

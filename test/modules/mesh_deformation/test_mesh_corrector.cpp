@@ -1,10 +1,7 @@
-#include <catch2/catch.hpp>
-#include <random>
-#include <vector>
-
 #include "modules/mesh_deformation/mesh_corrector.hpp"
 #include "test/modules/mesh_deformation/corridor.hpp"
 #include "test/support/random_pose.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,14 +1,9 @@
-#include <catch2/catch.hpp>
-#include <chrono>
-#include <memory>
-#include <thread>
-#include <vector>
-
 #include "modules/mesh_deformation/node/mesh_deformation_node.hpp"
 #include "runtime/clock.hpp"
 #include "test/modules/mesh_deformation/corridor.hpp"
 #include "test/support/captured_log.hpp"
 #include "test/support/inbox.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -161,7 +156,7 @@ TEST_CASE("A last map that cannot be corrected is reported", "[node]") {
   node.step(robot.map, 0.0);
   const CapturedLog log;
   node.step(kEnd, 0.0);
-  CHECK_THAT(log.text(), Catch::Contains("the last map is not corrected"));
+  CHECK_THAT(log.text(), Contains("the last map is not corrected"));
   CHECK(robot.results().empty());
 }
 

@@ -1,14 +1,8 @@
-#include <catch2/catch.hpp>
-#include <cstddef>
-#include <numbers>
-#include <set>
-#include <tuple>
-#include <vector>
-
 #include "modules/core/lie.hpp"
 #include "modules/mesh_deformation/mesh_corrector.hpp"
 #include "modules/semantic_mapping/semantic_mapper.hpp"
 #include "test/modules/semantic_mapping/wall_scene.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

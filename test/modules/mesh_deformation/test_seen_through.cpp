@@ -1,11 +1,7 @@
-#include <algorithm>
-#include <catch2/catch.hpp>
-#include <limits>
-#include <vector>
-
 #include "modules/mesh/seen_through.hpp"
 #include "modules/mesh_deformation/mesh_corrector.hpp"
 #include "test/modules/semantic_mapping/wall_scene.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

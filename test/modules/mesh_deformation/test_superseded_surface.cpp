@@ -1,11 +1,6 @@
-#include <algorithm>
-#include <catch2/catch.hpp>
-#include <cmath>
-#include <random>
-#include <vector>
-
 #include "modules/mesh_deformation/superseded_surface.hpp"
 #include "test/modules/mesh_deformation/corridor.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

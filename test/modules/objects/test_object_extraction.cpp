@@ -1,8 +1,6 @@
-#include <catch2/catch.hpp>
-#include <random>
-
 #include "modules/objects/object_extraction.hpp"
 #include "test/modules/objects/box_mesh.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,10 +1,8 @@
-#include <catch2/catch.hpp>
-#include <random>
-
 #include "modules/core/write_file.hpp"
 #include "modules/objects/object_box.hpp"
 #include "modules/objects/object_file.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -38,7 +36,7 @@ TEST_CASE("Objects with an unusable entry are refused with its place", "[objects
   const auto refuses = [&](const auto& read, const std::string& text, const std::string& place) {
     CAPTURE(text);
     const auto file = folder.write("objects.json", text);
-    CHECK_THROWS_WITH(read(file), Catch::Contains(file.string() + place));
+    CHECK_THROWS_WITH(read(file), Contains(file.string() + place));
   };
   const std::string box = R"(, "center_m": [0, 0, 0], "yaw_rad": 0, "size_m": [1, 1, 1]}]})";
   for (const char* entry : {R"("label": 256, "robots": [])", R"("label": -1, "robots": [])",

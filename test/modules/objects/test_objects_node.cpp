@@ -1,14 +1,10 @@
-#include <catch2/catch.hpp>
-#include <limits>
-#include <memory>
-#include <vector>
-
 #include "modules/objects/node/objects_codec.hpp"
 #include "modules/objects/node/objects_node.hpp"
 #include "test/modules/objects/box_mesh.hpp"
 #include "test/runtime/dds/dds_fixture.hpp"
 #include "test/support/captured_log.hpp"
 #include "test/support/corrupted_message.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -114,7 +110,7 @@ TEST_CASE("Objects of other robots join those of this one, but not in its name",
   node.step(std::make_shared<const RobotObjects>(received), 3.0);
   node.step({}, 4.0);
   CHECK(joint.messages().back().objects.size() == 2);
-  CHECK_THAT(log.text(), Catch::Contains("objects of robot 4 are ignored"));
+  CHECK_THAT(log.text(), Contains("objects of robot 4 are ignored"));
   const auto last = node.finish(*poses(4));
   REQUIRE(last);
   CHECK(last->objects.size() == 2);

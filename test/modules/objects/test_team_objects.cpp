@@ -1,9 +1,7 @@
-#include <catch2/catch.hpp>
-#include <random>
-
 #include "modules/objects/object_merging.hpp"
 #include "modules/objects/team_objects.hpp"
 #include "test/modules/objects/box_mesh.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

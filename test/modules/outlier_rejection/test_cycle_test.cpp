@@ -1,5 +1,4 @@
-#include <catch2/catch.hpp>
-
+#include "test/support/test.hpp"
 #include "modules/outlier_rejection/chi_squared.hpp"
 #include "modules/outlier_rejection/cycle_test.hpp"
 #include "test/modules/outlier_rejection/chain.hpp"

@@ -1,8 +1,4 @@
-#include <algorithm>
-#include <catch2/catch.hpp>
-#include <random>
-#include <vector>
-
+#include "test/support/test.hpp"
 #include "modules/outlier_rejection/local_contest.hpp"
 #include "modules/outlier_rejection/witnessed_pair.hpp"
 #include "test/modules/outlier_rejection/chain.hpp"

@@ -1,14 +1,10 @@
-#include <algorithm>
 #include <bit>
-#include <catch2/catch.hpp>
-#include <numeric>
-#include <random>
-#include <vector>
 
 #include "modules/outlier_rejection/clique_search.hpp"
 #include "modules/outlier_rejection/max_clique.hpp"
 #include "test/modules/outlier_rejection/random_graph.hpp"
 #include "test/support/shared_data.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -113,8 +109,8 @@ TEST_CASE("A clique as large as the bound is proven again", "[clique]") {
 TEST_CASE("Invalid neighbours are refused and change nothing", "[clique]") {
   MaxClique clique(kNoLimit);
   clique.add({});
-  CHECK_THROWS_WITH(clique.add(std::vector<std::size_t>{1}), Catch::Contains("1 does not exist"));
-  CHECK_THROWS_WITH(clique.add(std::vector<std::size_t>{0, 0}), Catch::Contains("given twice"));
+  CHECK_THROWS_WITH(clique.add(std::vector<std::size_t>{1}), Contains("1 does not exist"));
+  CHECK_THROWS_WITH(clique.add(std::vector<std::size_t>{0, 0}), Contains("given twice"));
   CHECK(clique.size() == 1);
   CHECK(clique.add(std::vector<std::size_t>{0}));
 }

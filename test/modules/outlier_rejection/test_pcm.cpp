@@ -1,10 +1,6 @@
-#include <catch2/catch.hpp>
-
-#include <algorithm>
-#include <cmath>
-
 #include "modules/outlier_rejection/pcm.hpp"
 #include "test/modules/outlier_rejection/chain.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,14 +1,9 @@
-#include <algorithm>
-#include <catch2/catch.hpp>
-#include <random>
-#include <string>
-#include <vector>
-
 #include "modules/outlier_rejection/node/outlier_rejection_codec.hpp"
 #include "modules/outlier_rejection/node/pcm_node.hpp"
 #include "test/modules/outlier_rejection/chain.hpp"
 #include "test/support/captured_log.hpp"
 #include "test/support/corrupted_message.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -140,7 +135,7 @@ TEST_CASE("Robots joined by one place wait for a second one, and it is said", "[
   CHECK(log.text().empty());
   team.keyframe_at(1030.0);
   CHECK(team.publish() == Sizes{2});
-  CHECK_THAT(log.text(), Catch::Contains("robots 2 5: joined by one place only"));
+  CHECK_THAT(log.text(), Contains("robots 2 5: joined by one place only"));
   team.give({closures[2]});
   CHECK(team.publish() == Sizes{3});  // the wait is over permanently
 }
@@ -157,9 +152,8 @@ TEST_CASE("Weak closures at one place join two robots only if one at another pla
   team.node.expect_no_more();
   CHECK(team.publish().empty());
   CHECK(team.publish().empty());
-  CHECK_THAT(log.text(),
-             Catch::Contains("not joined: at their best place closures have 140 inliers "
-                             "of pcm.min_lone_support 150"));
+  CHECK_THAT(log.text(), Contains("not joined: at their best place closures have 140 inliers "
+                                  "of pcm.min_lone_support 150"));
   if (is_strong) closures[2].inliers = 10;  // a neighbour, too
   team.give({closures[is_strong ? 2 : 9]});
   CHECK(team.publish() == Sizes{3});
@@ -187,7 +181,7 @@ TEST_CASE("At the end of all runs no pair waits for a witness", "[node]") {
   CHECK(team.publish().empty());
   team.node.expect_no_more();
   CHECK(team.publish() == Sizes{1});
-  CHECK_THAT(log.text(), Catch::Contains("no other place has agreed within 2 s"));
+  CHECK_THAT(log.text(), Contains("no other place has agreed within 2 s"));
 }
 
 TEST_CASE("Closures inside the robot need no witness", "[node]") {

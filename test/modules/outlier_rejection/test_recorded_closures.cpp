@@ -1,24 +1,16 @@
-#include <algorithm>
-#include <catch2/catch.hpp>
-#include <filesystem>
-#include <map>
-#include <set>
-#include <string>
-#include <utility>
-#include <vector>
-
 #include "modules/outlier_rejection/pcm.hpp"
 #include "modules/outlier_rejection/witnessed_pair.hpp"
 #include "modules/recorded_graph/recorded_graph.hpp"
 #include "runtime/config_layers.hpp"
 #include "test/support/shared_data.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
 
 // Every closure in the given files of one team, in the order in which robots that drive at the
 // same pace would meet them.
-std::vector<Closure> recorded_closures(const std::vector<std::filesystem::path>& files) {
+std::vector<Closure> recorded_closures(const std::vector<fs::path>& files) {
   std::map<RobotId, std::vector<OdometryPose>> poses;
   std::vector<RelativePose> edges;
   for (const auto& file : files) {
@@ -57,9 +49,8 @@ std::map<RobotPair, Pcm> reject_outliers(const std::vector<Closure>& closures,
 }
 
 // The files <prefix>0<suffix> ... of a team; empty if they are not there.
-std::vector<std::filesystem::path> team(const std::string& prefix, int robots,
-                                        const std::string& suffix) {
-  std::vector<std::filesystem::path> files;
+std::vector<fs::path> team(const std::string& prefix, int robots, const std::string& suffix) {
+  std::vector<fs::path> files;
   for (int robot = 0; robot < robots; ++robot) {
     const auto file = shared_data(prefix + std::to_string(robot) + suffix);
     if (!file) return {};

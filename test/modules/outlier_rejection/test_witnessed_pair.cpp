@@ -1,10 +1,6 @@
-#include <catch2/catch.hpp>
-
-#include <algorithm>
-#include <set>
-
 #include "modules/outlier_rejection/witnessed_pair.hpp"
 #include "test/modules/outlier_rejection/chain.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,17 +1,10 @@
-#include <algorithm>
-#include <catch2/catch.hpp>
-#include <cmath>
-#include <map>
-#include <random>
-
 #include "modules/place_recognition/bow_database.hpp"
 #include "modules/place_recognition/place_database.hpp"
 #include "test/modules/place_recognition/toy_vocabulary.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
-
-using Catch::Contains;
 
 constexpr double kScoreTolerance = 1e-5;  // sums of up to 40 floats below 1
 

@@ -1,8 +1,6 @@
 #include "modules/place_recognition/known_places.hpp"
 
-#include <catch2/catch.hpp>
-#include <cmath>
-#include <vector>
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,14 +1,9 @@
-#include <catch2/catch.hpp>
-#include <cmath>
-#include <random>
-#include <set>
-#include <utility>
-
 #include "modules/place_recognition/node/place_recognition_codec.hpp"
 #include "modules/place_recognition/node/place_recognition_node.hpp"
 #include "modules/place_recognition/packed_bits.hpp"
 #include "test/modules/place_recognition/toy_vocabulary.hpp"
 #include "test/support/corrupted_message.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,15 +1,4 @@
-#include <algorithm>
-#include <array>
 #include <bit>
-#include <catch2/catch.hpp>
-#include <cmath>
-#include <cstring>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
-#include <random>
-#include <set>
-#include <string>
 
 #include "modules/images/image_codec.hpp"
 #include "modules/images/keypoint_extractor.hpp"
@@ -19,11 +8,10 @@
 #include "test/support/command.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
-
-using Catch::Contains;
 
 using Images = std::vector<std::vector<BinaryDescriptor>>;
 
@@ -265,12 +253,12 @@ TEST_CASE("A missing file is named", "[place_recognition]") {
 TEST_CASE("The shipped vocabulary loads, is the documented one, and is small",
           "[place_recognition]") {
   constexpr std::size_t kMaxShippedBytes = 1'500'000;
-  const std::filesystem::path file = "config/vocabulary/indoor.kmvoc";
+  const fs::path file = "config/vocabulary/indoor.kmvoc";
   const Vocabulary vocabulary = load_vocabulary(file);
   std::ifstream readme("config/vocabulary/README.md");
   const std::string text(std::istreambuf_iterator<char>(readme), {});
   CHECK_THAT(text, Contains(fingerprint_text(vocabulary.id())));
-  CHECK(std::filesystem::file_size(file) < kMaxShippedBytes);
+  CHECK(fs::file_size(file) < kMaxShippedBytes);
   World world(1);
   const auto image = world.image(100);
   CHECK(score(vocabulary.transform(image), vocabulary.transform(image)) ==

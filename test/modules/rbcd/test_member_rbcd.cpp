@@ -1,11 +1,7 @@
-#include <catch2/catch.hpp>
-
-#include <memory>
-#include <vector>
-
 #include "modules/rbcd/member_rbcd.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/solver_team.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,7 +1,6 @@
-#include <catch2/catch.hpp>
-
 #include "modules/rbcd/quadratic_problem.hpp"
 #include "test/support/pose_graph_problems.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,9 +1,7 @@
-#include <catch2/catch.hpp>
-#include <random>
-
 #include "modules/rbcd/block_cholesky.hpp"
 #include "modules/rbcd/stiefel.hpp"
 #include "test/support/pose_graph_problems.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -135,7 +133,7 @@ TEST_CASE("An indefinite matrix is not factorised", "[rbcd]") {
   Eigen::SparseMatrix<double> A(4, 4);
   A.setIdentity();
   A.coeffRef(2, 2) = -1.0;
-  CHECK_THROWS_WITH(BlockCholesky(A), Catch::Contains("4 rows is not positive definite"));
+  CHECK_THROWS_WITH(BlockCholesky(A), Contains("4 rows is not positive definite"));
 }
 
 }  // namespace

@@ -1,13 +1,9 @@
-#include <catch2/catch.hpp>
-
-#include <random>
-#include <sstream>
-
 #include "modules/core/covariance.hpp"
 #include "modules/core/precision.hpp"
 #include "modules/recorded_graph/g2o_io.hpp"
 #include "test/support/random_pose.hpp"
 #include "test/support/shared_data.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -145,7 +141,7 @@ TEST_CASE("Other priors than verticals are refused with the line and the reason"
   }));
   CAPTURE(lines);
   CHECK_THROWS_WITH(read_graph(kVertex + kOffset + lines + '\n'),
-                    Catch::StartsWith("test.g2o:3: ") && Catch::Contains(reason));
+                    StartsWith("test.g2o:3: ") && Contains(reason));
   const std::string vertical = "EDGE_SE3_PRIOR 0 4" + pose + level;
   CHECK_THROWS_WITH(read_graph(kVertex + kOffset + vertical + vertical),
                     "test.g2o:4: second prior on 0:0");
@@ -162,7 +158,7 @@ TEST_CASE("A vertical that is not a unit vector is not written", "[g2o][vertical
   G2oGraph graph;
   graph.verticals.push_back({{2, 5}, {up, sigma}});
   std::ostringstream out;
-  CHECK_THROWS_WITH(write_g2o(out, graph), Catch::Contains("vertical of 2:5"));
+  CHECK_THROWS_WITH(write_g2o(out, graph), Contains("vertical of 2:5"));
 }
 
 TEST_CASE("2D g2o is lifted to the plane z = 0", "[g2o]") {
@@ -213,7 +209,7 @@ TEST_CASE("A bad g2o file is refused with its line and the reason", "[g2o]") {
   }));
   CAPTURE(line);
   CHECK_THROWS_WITH(read_graph(kVertex + "# comment\n\nFIX 0\n" + line + '\n'),
-                    Catch::StartsWith("test.g2o:5: ") && Catch::Contains(reason));
+                    StartsWith("test.g2o:5: ") && Contains(reason));
 }
 
 TEST_CASE("An edge with indefinite information has the weights of its blocks", "[g2o]") {
@@ -237,7 +233,7 @@ TEST_CASE("An edge with indefinite information has the weights of its blocks", "
 
 TEST_CASE("An empty or missing g2o file is refused", "[g2o]") {
   CHECK_THROWS_WITH(read_graph("# nothing\n"), "test.g2o: no vertex and no edge");
-  CHECK_THROWS_WITH(read_g2o(std::filesystem::path("no/such.g2o")), "no/such.g2o: no such file");
+  CHECK_THROWS_WITH(read_g2o(fs::path("no/such.g2o")), "no/such.g2o: no such file");
 }
 
 TEST_CASE("The public benchmark graphs have the sizes their sources state", "[g2o]") {

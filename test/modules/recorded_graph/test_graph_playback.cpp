@@ -1,12 +1,6 @@
-#include <catch2/catch.hpp>
-
-#include <future>
-#include <limits>
-#include <random>
-#include <vector>
-
 #include "modules/recorded_graph/node/graph_playback_node.hpp"
 #include "test/support/random_pose.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,8 +1,4 @@
-#include <catch2/catch.hpp>
-
 #include <Eigen/LU>
-#include <functional>
-#include <sstream>
 
 #include "modules/core/covariance.hpp"
 #include "modules/recorded_graph/g2o_io.hpp"
@@ -10,11 +6,11 @@
 #include "test/support/corrupted_input.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/small_jrl.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
 
-using Catch::Contains;
 using nlohmann::json;
 
 JrlGraph parsed(const json& document) {

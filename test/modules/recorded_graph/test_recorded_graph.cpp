@@ -1,6 +1,3 @@
-#include <catch2/catch.hpp>
-#include <fstream>
-
 #include "modules/core/covariance.hpp"
 #include "modules/core/measurement_limits.hpp"
 #include "modules/core/precision.hpp"
@@ -9,6 +6,7 @@
 #include "test/support/corrupted_input.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -56,7 +54,7 @@ TEST_CASE("A graph that is not the part of one robot is refused", "[recorded]") 
         "test: must hold the odometry of one robot, has that of 0 1");
   CHECK(refusal({edge({1, 0}, {2, 1})}) == "test: edge 1:0 -> 2:1 does not touch robot 0");
   CHECK(refusal({}) == "accepted");
-  CHECK_THROWS_WITH(make_recorded_graph({}, "test"), Catch::EndsWith("has that of none"));
+  CHECK_THROWS_WITH(make_recorded_graph({}, "test"), EndsWith("has that of none"));
 }
 
 const std::string kHeader =
@@ -94,8 +92,8 @@ TEST_CASE("A bad row is refused with its line and the reason", "[recorded]") {
   }));
   CAPTURE(row);
   CHECK_THROWS_WITH(read(kHeader + "0,0,0,1,0,0,0,1,0,0,0,1,1\n" + row + '\n'),
-                    Catch::StartsWith("test.csv:3: ") && Catch::Contains(reason));
-  CHECK_THROWS_WITH(read("a,b\n"), Catch::StartsWith("test.csv:1: the first line must name"));
+                    StartsWith("test.csv:3: ") && Contains(reason));
+  CHECK_THROWS_WITH(read("a,b\n"), StartsWith("test.csv:1: the first line must name"));
 }
 
 TEST_CASE("The tunnels robots have the poses and edges their source states", "[recorded]") {
@@ -154,9 +152,9 @@ TEST_CASE("The part of a robot contains its verticals", "[recorded][vertical]") 
   const KeyframeId elsewhere = GENERATE(KeyframeId{7, 3}, KeyframeId{8, 0});
   graph.verticals.push_back({elsewhere, second});
   write_g2o(file, graph);
-  CHECK_THROWS_WITH(read_recorded_graph(file),
-                    Catch::EndsWith("7.g2o: the prior on " + to_string(elsewhere) +
-                                    " is on no keyframe of robot 7"));
+  CHECK_THROWS_WITH(
+      read_recorded_graph(file),
+      EndsWith("7.g2o: the prior on " + to_string(elsewhere) + " is on no keyframe of robot 7"));
 }
 
 TEST_CASE("A planar graph has equal weights in space, and a missing step is unknown",
@@ -181,7 +179,7 @@ TEST_CASE("A weight that no robot optimises is refused with its edge", "[recorde
   graph.edges[0].covariance /= information;
   write_g2o(folder.path() / "7.g2o", graph);
   CHECK_THROWS_WITH(read_recorded_graph(folder.path() / "7.g2o"),
-                    Catch::Contains("7.g2o: edge 7:0 -> 7:1 has a variance of"));
+                    Contains("7.g2o: edge 7:0 -> 7:1 has a variance of"));
 }
 
 TEST_CASE("Files that are not the part of one robot are refused with their name", "[recorded]") {
@@ -193,7 +191,7 @@ TEST_CASE("Files that are not the part of one robot are refused with their name"
   }));
   const auto file = shared_data("multi_robot/" + name);
   if (!file) return;
-  CHECK_THROWS_WITH(read_recorded_graph(*file), Catch::Contains(reason));
+  CHECK_THROWS_WITH(read_recorded_graph(*file), Contains(reason));
 }
 
 const std::string kUnitLine = " 1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 1 0 0 1 0 1\n";

@@ -1,18 +1,8 @@
 #pragma once
 
-#include <algorithm>
-#include <catch2/catch.hpp>
-#include <filesystem>
-#include <map>
-#include <memory>
-#include <set>
-#include <stdexcept>
-#include <string>
-#include <utility>
-#include <vector>
-
 #include "modules/recordings/open_bag.hpp"
 #include "modules/recordings/ros_messages.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 
@@ -48,7 +38,7 @@ inline std::vector<TopicMessage> topic_messages_of(BagReader& reader) {
 
 /// An MCAP file with messages of ROS 2, read to its end.
 struct Record {
-  explicit Record(const std::filesystem::path& file)
+  explicit Record(const fs::path& file)
       : reader(open_mcap(file)), messages(topic_messages_of(*reader)) {
     for (const TopicMessage& message : messages) ++counts[message.topic];
   }

@@ -1,9 +1,6 @@
-#include <catch2/catch.hpp>
-
-#include <cmath>
-
 #include "modules/recordings/bag_summary.hpp"
 #include "test/modules/sensors/listed_bag.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,14 +1,10 @@
-#include <catch2/catch.hpp>
-
 #include <bzlib.h>
 #include <lz4frame.h>
 #include <zstd.h>
-#include <algorithm>
-#include <random>
-#include <string>
 
 #include "modules/recordings/chunked_file.hpp"
 #include "test/modules/recordings/bag_contents.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,9 +1,4 @@
-#include <catch2/catch.hpp>
-
 #include <sqlite3.h>
-
-#include <algorithm>
-#include <filesystem>
 
 #include "modules/core/input_file.hpp"
 #include "modules/recordings/open_bag.hpp"
@@ -12,11 +7,10 @@
 #include "test/support/corrupted_input.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
-
-namespace fs = std::filesystem;
 
 constexpr const char* kTables =
     "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL,"
@@ -134,15 +128,15 @@ TEST_CASE("Rows that are no messages are lost with their place", "[recordings]")
 TEST_CASE("A database without the tables is refused and its views are not run", "[recordings]") {
   const TemporaryFolder folder;
   CHECK_THROWS_WITH(open_db3(database_of(folder, "a.db3", "CREATE TABLE other(id INTEGER);")),
-                    Catch::Contains("a.db3: no table topics"));
+                    Contains("a.db3: no table topics"));
   const std::string endless =
       "CREATE TABLE topics(id INTEGER PRIMARY KEY, name, type, serialization_format);"
       "CREATE VIEW messages AS WITH RECURSIVE n(id) AS (SELECT 1 UNION ALL SELECT id FROM n)"
       " SELECT id, 1 AS topic_id, 1 AS timestamp, x'' AS data FROM n;";
   CHECK_THROWS_WITH(open_db3(database_of(folder, "b.db3", endless)),
-                    Catch::Contains("b.db3: no table messages"));
+                    Contains("b.db3: no table messages"));
   CHECK_THROWS_WITH(open_db3(folder.write("c.db3", "SQLite")),
-                    Catch::Contains("c.db3: not a SQLite database"));
+                    Contains("c.db3: not a SQLite database"));
   check_no_files<InputFileError>(".db3", [](const fs::path& path) { (void)open_db3(path); });
 }
 
@@ -170,19 +164,19 @@ TEST_CASE("Several files of a folder are one recording", "[recordings]") {
 TEST_CASE("A file that is no recording is refused by name", "[recordings]") {
   const TemporaryFolder folder;
   CHECK_THROWS_WITH(open_bag(folder.write("a.bag", "nothing of the kind")),
-                    Catch::Contains("a.bag byte 0: does not begin like"));
-  CHECK_THROWS_WITH(open_bag(folder.write("none.bag", "")), Catch::Contains("none.bag: is empty"));
+                    Contains("a.bag byte 0: does not begin like"));
+  CHECK_THROWS_WITH(open_bag(folder.write("none.bag", "")), Contains("none.bag: is empty"));
   fs::create_directory(folder.path() / "empty");
   CHECK_FALSE(may_be_bag(folder.path() / "empty"));
-  CHECK_THROWS_WITH(open_bag(folder.path() / "empty"), Catch::Contains("no .db3 or .mcap file"));
+  CHECK_THROWS_WITH(open_bag(folder.path() / "empty"), Contains("no .db3 or .mcap file"));
   folder.write("packed/a_0.db3.zstd", "");
-  CHECK_THROWS_WITH(open_bag(folder.path() / "packed"), Catch::Contains("zstd -d"));
+  CHECK_THROWS_WITH(open_bag(folder.path() / "packed"), Contains("zstd -d"));
   CHECK(may_be_bag(folder.path() / "packed"));
   CHECK_THROWS_WITH(open_bag(folder.write("a.mcap.zst", "\x28\xB5\x2F\xFD____")),
-                    Catch::Contains("is compressed as a whole: zstd -d "));
+                    Contains("is compressed as a whole: zstd -d "));
   folder.write("two/a.db3", "");
   folder.write("two/a.mcap", "");
-  CHECK_THROWS_WITH(open_bag(folder.path() / "two"), Catch::Contains("both .db3 and .mcap"));
+  CHECK_THROWS_WITH(open_bag(folder.path() / "two"), Contains("both .db3 and .mcap"));
 }
 
 TEST_CASE("Corrupted databases are refused or read in order", "[recordings]") {

@@ -1,11 +1,4 @@
-#include <catch2/catch.hpp>
-
-#include <algorithm>
-#include <filesystem>
-#include <map>
 #include <nlohmann/json.hpp>
-#include <string>
-#include <vector>
 
 #include "modules/core/input_file.hpp"
 #include "modules/core/json.hpp"
@@ -15,11 +8,10 @@
 #include "test/support/corrupted_input.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
-
-namespace fs = std::filesystem;
 
 // Fields of a record of the conformance suite by name; numbers are strings there.
 struct ListedRecord {
@@ -245,7 +237,7 @@ TEST_CASE("Attachments are read as they were written, or refused", "[recordings]
   CHECK(read_mcap_attachments(folder.write("a.mcap", bytes.substr(0, name))).empty());
   bytes[name] = 'M';
   CHECK_THROWS_WITH(read_mcap_attachments(folder.write("a.mcap", bytes)),
-                    Catch::Contains("an attachment that is damaged"));
+                    Contains("an attachment that is damaged"));
   CHECK_THROWS_AS(read_mcap_attachments(folder.write("a.mcap", "#ROSBAG")), InputFileError);
 }
 
@@ -258,8 +250,7 @@ TEST_CASE("A chunk with another checksum than it states is lost with its place",
   CHECK(messages_of(*reader).size() == file.messages.size() - file.chunk_messages.back());
   const BagReport report = reader->report();
   REQUIRE(report.count(BagFault::kChecksum) == 1);
-  CHECK_THAT(report.entries().at(BagFault::kChecksum).first,
-             Catch::StartsWith(path.string() + " byte "));
+  CHECK_THAT(report.entries().at(BagFault::kChecksum).first, StartsWith(path.string() + " byte "));
   // Messages outside of chunks are checked by the checksum of the data.
   ByteWriter bare;
   const std::vector<std::uint8_t> magic(kMcapMagic.begin(), kMcapMagic.end());
@@ -290,9 +281,9 @@ TEST_CASE("Chunks that decompress to far more than the file are left out and rep
   const auto reader = open_mcap(path);
   CHECK(messages_of(*reader).size() == 1);
   REQUIRE(reader->report().count(BagFault::kCompression) == 1);
-  CHECK_THAT(reader->report().entries().at(BagFault::kCompression).first,
-             Catch::StartsWith(path.string() + " byte ") &&
-                 Catch::Contains("more than 64 MiB and 250 times the file"));
+  CHECK_THAT(
+      reader->report().entries().at(BagFault::kCompression).first,
+      StartsWith(path.string() + " byte ") && Contains("more than 64 MiB and 250 times the file"));
 }
 
 TEST_CASE("Corrupted MCAP files are refused or read in order", "[recordings]") {
@@ -311,7 +302,7 @@ TEST_CASE("A file that is no MCAP file is refused by name", "[recordings]") {
   check_no_files<InputFileError>(".mcap", [](const fs::path& path) { (void)open_mcap(path); });
   const TemporaryFolder folder;
   CHECK_THROWS_WITH(open_mcap(folder.write("a.mcap", "#ROSBAG V2.0\n")),
-                    Catch::Contains("a.mcap byte 0: does not begin as MCAP files"));
+                    Contains("a.mcap byte 0: does not begin as MCAP files"));
 }
 
 }  // namespace km

@@ -1,8 +1,3 @@
-#include <catch2/catch.hpp>
-
-#include <algorithm>
-#include <filesystem>
-
 #include "modules/core/bytes.hpp"
 #include "modules/core/input_file.hpp"
 #include "modules/recordings/open_bag.hpp"
@@ -11,11 +6,11 @@
 #include "test/support/corrupted_input.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
 
-namespace fs = std::filesystem;
 using Bytes = std::vector<std::uint8_t>;
 
 // Writes small bags after the specification, without compression.
@@ -226,9 +221,9 @@ TEST_CASE("A file that is no bag of version 2 is refused by name", "[recordings]
   check_no_files<InputFileError>(".bag", [](const fs::path& path) { (void)open_ros1_bag(path); });
   const TemporaryFolder folder;
   CHECK_THROWS_WITH(open_ros1_bag(folder.write("a.bag", "#ROSBAG V1.2\n")),
-                    Catch::Contains("a.bag byte 0: does not begin as bags of version 2.0"));
+                    Contains("a.bag byte 0: does not begin as bags of version 2.0"));
   CHECK_THROWS_WITH(open_ros1_bag(folder.write("b.bag", "#ROSBAG V2.0\n")),
-                    Catch::Contains("b.bag byte 13: no bag header"));
+                    Contains("b.bag byte 13: no bag header"));
 }
 
 }  // namespace km

@@ -1,17 +1,10 @@
-#include <catch2/catch.hpp>
-
-#include <fstream>
-#include <span>
-#include <string>
-#include <utility>
-#include <vector>
-
 #include "modules/core/bytes.hpp"
 #include "modules/core/lie.hpp"
 #include "modules/recordings/ros_camera.hpp"
 #include "modules/recordings/ros_messages.hpp"
 #include "test/modules/sensors/listed_bag.hpp"
 #include "test/support/corrupted_input.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -384,7 +377,7 @@ TEST_CASE("The frame of a CameraInfo is the rectified camera's", "[recordings]")
   CHECK(T_frame_camera(info, RosImages::kRaw).isApprox(SE3::Identity()));
   info.r[0] = 2.0;
   CHECK_THROWS_WITH(T_frame_camera(info, RosImages::kRaw),
-                    Catch::Contains("frame 'left_optical': R is not a rotation"));
+                    Contains("frame 'left_optical': R is not a rotation"));
 }
 
 TEST_CASE("A CameraInfo that is no calibration is refused by frame and field", "[recordings]") {
@@ -418,18 +411,18 @@ TEST_CASE("A CameraInfo that is no calibration is refused by frame and field", "
   RosCameraInfo info = camera_info("left_optical");
   c.spoil(info);
   CHECK_THROWS_WITH(camera_of(info, RosImages::kRaw),
-                    Catch::Contains("frame 'left_optical': ") && Catch::Contains(c.why));
+                    Contains("frame 'left_optical': ") && Contains(c.why));
 }
 
 TEST_CASE("A rectified camera needs no K, and a raw one no P", "[recordings]") {
   RosCameraInfo info = camera_info("left_optical");
   info.k.fill(0.0);
   CHECK(camera_of(info, RosImages::kRectified).fx == 430.0);
-  CHECK_THROWS_WITH(camera_of(info, RosImages::kRaw), Catch::Contains("rectified: true"));
+  CHECK_THROWS_WITH(camera_of(info, RosImages::kRaw), Contains("rectified: true"));
   info = camera_info("left_optical");
   info.p.fill(0.0);
   CHECK(camera_of(info, RosImages::kRaw).fx == 458.0);
-  CHECK_THROWS_WITH(camera_of(info, RosImages::kRectified), Catch::Contains("P is 0"));
+  CHECK_THROWS_WITH(camera_of(info, RosImages::kRectified), Contains("P is 0"));
 }
 
 }  // namespace

@@ -1,14 +1,9 @@
-#include <algorithm>
-#include <catch2/catch.hpp>
-#include <cmath>
-#include <iterator>
-#include <random>
-
 #include "modules/robust/closure_noise.hpp"
 #include "modules/robust/corroboration.hpp"
 #include "modules/robust/cycle_mixture.hpp"
 #include "test/support/random_pose.hpp"
 #include "test/support/random_team.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

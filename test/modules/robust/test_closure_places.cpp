@@ -1,8 +1,5 @@
-#include <algorithm>
-#include <catch2/catch.hpp>
-#include <vector>
-
 #include "modules/robust/closure_places.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,17 +1,8 @@
-#include <catch2/catch.hpp>
-
-#include <algorithm>
-#include <cmath>
-#include <limits>
-#include <map>
-#include <random>
-#include <set>
-#include <vector>
-
 #include "modules/core/lie.hpp"
 #include "modules/robust/corroboration.hpp"
 #include "modules/robust/robust_schedule.hpp"
 #include "test/support/random_pose.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,7 +1,6 @@
-#include <catch2/catch.hpp>
-
 #include "modules/robust/frame_alignment.hpp"
 #include "test/support/random_pose.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

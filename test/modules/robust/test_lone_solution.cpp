@@ -1,13 +1,8 @@
-#include <algorithm>
-#include <catch2/catch.hpp>
-#include <random>
-#include <set>
-#include <vector>
-
 #include "modules/core/lie.hpp"
 #include "modules/robust/lone_solution.hpp"
 #include "modules/robust/robust_schedule.hpp"
 #include "test/support/random_pose.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

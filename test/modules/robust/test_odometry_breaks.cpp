@@ -1,9 +1,7 @@
-#include <catch2/catch.hpp>
-#include <random>
-
 #include "modules/core/lie.hpp"
 #include "modules/robust/odometry_noise.hpp"
 #include "test/support/random_pose.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

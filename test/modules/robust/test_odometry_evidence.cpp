@@ -1,14 +1,8 @@
-#include <array>
-#include <catch2/catch.hpp>
-#include <map>
-#include <random>
-#include <utility>
-#include <vector>
-
 #include "modules/core/lie.hpp"
 #include "modules/robust/odometry_evidence.hpp"
 #include "modules/robust/tree_messages.hpp"
 #include "test/support/random_pose.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

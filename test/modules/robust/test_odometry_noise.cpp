@@ -1,12 +1,7 @@
-#include <algorithm>
-#include <catch2/catch.hpp>
-#include <cmath>
-#include <random>
-#include <vector>
-
 #include "modules/core/lie.hpp"
 #include "modules/robust/odometry_noise.hpp"
 #include "test/support/random_pose.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,10 +1,7 @@
-#include <algorithm>
-#include <array>
-#include <catch2/catch.hpp>
-
 #include "modules/core/lie.hpp"
 #include "modules/robust/pair_consensus.hpp"
 #include "test/support/random_pose.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,11 +1,5 @@
-#include <catch2/catch.hpp>
-
-#include <algorithm>
-#include <cmath>
-#include <limits>
-#include <vector>
-
 #include "modules/robust/robust_schedule.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

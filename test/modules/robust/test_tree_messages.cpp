@@ -1,15 +1,9 @@
-#include <catch2/catch.hpp>
-#include <cmath>
-
 #include <sys/resource.h>
-
-#include <random>
-#include <string>
-#include <vector>
 
 #include "modules/core/bytes.hpp"
 #include "modules/robust/tree_messages.hpp"
 #include "test/support/random_pose.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,7 +1,6 @@
-#include <catch2/catch.hpp>
-
 #include "modules/robust/tree_newton.hpp"
 #include "test/support/solver_team.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

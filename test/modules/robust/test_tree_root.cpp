@@ -1,8 +1,5 @@
-#include <catch2/catch.hpp>
-#include <cstdint>
-#include <vector>
-
 #include "modules/robust/tree_root.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

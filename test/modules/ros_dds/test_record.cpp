@@ -1,11 +1,3 @@
-#include <catch2/catch.hpp>
-
-#include <cstring>
-#include <filesystem>
-#include <map>
-#include <string>
-#include <vector>
-
 #include "modules/recordings/open_bag.hpp"
 #include "modules/recordings/ros_messages.hpp"
 #include "modules/ros_dds/drawings.hpp"
@@ -14,11 +6,10 @@
 #include "runtime/log.hpp"
 #include "test/modules/recordings/bag_contents.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
-
-namespace fs = std::filesystem;
 
 SE3 at(double x) {
   SE3 T = SE3::Identity();

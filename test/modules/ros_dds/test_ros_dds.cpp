@@ -1,10 +1,3 @@
-#include <catch2/catch.hpp>
-
-#include <chrono>
-#include <map>
-#include <random>
-#include <thread>
-
 #include "modules/recordings/ros_messages.hpp"
 #include "modules/ros_dds/node/live_topics.hpp"
 #include "modules/ros_dds/node/ros_output_node.hpp"
@@ -13,6 +6,7 @@
 #include "runtime/dds/ros_subscription.hpp"
 #include "test/modules/sensors/listed_bag.hpp"
 #include "test/support/patience.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

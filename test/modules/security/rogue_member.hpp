@@ -2,11 +2,10 @@
 
 #include <sodium.h>
 
-#include <catch2/catch.hpp>
-
 #include "modules/security/authenticated_encryption.hpp"
 #include "modules/security/credentials.hpp"
 #include "test/modules/security/toy_team.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 

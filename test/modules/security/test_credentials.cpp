@@ -1,17 +1,10 @@
-#include <algorithm>
-#include <array>
-#include <catch2/catch.hpp>
-#include <fstream>
-#include <iterator>
-#include <string>
-#include <string_view>
-
 #include "modules/security/admitted_peers.hpp"
 #include "modules/security/authenticated_encryption.hpp"
 #include "modules/security/credentials.hpp"
 #include "modules/security/key_types.hpp"
 #include "modules/security/signing.hpp"
 #include "test/modules/security/toy_team.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -65,7 +58,7 @@ TEST_CASE("Certificates and credentials have the bytes of the test vectors in SE
   std::ifstream page(".github/SECURITY.md");
   std::string text(std::istreambuf_iterator<char>(page), {});
   std::erase_if(text, [](char c) { return c == ' ' || c == '\n'; });
-  CHECK_THAT(text, Catch::Contains(credentials));
+  CHECK_THAT(text, Contains(credentials));
 }
 
 TEST_CASE("Credentials are signed with every field of the identity", "[security]") {

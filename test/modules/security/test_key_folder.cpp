@@ -1,17 +1,12 @@
-#include <catch2/catch.hpp>
-#include <filesystem>
-#include <string>
-
 #include "modules/security/key_file.hpp"
 #include "modules/security/key_folder.hpp"
 #include "modules/security/team_folder.hpp"
 #include "test/modules/security/toy_team.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
-
-namespace fs = std::filesystem;
 
 // A team of two on disk.
 struct TeamOnDisk {
@@ -50,9 +45,8 @@ TEST_CASE("A secret that other users may read is refused", "[security]") {
   const fs::perms others = GENERATE(fs::perms::group_read, fs::perms::others_read,
                                     fs::perms::group_write, fs::perms::others_write);
   fs::permissions(secret, others, fs::perm_options::add);
-  CHECK_THAT(team.refusal(), Catch::Contains(secret.string()) &&
-                                 Catch::Contains("other users can read") &&
-                                 Catch::Contains("chmod 600"));
+  CHECK_THAT(team.refusal(), Contains(secret.string()) && Contains("other users can read") &&
+                                 Contains("chmod 600"));
   fs::permissions(secret, others, fs::perm_options::remove);
   CHECK(team.refusal().empty());
 }
@@ -80,7 +74,7 @@ TEST_CASE("A changed file is refused with its name and line", "[security]") {
   const TeamOnDisk team;
   REQUIRE(team.refusal().empty());
   team.replace(file, part, by);
-  CHECK_THAT(team.refusal(), Catch::Contains(refusal));
+  CHECK_THAT(team.refusal(), Contains(refusal));
 }
 
 TEST_CASE("A wrong or incomplete file of keys is refused", "[security]") {
@@ -88,23 +82,23 @@ TEST_CASE("A wrong or incomplete file of keys is refused", "[security]") {
   SECTION("something behind its end") {
     team.folder.write("survey/alpha/authority.txt",
                       team.folder.read("survey/alpha/authority.txt") + "more: 1\n");
-    CHECK_THAT(team.refusal(), Catch::Contains("line 5: \"more\" is not expected"));
+    CHECK_THAT(team.refusal(), Contains("line 5: \"more\" is not expected"));
   }
   SECTION("another robot's secret") {
     fs::copy_file(team.folder.path() / "survey/beta/secret_key.txt",
                   team.alpha() / "secret_key.txt", fs::copy_options::overwrite_existing);
-    CHECK_THAT(team.refusal(), Catch::Contains("is not the secret of certificate.txt"));
+    CHECK_THAT(team.refusal(), Contains("is not the secret of certificate.txt"));
   }
   SECTION("half a secret, which is not printed") {
     const std::string text = team.folder.read("survey/alpha/secret_key.txt");
     const std::string half = text.substr(text.find("secret_key: ") + 12, 32);
     team.folder.write("survey/alpha/secret_key.txt", text.substr(0, text.size() - 33) + "\n");
-    CHECK_THAT(team.refusal(), Catch::Contains("64 hexadecimal digits") && !Catch::Contains(half));
+    CHECK_THAT(team.refusal(), Contains("64 hexadecimal digits") && !Contains(half));
   }
   SECTION("no file") {
     fs::remove(team.alpha() / "revocations.txt");
-    CHECK_THAT(team.refusal(), Catch::Contains("revocations.txt: no such file") &&
-                                   Catch::Contains("kimera_multi_keys"));
+    CHECK_THAT(team.refusal(),
+               Contains("revocations.txt: no such file") && Contains("kimera_multi_keys"));
   }
 }
 
@@ -136,12 +130,9 @@ TEST_CASE("A robot gets new keys after the former have lapsed", "[security]") {
   const fs::path survey = folder.path() / "survey";
   TeamFolder team = TeamFolder::make(survey, {{0, "alpha"}}, kToyNow_s, kEnd_s);
   const PublicKey former = team.issued()[0].key;
-  CHECK_THROWS_WITH(team.issue({{0, "alpha"}}, kToyNow_s, kEnd_s),
-                    Catch::Contains("revoke it first"));
-  CHECK_THROWS_WITH(team.issue({{0, "other"}}, kToyNow_s, kEnd_s),
-                    Catch::Contains("revoke it first"));
-  CHECK_THROWS_WITH(team.issue({{5, "alpha"}}, kToyNow_s, kEnd_s),
-                    Catch::Contains("revoke it first"));
+  CHECK_THROWS_WITH(team.issue({{0, "alpha"}}, kToyNow_s, kEnd_s), Contains("revoke it first"));
+  CHECK_THROWS_WITH(team.issue({{0, "other"}}, kToyNow_s, kEnd_s), Contains("revoke it first"));
+  CHECK_THROWS_WITH(team.issue({{5, "alpha"}}, kToyNow_s, kEnd_s), Contains("revoke it first"));
   std::int64_t now_s = kToyNow_s;
   SECTION("revoked") {
     team.revoke("alpha");
@@ -169,8 +160,8 @@ TEST_CASE("A revocation reaches the existing folders and increases the number of
   CHECK(load_revocations(survey / "alpha").number == 1);
   CHECK(load_revocations(survey / "alpha").revoked == revoked);
   CHECK_FALSE(fs::exists(survey / "beta"));
-  CHECK_THROWS_WITH(team.revoke("beta"), Catch::Contains("is revoked already"));
-  CHECK_THROWS_WITH(team.revoke("delta"), Catch::Contains("never had"));
+  CHECK_THROWS_WITH(team.revoke("beta"), Contains("is revoked already"));
+  CHECK_THROWS_WITH(team.revoke("delta"), Contains("never had"));
   TeamFolder(survey).revoke("gamma");
   CHECK(TeamFolder(survey).revocations().number == 2);
   CHECK(load_revocations(survey / "alpha").revoked.size() == 2);

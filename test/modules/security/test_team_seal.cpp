@@ -1,8 +1,6 @@
-#include <catch2/catch.hpp>
-#include <functional>
-
 #include "test/modules/security/toy_team.hpp"
 #include "test/support/corrupted_input.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

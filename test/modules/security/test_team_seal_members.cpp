@@ -1,7 +1,6 @@
-#include <catch2/catch.hpp>
-
 #include "test/modules/security/rogue_member.hpp"
 #include "test/modules/security/toy_team.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,11 +1,8 @@
 #pragma once
 
-#include <catch2/catch.hpp>
-#include <cstdint>
-#include <string>
-
 #include "modules/security/signing.hpp"
 #include "modules/security/team_seal.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 

@@ -1,14 +1,6 @@
-#include <algorithm>
-#include <catch2/catch.hpp>
-#include <cmath>
-#include <map>
-#include <memory>
-#include <numbers>
-#include <random>
-#include <utility>
-
 #include "modules/semantic_mapping/incremental_mesh.hpp"
 #include "test/modules/semantic_mapping/mesh_checks.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

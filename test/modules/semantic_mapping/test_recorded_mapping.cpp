@@ -1,9 +1,8 @@
-#include <catch2/catch.hpp>
-
 #include "modules/evaluation/mesh/mesh_error.hpp"
 #include "modules/semantic_mapping/semantic_mapper.hpp"
 #include "test/support/recorded_kitchen.hpp"
 #include "test/support/shared_data.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,15 +1,9 @@
-#include <algorithm>
-#include <catch2/catch.hpp>
-#include <cmath>
-#include <limits>
-#include <memory>
 #include <opencv2/core/utility.hpp>
-#include <set>
-#include <stdexcept>
 
 #include "modules/semantic_mapping/depth_view.hpp"
 #include "test/modules/semantic_mapping/mesh_checks.hpp"
 #include "test/modules/semantic_mapping/wall_scene.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,10 +1,6 @@
-#include <catch2/catch.hpp>
-
-#include <memory>
-#include <vector>
-
 #include "modules/semantic_mapping/node/semantic_mapping_node.hpp"
 #include "test/modules/semantic_mapping/wall_scene.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,8 +1,5 @@
-#include <algorithm>
-#include <catch2/catch.hpp>
-#include <random>
-
 #include "modules/semantic_mapping/voxel_labels.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

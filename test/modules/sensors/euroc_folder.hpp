@@ -1,15 +1,9 @@
 #pragma once
 
-#include <catch2/catch.hpp>
-#include <cmath>
-#include <filesystem>
-#include <string>
-#include <utility>
-#include <vector>
-
 #include "modules/sensors/node/open_folder.hpp"
 #include "test/support/image_file.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 
@@ -43,9 +37,9 @@ class EurocFolder {
 
   static std::int64_t image_stamp(int i) { return kFirstImage + i * kImagePeriod; }
 
-  const std::filesystem::path& root() const { return folder_.path(); }
-  std::filesystem::path mav0() const { return root() / "mav0"; }
-  std::filesystem::path image(const std::string& camera, int i) const {
+  const fs::path& root() const { return folder_.path(); }
+  fs::path mav0() const { return root() / "mav0"; }
+  fs::path image(const std::string& camera, int i) const {
     return mav0() / camera / "data" / (std::to_string(image_stamp(i)) + ".png");
   }
 
@@ -78,14 +72,14 @@ class EurocFolder {
   }
   /// An RGB-D recording: depth in place of the right camera.
   void make_rgbd(int depth_every = 1) const {
-    std::filesystem::remove_all(mav0() / "cam1");
+    fs::remove_all(mav0() / "cam1");
     add_depth(depth_every);
   }
   static std::string side_image(const std::string& sensor, int i) {
     return sensor + "/data/" + std::to_string(image_stamp(i)) + ".png";
   }
   void write_pixels(const std::string& relative, const cv::Mat& pixels) const {
-    std::filesystem::create_directories((mav0() / relative).parent_path());
+    fs::create_directories((mav0() / relative).parent_path());
     write_png(mav0() / relative, pixels);
   }
 

@@ -1,8 +1,3 @@
-#include <catch2/catch.hpp>
-
-#include <algorithm>
-#include <cmath>
-#include <cstring>
 #include <opencv2/core.hpp>
 
 #include "modules/images/image_codec.hpp"
@@ -10,6 +5,7 @@
 #include "modules/sensors/sensor_messages.hpp"
 #include "test/modules/sensors/euroc_folder.hpp"
 #include "test/modules/sensors/listed_bag.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -116,7 +112,7 @@ TEST_CASE("Poses of an odometry replace inertial samples", "[sensors][bag]") {
   other->add("/left", image(kFirst, 1));
   other->add("/right", image(kFirst, 1));
   CHECK_THROWS_WITH(BagDataset("test.bag", std::move(other), rig),
-                    Catch::Contains("not of nav_msgs/Odometry"));
+                    Contains("not of nav_msgs/Odometry"));
 }
 
 TEST_CASE("A frame without its right image is counted and the other frames stay",
@@ -157,7 +153,7 @@ TEST_CASE("A window of a bag begins with the second before it", "[sensors][bag]"
     CHECK_THROWS_AS(BagDataset("test.bag", recording({}), small_rig(), part),
                     std::invalid_argument);
   CHECK_THROWS_WITH(BagDataset("test.bag", recording({}), small_rig(), {.from_s = 50.0}),
-                    Catch::StartsWith("test.bag: no frame") && Catch::Contains("from 50 s"));
+                    StartsWith("test.bag: no frame") && Contains("from 50 s"));
 }
 
 TEST_CASE("Missing topics are refused and the existing topics are listed", "[sensors][bag]") {
@@ -167,7 +163,7 @@ TEST_CASE("Missing topics are refused and the existing topics are listed", "[sen
                     "test.bag: no topic /rihgt; topics with images: /left, /right");
   rig.topics.right = "/imu";
   CHECK_THROWS_WITH(BagDataset("test.bag", recording({}), rig),
-                    Catch::Contains("/imu has messages of sensor_msgs/Imu"));
+                    Contains("/imu has messages of sensor_msgs/Imu"));
   CHECK_THROWS_WITH(BagDataset("test.bag", recording({.has_imu = false}), small_rig()),
                     "test.bag: no topic /imu; topics with inertial samples: none");
 }
@@ -198,9 +194,8 @@ TEST_CASE("Unreadable parts of a bag are counted with their place", "[sensors][b
   CHECK(packets_of(dataset).size() == 40);
   CHECK(dataset.report().count(ReaderFault::kDamagedBag) == 4);
   CHECK_THAT(dataset.report().entries().at(ReaderFault::kDamagedBag).first,
-             Catch::Contains("test.bag byte"));
+             Contains("test.bag byte"));
   // If nothing is left, the damage may be the cause.
-  using Catch::Contains;
   CHECK_THROWS_WITH(BagDataset("test.bag", damaged(std::make_unique<ListedBag>()), small_rig()),
                     Contains("no topic /left; topics with images: none") &&
                         Contains("4 damaged pieces of the recording, first: ") &&
@@ -455,7 +450,7 @@ TEST_CASE("Compressed depth is decoded by the format that its message states", "
   };
   CHECK(depth_of(0, c.format).image.millimetres == c.expected_mm);
   CHECK(depth_of(8, c.format).status == ImageStatus::kUnreadable);
-  CHECK_THAT(depth_of(c.bytes.size(), "h264").problem, Catch::Contains("states the format 'h264'"));
+  CHECK_THAT(depth_of(c.bytes.size(), "h264").problem, Contains("states the format 'h264'"));
 }
 
 TEST_CASE("A recording continues after its clock was set back", "[sensors][bag]") {
@@ -485,7 +480,7 @@ TEST_CASE("A recording continues after its clock was set back", "[sensors][bag]"
   const ReaderReport report = dataset.report();
   CHECK(report.count(ReaderFault::kClockSetBack) == 1);
   CHECK(report.count(ReaderFault::kUnorderedStamp) == 2);
-  CHECK_THAT(to_string(report), Catch::Contains("the clock went back 10.0 s"));
+  CHECK_THAT(to_string(report), Contains("the clock went back 10.0 s"));
 }
 
 }  // namespace

@@ -1,14 +1,11 @@
-#include <catch2/catch.hpp>
-
 #include "modules/sensors/dataset_reader.hpp"
 #include "modules/sensors/node/open_folder.hpp"
 #include "test/modules/sensors/euroc_folder.hpp"
 #include "test/support/shared_data.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
-
-namespace fs = std::filesystem;
 
 // The contract of SensorPacket: samples in order, each packet starts with the last sample of the
 // one before, and ends with the first sample at or after its frame.
@@ -76,7 +73,7 @@ TEST_CASE("A window is half open and counts from the recording's first image", "
   CHECK_THROWS_AS(open_folder(folder.root(), {.part = {.from_s = std::nan("")}}),
                   std::invalid_argument);
   CHECK_THROWS_WITH(open_folder(folder.root(), {.part = {.from_s = 1.0}}),
-                    Catch::Contains("from 0 s to 0.35 s"));
+                    Contains("from 0 s to 0.35 s"));
 }
 
 TEST_CASE("Blanks, comments, CRLF and a bare header in the lists are accepted", "[sensors]") {
@@ -112,19 +109,19 @@ TEST_CASE("Missing files and folders are refused by name", "[sensors]") {
     const EurocFolder corrupted;
     fs::remove(corrupted.mav0() / file);
     CHECK_THROWS_WITH(open_folder(corrupted.root()),
-                      Catch::StartsWith((corrupted.mav0() / file).string() + ": no such file"));
+                      StartsWith((corrupted.mav0() / file).string() + ": no such file"));
   }
   fs::remove_all(folder.mav0() / "cam1");
   for (const fs::path& path : {folder.root(), folder.mav0()})
-    CHECK_THROWS_WITH(open_folder(path), Catch::Contains("cam1/sensor.yaml: no such file") &&
-                                             Catch::Contains("nor depth0"));
+    CHECK_THROWS_WITH(open_folder(path),
+                      Contains("cam1/sensor.yaml: no such file") && Contains("nor depth0"));
   fs::remove_all(folder.mav0());
   CHECK_THROWS_WITH(open_folder(folder.root()),
-                    Catch::EndsWith("neither a folder mav0 nor cam0 in it: not a recording in the "
-                                    "layout of EuRoC, KITTI, TUM RGB-D or 7-Scenes"));
+                    EndsWith("neither a folder mav0 nor cam0 in it: not a recording in the "
+                             "layout of EuRoC, KITTI, TUM RGB-D or 7-Scenes"));
   for (const char* robot : {"robot1", "robot0", "robot2/none"})
     fs::create_directories(folder.root() / robot / (robot[5] < '2' ? "mav0" : "cam0"));
-  CHECK_THROWS_WITH(open_folder(folder.root()), Catch::EndsWith("in it are robot0, robot1"));
+  CHECK_THROWS_WITH(open_folder(folder.root()), EndsWith("in it are robot0, robot1"));
 }
 
 TEST_CASE("A recording needs no inertial sensor", "[sensors]") {
@@ -192,7 +189,7 @@ TEST_CASE("Lists without a usable row are refused", "[sensors]") {
   std::string message = c.message;
   for (std::size_t at = 0; (at = message.find("FILE")) != message.npos;)
     message.replace(at, 4, (folder.mav0() / c.file).string());
-  CHECK_THROWS_WITH(open_folder(folder.root()), Catch::EndsWith(message));
+  CHECK_THROWS_WITH(open_folder(folder.root()), EndsWith(message));
 }
 
 TEST_CASE("Repeated rows and images without a partner are skipped and counted", "[sensors]") {
@@ -203,12 +200,12 @@ TEST_CASE("Repeated rows and images without a partner are skipped and counted", 
   CHECK(outcome.packets.size() == 8);
   CHECK(outcome.report.count(ReaderFault::kRepeatedStamp) == 1);
   CHECK_THAT(first_of(outcome.report, ReaderFault::kRepeatedStamp),
-             Catch::EndsWith("cam0/data.csv line 6: 10150000000"));
+             EndsWith("cam0/data.csv line 6: 10150000000"));
   folder.replace("cam1/data.csv", row, "");
   outcome = read(folder);
   CHECK(outcome.packets.size() == 7);
   CHECK_THAT(first_of(outcome.report, ReaderFault::kLeftWithoutRight),
-             Catch::EndsWith("cam0/data.csv line 5: 10150000000.png"));
+             EndsWith("cam0/data.csv line 5: 10150000000.png"));
 }
 
 TEST_CASE("A gap between inertial samples is reported and the pairs are kept", "[sensors]") {
@@ -221,7 +218,7 @@ TEST_CASE("A gap between inertial samples is reported and the pairs are kept", "
   CHECK(outcome.packets.size() == 8);
   CHECK(outcome.report.count(ReaderFault::kImuGap) == 1);
   CHECK_THAT(first_of(outcome.report, ReaderFault::kImuGap),
-             Catch::Contains("0.040000 s after 10105000000"));
+             Contains("0.040000 s after 10105000000"));
 }
 
 TEST_CASE("Pairs outside the inertial samples are skipped", "[sensors]") {
@@ -316,13 +313,13 @@ TEST_CASE("An impossible calibration is refused with file and line", "[sensors]"
   const EurocFolder folder;
   folder.replace(c.sensor + "/sensor.yaml", c.from, c.to);
   CHECK_THROWS_WITH(read_euroc_rig(folder.mav0()),
-                    Catch::Contains(c.sensor + "/sensor.yaml") && Catch::Contains(c.message));
+                    Contains(c.sensor + "/sensor.yaml") && Contains(c.message));
 }
 
 TEST_CASE("Two cameras in one place are refused", "[sensors]") {
   const EurocFolder folder;
   folder.write("cam1/sensor.yaml", EurocFolder::camera_yaml(0.0));
-  CHECK_THROWS_WITH(read_euroc_rig(folder.mav0()), Catch::Contains("where the left one is"));
+  CHECK_THROWS_WITH(read_euroc_rig(folder.mav0()), Contains("where the left one is"));
 }
 
 }  // namespace km

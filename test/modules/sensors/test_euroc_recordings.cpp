@@ -1,19 +1,13 @@
-#include <catch2/catch.hpp>
-
-#include <fstream>
-#include <functional>
-
 #include "modules/core/imu_limits.hpp"
 #include "modules/sensors/image_file.hpp"
 #include "modules/sensors/node/open_folder.hpp"
 #include "test/modules/sensors/euroc_folder.hpp"
 #include "test/support/corrupted_input.hpp"
 #include "test/support/image_file.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
-
-namespace fs = std::filesystem;
 
 constexpr std::int64_t kDay_ns = 86'400'000'000'000;
 
@@ -108,7 +102,7 @@ TEST_CASE("A bad row is skipped and counted with its line and no other row is", 
   REQUIRE(reader.report().count(row.fault) == 1);
   const ReaderReport report = reader.report();
   CHECK_THAT(report.entries().at(row.fault).first,
-             Catch::Contains(std::string(row.file) + " line " + std::to_string(row.line)));
+             Contains(std::string(row.file) + " line " + std::to_string(row.line)));
   CHECK(reader.report().count(ReaderFault::kImuGap) == 0);
 }
 
@@ -158,7 +152,7 @@ TEST_CASE("A bad image loses its pair and no inertial sample", "[sensors]") {
   CHECK(outcome.report.entries().size() == 1);
   REQUIRE(outcome.report.count(bad.fault) == 1);
   CHECK_THAT(outcome.report.entries().at(bad.fault).first,
-             Catch::Contains("cam0/data.csv line 5: ") && Catch::Contains(bad.problem));
+             Contains("cam0/data.csv line 5: ") && Contains(bad.problem));
   CHECK(outcome.packets[3].imu.size() == 21);  // 100 ms
   CHECK(outcome.packets[3].imu.front().stamp == outcome.packets[2].imu.back().stamp);
 }
@@ -196,8 +190,6 @@ TEST_CASE("A corrupted image gives an image of the right size or none", "[sensor
 
 namespace {
 
-namespace fs = std::filesystem;
-
 // Checks that all frames are there, that the frame of index 2 lacks its depth (or labels), and that
 // the report contains only this fault, with `text` in its example.
 void check_image_lost(const EurocFolder& folder, const FolderOptions& options, ReaderFault fault,
@@ -211,7 +203,7 @@ void check_image_lost(const EurocFolder& folder, const FolderOptions& options, R
   }
   REQUIRE(outcome.report.entries().size() == 1);
   CHECK(outcome.report.count(fault) == 1);
-  CHECK_THAT(outcome.report.entries().begin()->second.first, Catch::Contains(text));
+  CHECK_THAT(outcome.report.entries().begin()->second.first, Contains(text));
 }
 
 constexpr const char* kPalette =
@@ -282,7 +274,7 @@ TEST_CASE("Depth and labels beside stereo are read on request", "[sensors]") {
 TEST_CASE("A recording without requested depth or labels is refused", "[sensors]") {
   const EurocFolder folder;
   const auto refusal_with = [&](const FolderOptions& options, const std::string& end) {
-    CHECK_THROWS_WITH(open_folder(folder.root(), options), Catch::Contains(end));
+    CHECK_THROWS_WITH(open_folder(folder.root(), options), Contains(end));
   };
   refusal_with({.depth = true},
                "depth0/sensor.yaml: no such file: a EuRoC folder has the "
@@ -381,7 +373,7 @@ TEST_CASE("Depth that is not aligned with the left camera is refused", "[sensors
   folder.make_rgbd();
   folder.replace("depth0/sensor.yaml", c.from, c.to);
   CHECK_THROWS_WITH(open_folder(folder.root()),
-                    Catch::Contains("depth0/sensor.yaml") && Catch::Contains(c.message));
+                    Contains("depth0/sensor.yaml") && Contains(c.message));
 }
 
 TEST_CASE("The palette maps labels from colours to ids", "[sensors]") {
@@ -412,9 +404,8 @@ TEST_CASE("The palette maps labels from colours to ids", "[sensors]") {
   CHECK(outcome.report.count(ReaderFault::kUnknownColor) == 1);
   CHECK(open_folder(folder.root(), {.labels = true}).folder().palette.find(7)->name == "tree");
   folder.write("label_palette.csv", "name,red,green,blue,alpha,id\nroad,128,64,300,255,3\n");
-  CHECK_THROWS_WITH(open_folder(folder.root(), {.labels = true}),
-                    Catch::Contains("label_palette.csv"));
-  CHECK_THAT(outcome.report.entries().begin()->second.first, Catch::EndsWith(".png: 1 pixels"));
+  CHECK_THROWS_WITH(open_folder(folder.root(), {.labels = true}), Contains("label_palette.csv"));
+  CHECK_THAT(outcome.report.entries().begin()->second.first, EndsWith(".png: 1 pixels"));
 }
 
 }  // namespace km

@@ -1,19 +1,13 @@
 #include "modules/sensors/folder_layouts.hpp"
 
-#include <catch2/catch.hpp>
-#include <cmath>
-#include <filesystem>
-#include <fstream>
-
 #include "euroc_folder.hpp"
 #include "modules/sensors/node/open_folder.hpp"
 #include "test/support/image_file.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
-
-namespace fs = std::filesystem;
 
 constexpr int kFrames = 4;
 
@@ -70,8 +64,7 @@ TEST_CASE("A folder in KITTI's layout is read with its calibration", "[sensors][
   CHECK(reader.report().empty());
   CHECK(open_folder(folder.path(), {.part = {.from_s = 0.05, .to_s = 0.25}}).pair_count() == 2);
   CHECK_THROWS_AS(open_folder(folder.path(), {.part = {.from_s = 7.0}}), DatasetError);
-  CHECK_THROWS_WITH(open_folder(folder.path(), {}, "camera.yaml"),
-                    Catch::Contains("leave --rig out"));
+  CHECK_THROWS_WITH(open_folder(folder.path(), {}, "camera.yaml"), Contains("leave --rig out"));
 }
 
 TEST_CASE("A bad file of a folder in KITTI's layout is refused with file, line and value",
@@ -94,9 +87,9 @@ TEST_CASE("A bad file of a folder in KITTI's layout is refused with file, line a
   write_kitti(folder);
   folder.write(c.file, c.text);
   if (c.text.empty()) fs::remove(folder.path() / c.file);
-  CHECK_THROWS_WITH(open_folder(folder.path()), Catch::Contains(c.message));
+  CHECK_THROWS_WITH(open_folder(folder.path()), Contains(c.message));
   fs::remove_all(folder.path() / "image_1");
-  CHECK_THROWS_WITH(open_folder(folder.path()), Catch::Contains("image_1: no such folder"));
+  CHECK_THROWS_WITH(open_folder(folder.path()), Contains("image_1: no such folder"));
 }
 
 TEST_CASE("Faulty times and images of a folder in KITTI's layout are left out and counted",
@@ -129,7 +122,7 @@ TEST_CASE("Faulty times and images of a folder in KITTI's layout are left out an
       CHECK(packet.frame->left.pixels[0] == std::lround(1e-7 * double(packet.frame->stamp)));
   const ReaderReport report = reader.report();
   REQUIRE(report.count(c.fault) == 1);
-  CHECK_THAT(report.entries().at(c.fault).first, Catch::Contains(c.example));
+  CHECK_THAT(report.entries().at(c.fault).first, Contains(c.example));
 }
 
 TEST_CASE("A folder in the layout of TUM RGB-D has the camera of its name", "[sensors][folder]") {
@@ -149,7 +142,7 @@ TEST_CASE("The camera of a folder in the layout of TUM RGB-D can be described",
   const TemporaryFolder folder;
   const fs::path root = folder.path() / "desk";
   write_tum(root);
-  CHECK_THROWS_WITH(open_folder(root), Catch::Contains("--rig FILE"));
+  CHECK_THROWS_WITH(open_folder(root), Contains("--rig FILE"));
   const fs::path camera =
       folder.write("camera.yaml",
                    "resolution: [32, 24]\ncamera_model: pinhole\nintrinsics: [30, 30, 16, 12]\n"
@@ -171,14 +164,14 @@ TEST_CASE("The camera of a folder in the layout of TUM RGB-D can be described",
   FolderReader faulty = open_folder(root, {}, camera);
   CHECK(packets_of(faulty).size() == 1);
   CHECK_THAT(faulty.report().entries().at(ReaderFault::kMalformedRow).first,
-             Catch::Contains("rgb.txt line 2: 1 fields, expected 2"));
+             Contains("rgb.txt line 2: 1 fields, expected 2"));
   CHECK(faulty.report().count(ReaderFault::kMalformedRow) == 2);
   std::ofstream(root / "depth.txt") << "1305031109.0 depth/0.png\n";
   CHECK_THROWS_WITH(open_folder(root, {}, camera),
-                    Catch::EndsWith("rgb.txt: no depth image for any of 1 images: the stamps of "
-                                    "depth images are too far away"));
+                    EndsWith("rgb.txt: no depth image for any of 1 images: the stamps of "
+                             "depth images are too far away"));
   fs::remove(root / "depth.txt");
-  CHECK_THROWS_WITH(open_folder(root, {}, camera), Catch::Contains("depth.txt: no such file"));
+  CHECK_THROWS_WITH(open_folder(root, {}, camera), Contains("depth.txt: no such file"));
 }
 
 // Frames 0, 4 and 12 of a recording; the grey value of an image is its number.
@@ -204,10 +197,10 @@ TEST_CASE("A folder in the layout of 7-Scenes is read at 30 Hz", "[sensors][fold
   for (const char* frame : {"0000", "0004", "0012"})
     fs::remove(folder.path() / ("frame-00" + std::string(frame) + ".depth.png"));
   CHECK_THROWS_WITH(open_folder(folder.path()),
-                    Catch::Contains(": no depth image for any of 3 images, first: "));
+                    Contains(": no depth image for any of 3 images, first: "));
   folder.write("camera-intrinsics.txt", "30 0 16\n0 30 inf\n0 0 1\n");
   CHECK_THROWS_WITH(open_folder(folder.path()),
-                    Catch::Contains("camera-intrinsics.txt line 2: inf is not a number"));
+                    Contains("camera-intrinsics.txt line 2: inf is not a number"));
 }
 
 TEST_CASE("The names of frames show the layout of 7-Scenes without a calibration",
@@ -220,8 +213,7 @@ TEST_CASE("The names of frames show the layout of 7-Scenes without a calibration
   for (const char* frame : {"frame-000000", "frame-000004", "frame-000012"})
     if (!missing.empty()) fs::remove(folder.path() / (frame + missing + "png"));
   CHECK(layout_of(folder.path()) == FolderLayout::kSevenScenes);
-  CHECK_THROWS_WITH(open_folder(folder.path()),
-                    Catch::EndsWith("camera-intrinsics.txt: no such file"));
+  CHECK_THROWS_WITH(open_folder(folder.path()), EndsWith("camera-intrinsics.txt: no such file"));
 }
 
 }  // namespace

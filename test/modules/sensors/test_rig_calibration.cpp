@@ -1,19 +1,13 @@
-#include <catch2/catch.hpp>
-
-#include <cmath>
-#include <string>
-
 #include "modules/sensors/dataset_reader.hpp"
 #include "modules/sensors/node/rig_calibration.hpp"
 #include "test/modules/sensors/euroc_folder.hpp"
 #include "test/support/corrupted_input.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
-
-namespace fs = std::filesystem;
 
 // Two cameras that look along the inertial sensor's x axis, at y = 0.1 and y = -0.1 m: T_cam_imu
 // maps x to z, y to -x and z to -y.
@@ -282,12 +276,12 @@ TEST_CASE("An unused part of a calibration is noted with its place", "[sensors][
   };
   CHECK_THAT(notes_of(files.read("calib.json",
                                  replaced(kBasalt, "accel_bias\": [0.0", "accel_bias\": [0.1"))),
-             Catch::Contains("calib.json line 24: calib_accel_bias is not applied"));
+             Contains("calib.json line 24: calib_accel_bias is not applied"));
   CHECK_THAT(notes_of(files.read("camchain.yaml", kCamera0 + kCamera1)),
-             Catch::Contains("camchain.yaml: no imu0"));
+             Contains("camchain.yaml: no imu0"));
   CHECK_THAT(notes_of(files.read_kalibr(kCamera0 + kCamera1,
                                         kImu + "Tw:\n- [1.01, 0, 0]\n- [0, 1, 0]\n- [0, 0, 1]\n")),
-             Catch::Contains("imu.yaml line 8: Tw is not applied"));
+             Contains("imu.yaml line 8: Tw is not applied"));
 }
 
 TEST_CASE("A pair is chosen among more cameras, or one with depth", "[sensors][calibration]") {
@@ -326,28 +320,27 @@ TEST_CASE("Files of ROS' camera_calibration give the pair without its pose on th
   CHECK_FALSE(found.has_extrinsics);
   CHECK(found.rig.stereo.cameras[0].fx == (choice.rectified ? 430.0 : 458.0));
   CHECK(found.rig.stereo.baseline_m() == Approx(0.1));
-  CHECK_THROWS_WITH(read_rig({left}, choice), Catch::Contains("for each camera"));
-  CHECK_THROWS_WITH(read_rig({right, left}, choice), Catch::Contains("no baseline"));
+  CHECK_THROWS_WITH(read_rig({left}, choice), Contains("for each camera"));
+  CHECK_THROWS_WITH(read_rig({right, left}, choice), Contains("no baseline"));
 }
 
 TEST_CASE("A file that is no calibration is refused with a list of the expected formats",
           "[sensors][calibration]") {
   const Files files;
-  CHECK_THROWS_WITH(read_rig({}), Catch::Contains("expected a folder"));
+  CHECK_THROWS_WITH(read_rig({}), Contains("expected a folder"));
   CHECK_THROWS_WITH(files.read("a.yaml", "some: thing\n"),
-                    Catch::Contains("a.yaml: neither cam0 nor imu0"));
-  CHECK_THROWS_WITH(files.read("a.yaml", kImu),
-                    Catch::Contains("also name Kalibr's chain of cameras"));
-  CHECK_THROWS_WITH(files.read_kalibr(kCamera0), Catch::Contains("one camera without depth"));
+                    Contains("a.yaml: neither cam0 nor imu0"));
+  CHECK_THROWS_WITH(files.read("a.yaml", kImu), Contains("also name Kalibr's chain of cameras"));
+  CHECK_THROWS_WITH(files.read_kalibr(kCamera0), Contains("one camera without depth"));
   const std::string behind = replaced(replaced(cut(kCamera1, "  T_cn_cnm1", "  camera_model"),
                                                "[0.0, -1.0, 0.0, -0.1]", "[0.0, 1.0, 0.0, 0.1]"),
                                       "[1.0, 0.0, 0.0, -0.05]", "[-1.0, 0.0, 0.0, -0.05]");
   CHECK_THROWS_WITH(files.read_kalibr(kCamera0 + behind),
-                    Catch::Contains("makes the cameras look 180 degrees apart"));
+                    Contains("makes the cameras look 180 degrees apart"));
   CHECK_THROWS_WITH(files.read_kalibr(kCamera0 + kCamera1, kCamera0),
-                    Catch::Contains("imu.yaml: a second file of cam0"));
+                    Contains("imu.yaml: a second file of cam0"));
   CHECK_THROWS_WITH(read_rig({EurocFolder().mav0() / "cam0" / "sensor.yaml"}),
-                    Catch::Contains("give the folder that holds cam0, cam1 and imu0"));
+                    Contains("give the folder that holds cam0, cam1 and imu0"));
   check_no_files<DatasetError>(".yaml", [](const fs::path& file) { (void)read_rig({file}); });
 }
 
@@ -367,7 +360,7 @@ TEST_CASE("An impossible Kalibr chain is refused with file and line", "[sensors]
   CAPTURE(c.from, c.to);
   const Files files;
   CHECK_THROWS_WITH(files.read_kalibr(replaced(kCamera0, c.from, c.to) + kCamera1),
-                    Catch::Contains("camchain.yaml " + c.message));
+                    Contains("camchain.yaml " + c.message));
 }
 
 TEST_CASE("An impossible Basalt file is refused with file and line", "[sensors][calibration]") {
@@ -385,7 +378,7 @@ TEST_CASE("An impossible Basalt file is refused with file and line", "[sensors][
   CAPTURE(c.from, c.to);
   const Files files;
   CHECK_THROWS_WITH(files.read("calib.json", replaced(kBasalt, c.from, c.to)),
-                    Catch::Contains("calib.json ") && Catch::Contains(c.message));
+                    Contains("calib.json ") && Contains(c.message));
 }
 
 void check_calibration(const RigCalibration& calibration) {

@@ -1,15 +1,10 @@
-#include <catch2/catch.hpp>
-
-#include <numbers>
-
 #include "modules/core/lie.hpp"
 #include "modules/sensors/rig_completion.hpp"
 #include "test/modules/sensors/listed_bag.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
-
-using Catch::Contains;
 
 RosImu imu(const std::string& frame) {
   RosImu message;

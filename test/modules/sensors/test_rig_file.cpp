@@ -1,15 +1,10 @@
-#include <catch2/catch.hpp>
-
-#include <sstream>
-
 #include "modules/core/lie.hpp"
 #include "modules/sensors/node/rig_file.hpp"
 #include "test/modules/sensors/euroc_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
-
-using Catch::Contains;
 
 std::string complaint(const std::string& text) try {
   const TemporaryFolder folder;
@@ -71,7 +66,7 @@ TEST_CASE("A rig file names the files of Kalibr or contains their keys", "[senso
 TEST_CASE("A rig file for depth needs no calibration of depth", "[sensors]") {
   const EurocFolder recording;
   const TemporaryFolder folder;
-  std::filesystem::create_directory_symlink(recording.root(), folder.path() / "recording");
+  fs::create_directory_symlink(recording.root(), folder.path() / "recording");
   const PartialRig rig =
       read(folder,
            "left: {topic: /color}\ndepth: {topic: /depth, min_range_m: 0.4, max_range_m: 6, "
@@ -91,7 +86,7 @@ const CameraCalibration kCorrection{
 TEST_CASE("A corrected rig file gives the rig of the original with the correction", "[sensors]") {
   const EurocFolder recording;
   const TemporaryFolder folder, elsewhere;
-  std::filesystem::create_directory_symlink(recording.root(), folder.path() / "recording");
+  fs::create_directory_symlink(recording.root(), folder.path() / "recording");
   const bool is_inline = GENERATE(false, true);
   CAPTURE(is_inline);
   std::string text = kTopics;

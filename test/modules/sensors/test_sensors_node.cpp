@@ -1,15 +1,6 @@
-#include <catch2/catch.hpp>
-
-#include <chrono>
-#include <cmath>
-#include <future>
-#include <stdexcept>
-#include <thread>
-#include <utility>
-#include <vector>
-
 #include "modules/sensors/load_shedding.hpp"
 #include "modules/sensors/node/sensors_node.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

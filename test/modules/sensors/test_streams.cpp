@@ -1,17 +1,10 @@
-#include <catch2/catch.hpp>
-
-#include <cmath>
-
-#include <algorithm>
-#include <limits>
-#include <random>
-
 #include "modules/core/lie.hpp"
 #include "modules/core/stamp.hpp"
 #include "modules/sensors/sample_streams.hpp"
 #include "modules/sensors/stream_stamps.hpp"
 #include "modules/sensors/usual_numbers.hpp"
 #include "test/modules/sensors/euroc_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -148,7 +141,7 @@ TEST_CASE("Between poses the body moves at constant velocity", "[sensors][poses]
   CHECK(poses.why_not(nanoseconds(9.9)) == "start 0.1 s after it");
   CHECK(poses.why_not(nanoseconds(10.0)).empty());
   CHECK(poses.why_not(nanoseconds(48.0)) == "end 37.0 s before it: are the clocks different?");
-  CHECK_THAT(poses.why_not(nanoseconds(1e9)), Catch::Contains("another clock, unit or column"));
+  CHECK_THAT(poses.why_not(nanoseconds(1e9)), Contains("another clock, unit or column"));
   CHECK(!poses.at(nanoseconds(9.9)));
   for (const double t_s : {10.0, 10.1, 10.4, 10.75, 11.0}) {
     CAPTURE(t_s);
@@ -250,10 +243,10 @@ TEST_CASE("A file of poses is read row by row", "[sensors][poses]") {
   CHECK(report.count(ReaderFault::kMalformedRow) == 4);
   CHECK(report.count(ReaderFault::kUnorderedStamp) == 1);
   CHECK_THAT(report.entries().at(ReaderFault::kMalformedRow).first,
-             Catch::Contains("poses.tum line 4: the quaternion's norm is not 1"));
+             Contains("poses.tum line 4: the quaternion's norm is not 1"));
   CHECK_THROWS_WITH(read_pose_file(folder.write("none.tum", "1 2 3\n"), report),
-                    Catch::Contains("none.tum: no pose in it: t[s] x y z qx qy qz qw; ") &&
-                        Catch::EndsWith("none.tum line 1: has 3 fields, not 8 or 44"));
+                    Contains("none.tum: no pose in it: t[s] x y z qx qy qz qw; ") &&
+                        EndsWith("none.tum line 1: has 3 fields, not 8 or 44"));
 }
 
 TEST_CASE("Packets get the poses of a file and frames without one are counted",
@@ -295,7 +288,7 @@ TEST_CASE("Numbers of sensors outside the usual range are named by their confusi
   const auto found = doubt(c.number, c.value);
   REQUIRE(found);
   CHECK(found->id == c.id);
-  CHECK_THAT(found->what, Catch::Contains(c.words));
+  CHECK_THAT(found->what, Contains(c.words));
   CHECK_FALSE(doubt(UsualNumber::kBaseline_m, 0.54));  // KITTI
   CHECK_FALSE(doubt(UsualNumber::kImageRate_hz, std::nan("")));
   const auto exchanged = gravity_doubt({{1, {0.0, 9.8, 0.0}, {0.1, 0.0, 0.0}}});
@@ -317,7 +310,7 @@ TEST_CASE("The first packets of a source show its rates and units once", "[senso
     for (const Doubt& doubt : first.add(packet)) found.push_back(doubt);
   }
   REQUIRE(found.size() == 3);
-  CHECK_THAT(found[0].what, Catch::Contains("20000 Hz, usually 1 to 1000 Hz: 20 Hz if of stamps"));
+  CHECK_THAT(found[0].what, Contains("20000 Hz, usually 1 to 1000 Hz: 20 Hz if of stamps"));
   CHECK(found[2].id == "depth.size");
   CHECK(found[1].id == "imu.stamps");
 }

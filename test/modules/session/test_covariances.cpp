@@ -1,10 +1,9 @@
-#include <catch2/catch.hpp>
-
 #include "modules/core/lie.hpp"
 #include "modules/core/symmetric_eigen.hpp"
 #include "modules/robust/tree_newton.hpp"
 #include "modules/tree_newton/edge_model.hpp"
 #include "test/support/solver_team.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,11 +1,9 @@
-#include <catch2/catch.hpp>
-#include <utility>
-
 #include "modules/core/measurement_limits.hpp"
 #include "modules/rbcd/solver_choice.hpp"
 #include "modules/robust/fix_placement.hpp"
 #include "test/support/random_pose.hpp"
 #include "test/support/team_network.hpp"
+#include "test/support/test.hpp"
 
 // Robots with absolute fixes: keyframe 0 is the origin of the absolute frame, and the step to
 // keyframe 1 is unknown.

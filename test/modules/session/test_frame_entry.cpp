@@ -1,9 +1,8 @@
-#include <catch2/catch.hpp>
-
 #include "modules/core/lie.hpp"
 #include "modules/robust/lone_solution.hpp"
 #include "modules/session/frame_entry.hpp"
 #include "test/support/random_pose.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,8 +1,5 @@
-#include <catch2/catch.hpp>
-
-#include <random>
-
 #include "modules/session/frame_ties.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

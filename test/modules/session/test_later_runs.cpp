@@ -1,9 +1,8 @@
-#include <catch2/catch.hpp>
-
 #include "modules/core/measurement_limits.hpp"
 #include "modules/rbcd/solver_choice.hpp"
 #include "test/support/random_pose.hpp"
 #include "test/support/team_network.hpp"
+#include "test/support/test.hpp"
 
 // A run that localises itself in the map of a former run: keyframe 0 is of the map, and the step to
 // keyframe 1 is unknown.

@@ -1,11 +1,8 @@
 #include <Eigen/Geometry>
-#include <catch2/catch.hpp>
-#include <cmath>
-#include <iostream>
-#include <limits>
 
 #include "modules/rbcd/solver_choice.hpp"
 #include "test/support/team_network.hpp"
+#include "test/support/test.hpp"
 
 // One robot of four runs the stock program on an invented graph. The result of the three other
 // robots is compared with their result without it.

@@ -1,8 +1,5 @@
-#include <catch2/catch.hpp>
-
-#include <limits>
-
 #include "modules/session/own_graph.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,11 +1,5 @@
-#include <catch2/catch.hpp>
-
-#include <algorithm>
-#include <map>
-#include <memory>
-#include <vector>
-
 #include "modules/session/reliable_channel.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

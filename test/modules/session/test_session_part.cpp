@@ -1,11 +1,7 @@
-#include <catch2/catch.hpp>
-
-#include <algorithm>
-#include <random>
-
 #include "modules/core/bytes.hpp"
 #include "modules/session/session_part.hpp"
 #include "test/support/random_pose.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,6 +1,6 @@
 #include "modules/session/session_schedule.hpp"
 
-#include <catch2/catch.hpp>
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

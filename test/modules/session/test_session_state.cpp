@@ -1,6 +1,5 @@
-#include <catch2/catch.hpp>
-
 #include "modules/session/session_state.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,8 +1,7 @@
-#include <catch2/catch.hpp>
-
 #include "modules/session/team_message_bytes.hpp"
 #include "test/support/scripted_solver.hpp"
 #include "test/support/team_network.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -159,7 +158,7 @@ TEST_CASE("a graph that cannot be solved ends the session for all, with a notice
   for (const RobotId id : kIds)
     feed(network.add({id, 1}, {}, id == 50 ? gather(options) : gather()), id, problem);
   (void)network.run(60.0);
-  CHECK_THAT(network.robots.at(50).notices.front(), Catch::Contains("cannot be solved"));
+  CHECK_THAT(network.robots.at(50).notices.front(), Contains("cannot be solved"));
   for (const RobotId id : kIds) {
     CAPTURE(id);
     CHECK_FALSE(network.agent(id).in_session());
@@ -242,7 +241,7 @@ TEST_CASE("robots with different methods optimise separately, with a notice",
   }));
   CHECK(network.robots.at(33).progress.members == std::vector<RobotId>{33});
   REQUIRE_FALSE(network.robots.at(7).notices.empty());
-  CHECK_THAT(network.robots.at(7).notices.front(), Catch::Contains("another method"));
+  CHECK_THAT(network.robots.at(7).notices.front(), Contains("another method"));
 }
 
 TEST_CASE("refused inputs are counted, with a notice", "[pose_graph][agent]") {

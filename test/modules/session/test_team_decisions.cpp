@@ -1,8 +1,7 @@
-#include <catch2/catch.hpp>
-
 #include "modules/rbcd/solver_choice.hpp"
 #include "test/support/scripted_solver.hpp"
 #include "test/support/team_network.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,6 +1,5 @@
-#include <catch2/catch.hpp>
-
 #include "modules/core/team_links.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

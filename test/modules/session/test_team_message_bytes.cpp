@@ -1,14 +1,8 @@
-#include <catch2/catch.hpp>
-
-#include <functional>
-#include <limits>
-#include <map>
-#include <random>
-
 #include "modules/core/bytes.hpp"
 #include "modules/session/team_message_bytes.hpp"
 #include "modules/session/team_notices.hpp"
 #include "test/support/random_pose.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

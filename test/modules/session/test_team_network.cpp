@@ -1,10 +1,9 @@
 #include <malloc.h>
 
-#include <catch2/catch.hpp>
-
 #include "modules/rbcd/solver_choice.hpp"
 #include "modules/robust/tree_messages.hpp"
 #include "test/support/team_network.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

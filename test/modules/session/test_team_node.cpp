@@ -1,15 +1,10 @@
-#include <catch2/catch.hpp>
-
-#include <condition_variable>
-#include <mutex>
-#include <optional>
-
 #include "modules/core/precision.hpp"
 #include "modules/rbcd/solver_choice.hpp"
 #include "modules/session/node/team_node.hpp"
 #include "test/support/captured_log.hpp"
 #include "test/support/patience.hpp"
 #include "test/support/split_graph.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,6 +1,5 @@
-#include <catch2/catch.hpp>
-
 #include "modules/session/team_plan.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,13 +1,7 @@
-#include <catch2/catch.hpp>
-
-#include <algorithm>
-#include <cmath>
-#include <map>
-#include <vector>
-
 #include "modules/core/lie.hpp"
 #include "modules/rbcd/solver_choice.hpp"
 #include "test/support/team_network.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

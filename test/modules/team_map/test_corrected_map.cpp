@@ -1,19 +1,9 @@
-#include <catch2/catch.hpp>
-
-#include <algorithm>
-#include <cmath>
-#include <cstdint>
-#include <map>
-#include <memory>
-#include <optional>
-#include <variant>
-#include <vector>
-
 #include "modules/mesh/node/mesh_chunks_node.hpp"
 #include "modules/mesh/team_mesh.hpp"
 #include "modules/mesh_deformation/mesh_corrector.hpp"
 #include "test/modules/mesh_deformation/corridor.hpp"
 #include "test/support/inbox.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,10 +1,5 @@
-#include <catch2/catch.hpp>
-
-#include <algorithm>
-#include <cmath>
-#include <vector>
-
 #include "modules/team_map/surface_fusion.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

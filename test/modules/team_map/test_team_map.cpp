@@ -1,13 +1,6 @@
-#include <catch2/catch.hpp>
-
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <map>
-#include <vector>
-
 #include "modules/mesh/team_mesh.hpp"
 #include "modules/team_map/team_map.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,15 +1,9 @@
-#include <catch2/catch.hpp>
-
-#include <algorithm>
-#include <array>
-#include <cstdint>
-#include <memory>
-
 #include "modules/mesh/node/mesh_chunks_node.hpp"
 #include "modules/mesh/node/mesh_codec.hpp"
 #include "modules/team_map/node/team_map_node.hpp"
 #include "test/modules/mesh/wavy_sheet.hpp"
 #include "test/runtime/dds/dds_fixture.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

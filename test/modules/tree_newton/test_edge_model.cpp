@@ -1,9 +1,8 @@
-#include <catch2/catch.hpp>
-
 #include "modules/core/lie.hpp"
 #include "modules/core/symmetric_eigen.hpp"
 #include "modules/tree_newton/edge_model.hpp"
 #include "test/support/random_pose.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,13 +1,10 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
-#include <algorithm>
-#include <catch2/catch.hpp>
-#include <random>
-#include <set>
 
 #include "modules/tree_newton/closure_cover.hpp"
 #include "modules/tree_newton/frontal_cholesky.hpp"
 #include "modules/tree_newton/sparse_choice.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,10 +1,9 @@
-#include <catch2/catch.hpp>
-
 #include "modules/core/lie.hpp"
 #include "modules/rbcd/stiefel.hpp"
 #include "modules/tree_newton/edge_model.hpp"
 #include "modules/tree_newton/vertical_prior.hpp"
 #include "test/support/pose_graph_problems.hpp"
+#include "test/support/test.hpp"
 
 // Verticals in pose graph optimisation.
 

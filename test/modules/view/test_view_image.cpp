@@ -1,14 +1,7 @@
-#include <catch2/catch.hpp>
-#include <cstdint>
-#include <memory>
-#include <random>
-#include <stdexcept>
-#include <utility>
-#include <vector>
-
 #include "modules/core/distance_color.hpp"
 #include "modules/view/view_content.hpp"
 #include "test/support/image_file.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

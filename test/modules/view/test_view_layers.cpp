@@ -1,8 +1,5 @@
-#include <catch2/catch.hpp>
-#include <memory>
-#include <variant>
-
 #include "modules/view/view_layers.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

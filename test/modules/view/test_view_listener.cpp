@@ -1,19 +1,11 @@
 #include <view.h>
-#include <array>
-#include <catch2/catch.hpp>
-#include <cmath>
-#include <cstdint>
-#include <memory>
-#include <thread>
-#include <utility>
-#include <variant>
-#include <vector>
 
 #include "modules/view/node/view_channel_codec.hpp"
 #include "modules/view/node/view_listener_node.hpp"
 #include "modules/view/view_incumbents.hpp"
 #include "runtime/clock.hpp"
 #include "test/runtime/dds/dds_fixture.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

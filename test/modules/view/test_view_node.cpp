@@ -1,15 +1,9 @@
-#include <catch2/catch.hpp>
-#include <cstddef>
-#include <memory>
-#include <optional>
-#include <utility>
-#include <vector>
-
 #include "modules/view/node/view_listener_node.hpp"
 #include "modules/view/node/view_node.hpp"
 #include "test/modules/mesh/wavy_sheet.hpp"
 #include "test/modules/view/watcher.hpp"
 #include "test/runtime/dds/dds_fixture.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

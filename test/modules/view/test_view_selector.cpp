@@ -1,11 +1,8 @@
-#include <catch2/catch.hpp>
-#include <random>
-#include <vector>
-
 #include "modules/core/lie.hpp"
 #include "modules/view/view_selector.hpp"
 #include "test/modules/view/watcher.hpp"
 #include "test/support/random_pose.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,14 +1,7 @@
-#include <catch2/catch.hpp>
-#include <limits>
-#include <span>
-#include <stdexcept>
-#include <utility>
-#include <variant>
-#include <vector>
-
 #include "modules/view/view_update.hpp"
 #include "test/modules/view/some_updates.hpp"
 #include "test/support/corrupted_input.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,9 +1,8 @@
-#include <catch2/catch.hpp>
-
 #include "modules/core/lie.hpp"
 #include "modules/vio/fixed_lag_smoother.hpp"
 #include "synthetic_motion.hpp"
 #include "test/support/numeric_jacobian.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

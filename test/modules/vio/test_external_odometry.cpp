@@ -1,8 +1,7 @@
-#include <catch2/catch.hpp>
-
 #include "modules/core/covariance.hpp"
 #include "modules/core/lie.hpp"
 #include "modules/vio/external_odometry.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

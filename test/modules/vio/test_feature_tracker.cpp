@@ -1,12 +1,8 @@
-#include <algorithm>
-#include <catch2/catch.hpp>
-#include <map>
-#include <set>
-
 #include "modules/core/lie.hpp"
 #include "modules/core/quantile.hpp"
 #include "modules/vio/feature_detector.hpp"
 #include "modules/vio/feature_tracker.hpp"
+#include "test/support/test.hpp"
 #include "textured_plane.hpp"
 
 namespace km {

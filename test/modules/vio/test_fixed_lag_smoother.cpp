@@ -1,15 +1,11 @@
 #include <Eigen/LU>
-#include <catch2/catch.hpp>
-#include <limits>
-#include <optional>
-#include <random>
-#include <vector>
 
 #include "modules/core/lie.hpp"
 #include "modules/vio/fixed_lag_smoother.hpp"
 #include "modules/vio/gyro_noise_scale.hpp"
 #include "modules/vio/window_optimizer.hpp"
 #include "synthetic_motion.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,9 +1,7 @@
-#include <catch2/catch.hpp>
-#include <functional>
-
 #include "modules/vio/initialization.hpp"
 #include "modules/vio/rest_detector.hpp"
 #include "synthetic_motion.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

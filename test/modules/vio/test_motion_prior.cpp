@@ -1,12 +1,10 @@
 #include "modules/vio/motion_prior.hpp"
 
-#include <catch2/catch.hpp>
-#include <random>
-
 #include "modules/vio/residuals.hpp"
 #include "recorded_odometry.hpp"
 #include "synthetic_motion.hpp"
 #include "test/support/shared_data.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,8 +1,7 @@
-#include <catch2/catch.hpp>
-
 #include "modules/core/lie.hpp"
 #include "modules/vio/track_motion.hpp"
 #include "test/support/random_pose.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,9 +1,8 @@
 #include <Eigen/LU>
-#include <catch2/catch.hpp>
-#include <cmath>
 
 #include "modules/core/lie.hpp"
 #include "modules/vio/patches.hpp"
+#include "test/support/test.hpp"
 #include "textured_plane.hpp"
 
 namespace km {

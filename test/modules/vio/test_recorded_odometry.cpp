@@ -1,10 +1,7 @@
-#include <algorithm>
-#include <catch2/catch.hpp>
-#include <numeric>
-
 #include "modules/vio/node/vio_node.hpp"
 #include "recorded_odometry.hpp"
 #include "test/support/shared_data.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

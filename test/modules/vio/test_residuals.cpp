@@ -1,11 +1,11 @@
 #include <Eigen/Cholesky>
-#include <catch2/catch.hpp>
 
 #include "modules/vio/preintegration.hpp"
 #include "modules/vio/window.hpp"
 #include "synthetic_motion.hpp"
 #include "test/support/numeric_jacobian.hpp"
 #include "test/support/random_pose.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,13 +1,8 @@
-#include <algorithm>
-#include <catch2/catch.hpp>
-#include <limits>
-#include <optional>
-#include <random>
-
 #include "modules/core/covariance.hpp"
 #include "modules/vio/keyframe_rule.hpp"
 #include "modules/vio/vio.hpp"
 #include "synthetic_motion.hpp"
+#include "test/support/test.hpp"
 #include "textured_plane.hpp"
 
 namespace km {

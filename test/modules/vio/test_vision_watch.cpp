@@ -1,9 +1,6 @@
-#include <catch2/catch.hpp>
-#include <random>
-#include <vector>
-
 #include "modules/vio/estimate_watch.hpp"
 #include "modules/vio/vision_watch.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

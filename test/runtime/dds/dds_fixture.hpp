@@ -1,16 +1,5 @@
 #pragma once
 
-#include <algorithm>
-#include <catch2/catch.hpp>
-#include <chrono>
-#include <cstdint>
-#include <functional>
-#include <memory>
-#include <numeric>
-#include <string>
-#include <thread>
-#include <vector>
-
 #include "ping.h"
 #include "runtime/dds/bridge.hpp"
 #include "runtime/dds/codec.hpp"
@@ -19,6 +8,7 @@
 #include "test/support/inbox.hpp"
 #include "test/support/loopback_config.hpp"
 #include "test/support/patience.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 

@@ -1,10 +1,6 @@
-#include <algorithm>
-#include <catch2/catch.hpp>
-#include <random>
-#include <set>
-
 #include "runtime/dds/sequence_tracker.hpp"
 #include "test/runtime/dds/dds_fixture.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -4,12 +4,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <catch2/catch.hpp>
-#include <csignal>
-#include <cstdint>
-#include <set>
-
 #include "runtime/dds/domain_draw.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -27,8 +23,7 @@ TEST_CASE("No domain is drawn twice, and a host without a free domain is reporte
   CHECK(drawn.size() == 5);
   CHECK(*drawn.begin() == first);
   CHECK(*drawn.rbegin() == first + 4);
-  CHECK_THROWS_WITH(draw_domain(first, first + 4),
-                    Catch::Contains("are taken") && Catch::Contains("--domain"));
+  CHECK_THROWS_WITH(draw_domain(first, first + 4), Contains("are taken") && Contains("--domain"));
 }
 
 TEST_CASE("A domain with a participant of a program that drew none is not drawn", "[domain_draw]") {
@@ -42,7 +37,7 @@ TEST_CASE("A domain with a participant of a program that drew none is not drawn"
     address.sin_port = htons(static_cast<std::uint16_t>(7400 + 250 * ++domain + offset));
     REQUIRE(domain < 230);
   } while (bind(participant, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0);
-  CHECK_THROWS_WITH(draw_domain(domain, domain), Catch::Contains("are taken"));
+  CHECK_THROWS_WITH(draw_domain(domain, domain), Contains("are taken"));
   close(participant);
 }
 

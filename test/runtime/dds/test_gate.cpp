@@ -1,9 +1,5 @@
-#include <algorithm>
-#include <catch2/catch.hpp>
-#include <future>
-#include <random>
-
 #include "test/runtime/dds/dds_fixture.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

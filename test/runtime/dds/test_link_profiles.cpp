@@ -1,14 +1,9 @@
 #include <netdb.h>
 
-#include <catch2/catch.hpp>
-#include <string>
-#include <vector>
-
 #include "runtime/config_layers.hpp"
 #include "runtime/dds/participant.hpp"
 #include "test/runtime/dds/dds_fixture.hpp"
-
-using Catch::Contains;
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -126,8 +121,8 @@ TEST_CASE("Hosts that are unknown are all named", "[dds]") {
   else
     CHECK_NOTHROW(check_hosts({"localhost"}));
   CHECK_THROWS_WITH(check_hosts({"10.0.0.2", "not an address", "10.0.0.300:7", "10.0.0.3:port"}),
-                    Catch::Contains("not an address: ") && Catch::Contains("10.0.0.300:7: ") &&
-                        Catch::Contains("10.0.0.3:port: ") && !Catch::Contains("10.0.0.2"));
+                    Contains("not an address: ") && Contains("10.0.0.300:7: ") &&
+                        Contains("10.0.0.3:port: ") && !Contains("10.0.0.2"));
 }
 
 }  // namespace

@@ -1,11 +1,7 @@
-#include <catch2/catch.hpp>
-#include <fstream>
-#include <iostream>
-#include <sstream>
-
 #include "test/runtime/dds/peer_process.hpp"
 #include "test/support/command.hpp"
 #include "test/support/network.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -32,8 +28,7 @@ struct Pair {
   [[nodiscard]] std::unique_ptr<Process> start(const VirtualNetwork& network, int host,
                                                const std::vector<std::string>& settings) const {
     const auto robot = static_cast<RobotId>(2 + host);
-    return start_peer(robot, settings, network.host(host),
-                      keys ? keys->of(robot) : std::filesystem::path());
+    return start_peer(robot, settings, network.host(host), keys ? keys->of(robot) : fs::path());
   }
 };
 
@@ -102,7 +97,7 @@ TEST_CASE("A robot that is received but does not receive this one is unmet, with
   robots.b->send_line("unmet");
   const auto line = robots.b->wait_for_prefix("unmet ");
   REQUIRE(line);
-  CHECK_THAT(line->text, Catch::Contains("robot3 (id 3): ") && Catch::Contains("firewall"));
+  CHECK_THAT(line->text, Contains("robot3 (id 3): ") && Contains("firewall"));
 }
 
 TEST_CASE("Large messages pass a network that drops fragments of packets", "[dds][namespaces]") {

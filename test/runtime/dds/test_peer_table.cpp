@@ -1,10 +1,6 @@
-#include <algorithm>
-#include <catch2/catch.hpp>
-#include <string>
-#include <vector>
-
 #include "runtime/dds/peer_table.hpp"
 #include "runtime/dds/robot_identity.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -159,7 +155,7 @@ TEST_CASE("A robot that has proven its identity returns without another proof", 
     const std::vector<PeerEvent> events = table.take_events();
     REQUIRE(events.size() == 1);
     CHECK(events[0].kind == PeerEventKind::kRefused);
-    CHECK_THAT(events[0].text, Catch::StartsWith("forged announcements"));
+    CHECK_THAT(events[0].text, StartsWith("forged announcements"));
     CHECK(table.forged_announcements() == 1);
     CHECK(table.identity_of(guid(2))->boot == 70);
   }
@@ -225,7 +221,7 @@ TEST_CASE("A robot is isolated while robots are announced and none is received",
   table.participant(guid(2), data_of(7, 70), "");
   CHECK(table.is_isolated());
   CHECK_FALSE(table.receives_strangers());
-  CHECK_THAT(table.unmet().begin()->second, Catch::Contains("does not receive it (firewall, NAT"));
+  CHECK_THAT(table.unmet().begin()->second, Contains("does not receive it (firewall, NAT"));
   table.alive(guid(2));
   CHECK_FALSE(table.is_isolated());
   table.silent(guid(2));
@@ -301,7 +297,7 @@ TEST_CASE("No participant takes over the id of a present robot", "[peers]") {
   const auto events = table.take_events();
   REQUIRE(events.size() == 1);
   CHECK(events[0].kind == PeerEventKind::kRefused);
-  CHECK_THAT(events[0].text, Catch::Contains("udp/10.0.0.66"));
+  CHECK_THAT(events[0].text, Contains("udp/10.0.0.66"));
   CHECK(table.standing(guid(3)) == Standing::kRival);
   CHECK(table.standing(guid(2)) == Standing::kAdmitted);
   CHECK(table.peers()[0].identity.boot == kBoot);
@@ -333,7 +329,7 @@ TEST_CASE("With keys a former process does not get its id back", "[peers]") {
   const std::vector<PeerEvent> events = table.take_events();
   REQUIRE_FALSE(events.empty());
   CHECK(events.back().kind == PeerEventKind::kRefused);
-  CHECK_THAT(events.back().text, Catch::Contains("start it again"));
+  CHECK_THAT(events.back().text, Contains("start it again"));
   if (!was_silent) table.silent(guid(3));
   CHECK(table.is_current({7, kBoot + 1}));
   table.reported({7, "peer", kProtocolVersion, former});
@@ -373,7 +369,7 @@ TEST_CASE("The newer of two processes with this robot's id yields", "[peers]") {
   const auto events = meet_twin(kSelf, {1, "twin", kProtocolVersion, its_boot}, own_s, its_s, 30.0);
   REQUIRE(events.size() == 1);
   CHECK(events[0].kind == expected);
-  CHECK_THAT(events[0].text, Catch::Contains("give every robot its own --robot"));
+  CHECK_THAT(events[0].text, Contains("give every robot its own --robot"));
 }
 
 TEST_CASE("One of two processes with one id ends, whichever errors they measure with", "[peers]") {

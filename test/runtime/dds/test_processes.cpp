@@ -1,9 +1,6 @@
-#include <catch2/catch.hpp>
-#include <chrono>
-#include <thread>
-
 #include "test/runtime/dds/peer_process.hpp"
 #include "test/support/forged_discovery.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -39,7 +36,7 @@ TEST_CASE("Robots meet after forged packets have replaced the announcement of on
       {{true, kUserData}, {false, kUserData}, {true, kAddresses}}));
   CAPTURE(has_keys, change);
   const auto start = [&, has_keys = has_keys](RobotId id) {
-    return start_peer(id, settings, 0, has_keys ? keys.of(id) : std::filesystem::path());
+    return start_peer(id, settings, 0, has_keys ? keys.of(id) : fs::path());
   };
   const auto a = start(3);
   ForgedDiscovery stranger(loopback_config().domain);

@@ -1,7 +1,5 @@
-#include <catch2/catch.hpp>
-#include <string>
-
 #include "runtime/dds/robot_identity.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

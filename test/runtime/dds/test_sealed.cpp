@@ -1,11 +1,7 @@
-#include <algorithm>
-#include <atomic>
-#include <catch2/catch.hpp>
-#include <future>
-
 #include "runtime/clock.hpp"
 #include "test/modules/security/toy_team.hpp"
 #include "test/runtime/dds/dds_fixture.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 

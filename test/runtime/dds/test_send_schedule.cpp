@@ -1,10 +1,7 @@
-#include <catch2/catch.hpp>
-#include <string>
-#include <vector>
-
 #include "runtime/dds/fair_queue.hpp"
 #include "runtime/dds/robot_status.hpp"
 #include "runtime/dds/send_schedule.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

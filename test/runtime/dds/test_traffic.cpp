@@ -1,8 +1,5 @@
-#include <catch2/catch.hpp>
-#include <sstream>
-#include <string>
-
 #include "runtime/dds/traffic.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,10 +1,5 @@
-#include <catch2/catch.hpp>
-#include <memory>
-#include <string>
-#include <utility>
-#include <vector>
-
 #include "test/runtime/overlay/overlay_network.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,12 +1,5 @@
-#include <algorithm>
-#include <array>
-#include <catch2/catch.hpp>
-#include <memory>
-#include <set>
-#include <utility>
-#include <vector>
-
 #include "test/runtime/overlay/overlay_network.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,8 +1,7 @@
-#include <catch2/catch.hpp>
-
 #include "runtime/overlay/overlay.hpp"
 #include "runtime/overlay/overlay_codec.hpp"
 #include "test/support/corrupted_message.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

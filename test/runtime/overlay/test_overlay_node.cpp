@@ -1,9 +1,3 @@
-#include <catch2/catch.hpp>
-#include <memory>
-#include <optional>
-#include <string>
-#include <vector>
-
 #include "modules/loop_closure/node/loop_closure_codec.hpp"
 #include "modules/outlier_rejection/node/outlier_rejection_codec.hpp"
 #include "modules/place_recognition/node/place_recognition_codec.hpp"
@@ -13,6 +7,7 @@
 #include "test/modules/security/toy_team.hpp"
 #include "test/runtime/dds/dds_fixture.hpp"
 #include "test/support/inbox.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,14 +1,6 @@
-#include <algorithm>
-#include <catch2/catch.hpp>
-#include <map>
-#include <memory>
-#include <random>
-#include <set>
-#include <utility>
-#include <vector>
-
 #include "runtime/overlay/overlay.hpp"
 #include "test/runtime/overlay/overlay_network.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,15 +1,9 @@
-#include <algorithm>
-#include <catch2/catch.hpp>
-#include <map>
-#include <random>
-#include <set>
-#include <utility>
-
 #include "apps/lab/pgo/agent_team.hpp"
 #include "apps/lab/pgo/solvers.hpp"
 #include "modules/core/lie.hpp"
 #include "modules/tree_newton/chordal.hpp"
 #include "test/support/team_graphs.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

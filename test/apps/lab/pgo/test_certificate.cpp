@@ -1,7 +1,5 @@
 #include "apps/lab/pgo/certificate.hpp"
 
-#include <catch2/catch.hpp>
-
 #include "apps/lab/pgo/solvers.hpp"
 #include "modules/core/lie.hpp"
 #include "modules/core/symmetric_eigen.hpp"
@@ -9,6 +7,7 @@
 #include "test/support/pose_graph_problems.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/team_graphs.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,16 +1,9 @@
-#include <algorithm>
-#include <catch2/catch.hpp>
-#include <numeric>
-#include <optional>
-#include <random>
-#include <string>
-#include <vector>
-
 #include "apps/lab/pgo/agent_team.hpp"
 #include "apps/lab/pgo/scenario.hpp"
 #include "apps/lab/pgo/solvers.hpp"
 #include "apps/lab/pgo/team_graph_file.hpp"
 #include "test/support/shared_data.hpp"
+#include "test/support/test.hpp"
 
 // The law: a team ends with the decisions and the poses that follow from the measurements, in
 // whatever order and at whatever times its robots have met.

@@ -1,12 +1,3 @@
-#include <algorithm>
-#include <catch2/catch.hpp>
-#include <map>
-#include <optional>
-#include <random>
-#include <set>
-#include <string>
-#include <vector>
-
 #include "apps/lab/pgo/agent_team.hpp"
 #include "apps/lab/pgo/member_team.hpp"
 #include "apps/lab/pgo/scenario.hpp"
@@ -16,6 +7,7 @@
 #include "test/support/eavesdropper.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/team_graphs.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,10 +1,4 @@
-#include <algorithm>
-#include <catch2/catch.hpp>
 #include <nlohmann/json.hpp>
-#include <random>
-#include <set>
-#include <sstream>
-#include <string>
 
 #include "apps/lab/pgo/agent_team.hpp"
 #include "apps/lab/pgo/outlier_study.hpp"
@@ -16,11 +10,10 @@
 #include "test/support/shared_data.hpp"
 #include "test/support/team_graphs.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
-
-using Catch::Contains;
 
 const std::string kOutliersTool = KM_BIN_DIR "/kimera_multi_pgo outliers ";
 

@@ -1,8 +1,3 @@
-#include <algorithm>
-#include <catch2/catch.hpp>
-#include <random>
-#include <string>
-
 #include "apps/lab/pgo/pcm_run.hpp"
 #include "apps/lab/pgo/scenario.hpp"
 #include "modules/outlier_rejection/pcm.hpp"
@@ -11,11 +6,10 @@
 #include "test/support/command.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
-
-using Catch::Contains;
 
 const std::string kPcmTool = std::string(KM_BIN_DIR) + "/kimera_multi_pgo pcm ";
 
@@ -129,7 +123,7 @@ TEST_CASE("Closures without a usable covariance are refused by name", "[pcm]") {
   std::mt19937 rng(1);
   std::vector<LabelledClosure> closures = mixed(3, rng);
   closures[1].closure.covariance(0, 0) = -1.0;
-  CHECK_THROWS_WITH(run_pcm(closures), Catch::Contains("cannot be weighed"));
+  CHECK_THROWS_WITH(run_pcm(closures), Contains("cannot be weighed"));
 }
 
 TEST_CASE("With 1000 outliers the clique of Manhattan consists of true closures", "[pcm]") {
@@ -191,8 +185,7 @@ TEST_CASE("Random outliers join keyframes that odometry does not, in their box",
 
 TEST_CASE("Two keyframes are too few for an outlier", "[pcm]") {
   std::mt19937 rng(1);
-  CHECK_THROWS_WITH(random_outliers(1, {.robot = 0, .keyframes = 2}, rng),
-                    Catch::Contains("2 keyframes"));
+  CHECK_THROWS_WITH(random_outliers(1, {.robot = 0, .keyframes = 2}, rng), Contains("2 keyframes"));
 }
 
 }  // namespace

@@ -1,12 +1,3 @@
-#include <algorithm>
-#include <catch2/catch.hpp>
-#include <cmath>
-#include <map>
-#include <random>
-#include <set>
-#include <string>
-#include <vector>
-
 #include "apps/lab/pgo/outlier_study.hpp"
 #include "apps/lab/pgo/scenario.hpp"
 #include "apps/lab/pgo/team_graph_file.hpp"
@@ -14,11 +5,11 @@
 #include "modules/recorded_graph/g2o_io.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/team_graphs.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
 
-using Catch::Contains;
 using Eigen::Index;
 
 constexpr NoiseSigma kStep{.rotation_rad = 0.002, .translation_m = 0.01};

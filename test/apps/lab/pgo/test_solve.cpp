@@ -1,18 +1,13 @@
-#include <algorithm>
-#include <catch2/catch.hpp>
-#include <fstream>
 #include <regex>
-#include <sstream>
 
 #include "modules/recorded_graph/g2o_io.hpp"
 #include "test/support/command.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
-
-using Catch::Contains;
 
 const std::string kSolveTool = KM_BIN_DIR "/kimera_multi_pgo solve ";
 

@@ -1,14 +1,11 @@
 #include "apps/lab/pgo/team_graph_file.hpp"
 
-#include <catch2/catch.hpp>
-
 #include "test/support/shared_data.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
-
-using Catch::Contains;
 
 G2oGraph graph_of(const std::string& text) {
   return parse_g2o(text, "graph.g2o");
@@ -176,9 +173,8 @@ TEST_CASE("A folder's verticals are those of all its files", "[pgo][vertical]") 
   CAPTURE(left_by_a_run);
   if (left_by_a_run) {
     for (const std::string robot : {"4", "2"}) {
-      std::filesystem::create_directory(folder.path() / robot);
-      std::filesystem::rename(folder.path() / (robot + ".g2o"),
-                              folder.path() / robot / "pose_graph.g2o");
+      fs::create_directory(folder.path() / robot);
+      fs::rename(folder.path() / (robot + ".g2o"), folder.path() / robot / "pose_graph.g2o");
     }
     folder.write("label_palette.csv", "id,name\n");
   }
@@ -204,8 +200,8 @@ TEST_CASE("A folder and a run have the weights that robots use", "[pgo]") {
     CHECK(edge.tau == Approx(precision_of(covariance).tau));
   };
   check_weights();
-  std::filesystem::create_directory(folder.path() / "robot3");
-  std::filesystem::rename(folder.path() / "a.g2o", folder.path() / "robot3" / "pose_graph.g2o");
+  fs::create_directory(folder.path() / "robot3");
+  fs::rename(folder.path() / "a.g2o", folder.path() / "robot3" / "pose_graph.g2o");
   check_weights();
 
   graph.edges.push_back({{3, 0}, {7, 2}, SE3::Identity(), covariance});

@@ -1,5 +1,3 @@
-#include <catch2/catch.hpp>
-
 #include "apps/lab/pgo/member_team.hpp"
 #include "apps/lab/pgo/solvers.hpp"
 #include "modules/core/lie.hpp"
@@ -7,6 +5,7 @@
 #include "modules/tree_newton/chordal.hpp"
 #include "test/support/pose_graph_problems.hpp"
 #include "test/support/team_graphs.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -89,7 +88,7 @@ TEST_CASE("A robot whose own edges do not connect its poses cannot solve alone",
     return (e.i == 15 || e.j == 15) && graph.robot_of(e.i) == graph.robot_of(e.j);
   });
   CHECK_THROWS_WITH(run_solver(graph, any_start(graph), {.method = "local"}, {}),
-                    Catch::Contains("robot 1 cannot solve alone"));
+                    Contains("robot 1 cannot solve alone"));
 }
 
 TEST_CASE("Robots with verticals that solve alone are joined upright", "[pgo][vertical]") {

@@ -1,5 +1,3 @@
-#include <catch2/catch.hpp>
-#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "apps/lab/pgo/truth_score.hpp"
@@ -7,11 +5,10 @@
 #include "test/support/shared_data.hpp"
 #include "test/support/small_jrl.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
-
-using Catch::Contains;
 
 const std::string kPgoTool = KM_BIN_DIR "/kimera_multi_pgo ";
 

@@ -1,10 +1,5 @@
 #include <yaml-cpp/yaml.h>
 #include <zlib.h>
-#include <catch2/catch.hpp>
-#include <cmath>
-#include <filesystem>
-#include <map>
-#include <string>
 
 #include "apps/lab/simulate/dataset_record.hpp"
 #include "apps/lab/simulate/robot_scenario.hpp"
@@ -12,13 +7,12 @@
 #include "test/support/command.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
 
 // kimera_multi_simulate as a program, on the smallest possible recordings.
-
-namespace fs = std::filesystem;
 
 const std::string kProgram = std::string(KM_BIN_DIR) + "/kimera_multi_simulate";
 const std::string kSmall =
@@ -78,15 +72,15 @@ TEST_CASE("The ordinary reader reads a recording, and missing images are made ag
   for (const char* file : {"world.ply", "objects.json", "label_palette.csv"})
     CHECK(fs::exists(output / file));
   CHECK_THAT(folder.read("r/team.yaml"),
-             Catch::Contains("mapping.mode=semantic, --set, semantic_mapping.voxel_size_m=0.05, "
-                             "--set, vio.drift_rotation=2e-4") &&
-                 Catch::Contains("truth: \"robot1/mav0/state_groundtruth_estimate0/data.csv\""));
+             Contains("mapping.mode=semantic, --set, semantic_mapping.voxel_size_m=0.05, "
+                      "--set, vio.drift_rotation=2e-4") &&
+                 Contains("truth: \"robot1/mav0/state_groundtruth_estimate0/data.csv\""));
 
   const auto whole = contents(folder, "r");
-  CHECK_THAT(simulate(kSmall, output).output, Catch::Contains("complete already; nothing to do"));
+  CHECK_THAT(simulate(kSmall, output).output, Contains("complete already; nothing to do"));
   // As a run leaves it that was stopped.
   std::string record = folder.read("r/simulation.json");
-  CHECK_THAT(record, Catch::Contains("\"complete\": true"));  // as config/docker/entrypoint looks
+  CHECK_THAT(record, Contains("\"complete\": true"));  // as config/docker/entrypoint looks
   record.replace(record.rfind("true"), 4, "false");
   folder.write("r/simulation.json", record);
   fs::remove_all(output / "robot1/mav0/cam1/data");
@@ -163,20 +157,20 @@ TEST_CASE("Recorded states and samples are read, gzipped or not", "[simulate]") 
   CHECK(state.accel_bias == Eigen::Vector3d(10, 11, 12));
   REQUIRE(flight.imu.size() == 2);
   CHECK(flight.imu[1].accel == Eigen::Vector3d(4, 5, 7));
-  CHECK_THAT(flight.fingerprint, Catch::Contains(truth.filename().string()));
+  CHECK_THAT(flight.fingerprint, Contains(truth.filename().string()));
 }
 
 TEST_CASE("Recordings that cannot be used are refused by file and line", "[simulate]") {
   CHECK_THAT(refusal_of_flight(kEuroc + "3000,1,2,x,1,0,0,0\n", kImu),
-             Catch::Contains("truth.csv line 5: x is not a finite number"));
+             Contains("truth.csv line 5: x is not a finite number"));
   CHECK_THAT(refusal_of_flight(kEuroc + "3000,1,2,3,9,0,0,0\n", kImu),
-             Catch::Contains("line 5") && Catch::Contains("norm"));
-  CHECK_THAT(refusal_of_flight(kEuroc + "1500,1,2,3,1,0,0,0\n", kImu), Catch::Contains("line 5"));
+             Contains("line 5") && Contains("norm"));
+  CHECK_THAT(refusal_of_flight(kEuroc + "1500,1,2,3,1,0,0,0\n", kImu), Contains("line 5"));
   CHECK_THAT(refusal_of_flight(kEuroc, kImu + "2900,1,2\n"),
-             Catch::Contains("imu.csv line 4: has only 3 fields"));
-  CHECK_THAT(refusal_of_flight("", kImu), Catch::Contains("truth.csv: holds no data"));
+             Contains("imu.csv line 4: has only 3 fields"));
+  CHECK_THAT(refusal_of_flight("", kImu), Contains("truth.csv: holds no data"));
   CHECK_THAT(refusal_of_flight(kEuroc, "9000,1,2,3,4,5,6\n9900,1,2,3,4,5,7\n"),
-             Catch::Contains("do not overlap in time"));
+             Contains("do not overlap in time"));
 }
 
 const DatasetRecord kWanted = {"simulator 1", {{"world", "city"}, {"seed", "1"}}, false};
@@ -195,25 +189,24 @@ TEST_CASE("A folder with other content or parameters is refused", "[simulate]") 
   SECTION("files of others") {
     folder.write("thesis.tex", "");
     CHECK_THAT(refusal(folder.path()),
-               Catch::Contains("not made by this program") && Catch::Contains("another --output"));
+               Contains("not made by this program") && Contains("another --output"));
     CHECK(std::distance(fs::directory_iterator(folder.path()), {}) == 1);
   }
   SECTION("other parameters") {
     CHECK(refusal(folder.path()).empty());
     DatasetRecord other = kWanted;
     other.parameters = {{"world", "city"}, {"seed", "2"}, {"labels", "yes"}};
-    CHECK_THAT(refusal(folder.path(), other),
-               Catch::Contains("seed: 1 there, 2 asked for") &&
-                   Catch::Contains("labels: none there, yes asked") &&
-                   Catch::Contains("another --output"));
+    CHECK_THAT(refusal(folder.path(), other), Contains("seed: 1 there, 2 asked for") &&
+                                                  Contains("labels: none there, yes asked") &&
+                                                  Contains("another --output"));
   }
   SECTION("a damaged record") {
     folder.write("simulation.json", GENERATE("{\"generator\": ", "", "[1, 2]", "{\"a\": \"x\"}"));
-    CHECK_THAT(refusal(folder.path()), Catch::Contains("simulation.json: cannot be understood"));
+    CHECK_THAT(refusal(folder.path()), Contains("simulation.json: cannot be understood"));
   }
   SECTION("a place that cannot be written") {
     const fs::path below_file = folder.write("file", "") / "recordings";
-    CHECK_THAT(refusal(below_file), Catch::Contains(below_file.string()));
+    CHECK_THAT(refusal(below_file), Contains(below_file.string()));
   }
 }
 

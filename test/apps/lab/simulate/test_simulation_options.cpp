@@ -1,13 +1,9 @@
-#include <catch2/catch.hpp>
-
 #include <CLI/CLI.hpp>
-#include <algorithm>
-#include <string>
-#include <vector>
 
 #include "apps/lab/simulate/effects.hpp"
 #include "apps/lab/simulate/simulation_options.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -61,7 +57,7 @@ TEST_CASE("Bad arguments are refused with their name and value", "[simulate]") {
       Row{{"--difficulty", "4"}, "difficulty = 4"},
       Row{{"--trajectory", "/nowhere.csv"}, "/nowhere.csv"});
   CAPTURE(row.words);
-  CHECK_THAT(refusal_of_options(row.words), Catch::Contains(row.message));
+  CHECK_THAT(refusal_of_options(row.words), Contains(row.message));
 }
 
 TEST_CASE("Recorded motion needs a pair of files for each robot", "[simulate]") {
@@ -70,13 +66,13 @@ TEST_CASE("Recorded motion needs a pair of files for each robot", "[simulate]") 
   const std::string b =
       folder.write("V1_03/mav0/state_groundtruth_estimate0/data.csv", "").string();
   CHECK_THAT(refusal_of_options({"--trajectory", a, b, "--imu", a}),
-             Catch::Contains("--trajectory names 2 files, --imu 1"));
+             Contains("--trajectory names 2 files, --imu 1"));
   CHECK_THAT(refusal_of_options({"--trajectory", a, a, "--imu", a, a}),
-             Catch::Contains("named V1_02_medium"));
+             Contains("named V1_02_medium"));
   CHECK_THAT(refusal_of_options({"--trajectory", a, "--imu", a, "--names", "a", "b"}),
-             Catch::Contains("one name per --trajectory"));
+             Contains("one name per --trajectory"));
   CHECK_THAT(refusal_of_options({"--trajectory", a, "--imu", a, "--names", "../a"}),
-             Catch::Contains("'../a'"));
+             Contains("'../a'"));
   const auto options =
       parse({"--world", "vicon_room", "--output", "x", "--trajectory", a, b, "--imu", a, b});
   CHECK(options.names == std::vector<std::string>{"V1_02_medium", "V1_03"});
@@ -89,15 +85,15 @@ TEST_CASE("All errors of a file of options are reported by line", "[simulate]") 
       folder.write("bad.yaml", "# a city\nworld: citty\nsped: 3\nrate: fast  # Hz\ndepth: maybe\n")
           .string();
   CHECK_THAT(refusal_of_options({"--config", file, "--robots", "0"}),
-             Catch::Contains(file + ":4: rate = fast is not a number, 0.1 .. 200") &&
-                 Catch::Contains(file + ":5: depth = maybe is not true or false") &&
-                 Catch::Contains(file + ":3: unknown key sped (did you mean seed?)") &&
-                 Catch::Contains("command line: robots = 0 is outside 1 .. 99") &&
-                 !Catch::Contains("citty"));  // the command line says city
+             Contains(file + ":4: rate = fast is not a number, 0.1 .. 200") &&
+                 Contains(file + ":5: depth = maybe is not true or false") &&
+                 Contains(file + ":3: unknown key sped (did you mean seed?)") &&
+                 Contains("command line: robots = 0 is outside 1 .. 99") &&
+                 !Contains("citty"));  // the command line says city
   CHECK_THAT(refusal_of_options({"--config", folder.write("c.yaml", "robots: [2\n").string()}),
-             Catch::Contains("c.yaml:2: not YAML"));
+             Contains("c.yaml:2: not YAML"));
   CHECK_THAT(refusal_of_options({"--config", "nowhere.yaml"}),
-             Catch::Contains("nowhere.yaml: cannot open"));
+             Contains("nowhere.yaml: cannot open"));
 }
 
 TEST_CASE("The files of options that come with the program can be used", "[simulate]") {

@@ -1,8 +1,6 @@
-#include <catch2/catch.hpp>
-#include <cmath>
-
 #include "modules/evaluation/mesh/map_quality.hpp"
 #include "test/modules/evaluation/mesh/shapes.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

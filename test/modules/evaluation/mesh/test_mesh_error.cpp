@@ -1,16 +1,11 @@
-#include <catch2/catch.hpp>
-#include <cmath>
-#include <limits>
 #include <nlohmann/json.hpp>
-#include <numbers>
 #include <opencv2/core/utility.hpp>
-#include <random>
-#include <vector>
 
 #include "modules/evaluation/mesh/mesh_error.hpp"
 #include "modules/evaluation/mesh/mesh_report.hpp"
 #include "modules/evaluation/mesh/sampled_surface.hpp"
 #include "test/modules/evaluation/mesh/shapes.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -209,8 +204,8 @@ TEST_CASE("More samples than allowed lower the density of both sides, with a not
   CHECK(report.merged.truth.point.count > 3500);
   CHECK(report.samples_per_m2 < 200.0);
   REQUIRE(report.notes.size() == 1);
-  CHECK_THAT(report.notes[0], Catch::StartsWith("sampled at 1") &&
-                                  Catch::Contains("instead of 1000, to stay below 5000"));
+  CHECK_THAT(report.notes[0],
+             StartsWith("sampled at 1") && Contains("instead of 1000, to stay below 5000"));
 }
 
 TEST_CASE("A face with a vertex far away is left out, and such a truth is refused",
@@ -223,10 +218,8 @@ TEST_CASE("A face with a vertex far away is left out, and such a truth is refuse
   CHECK(report.merged.estimate.surface.mean_m == Approx(0.02).margin(1e-6));
   CHECK(report.merged.area_m2 == Approx(36.0));
   REQUIRE(report.notes.size() == 1);
-  CHECK_THAT(report.notes[0],
-             Catch::StartsWith("1 faces are longer than ten times the truth, 84.9 m"));
-  CHECK_THROWS_WITH(compare(estimate, estimate, in_place()),
-                    Catch::Contains("has it a vertex far away?"));
+  CHECK_THAT(report.notes[0], StartsWith("1 faces are longer than ten times the truth, 84.9 m"));
+  CHECK_THROWS_WITH(compare(estimate, estimate, in_place()), Contains("has it a vertex far away?"));
 }
 
 TEST_CASE("Meshes without labels are compared by shape, with a note", "[mesh_error]") {
@@ -236,8 +229,8 @@ TEST_CASE("Meshes without labels are compared by shape, with a note", "[mesh_err
   CHECK_FALSE(report.has_labels);
   REQUIRE(report.notes.size() == 1);
   CHECK(report.notes[0] == "labels are not judged: none in a");
-  CHECK_THAT(json_of(report), Catch::Contains("\"labels\": null"));
-  CHECK_THAT(to_table(report, {}), !Catch::Contains("True class"));
+  CHECK_THAT(json_of(report), Contains("\"labels\": null"));
+  CHECK_THAT(to_table(report, {}), !Contains("True class"));
 }
 
 TEST_CASE("Meshes that cannot be compared are refused by name", "[mesh_error]") {
@@ -262,13 +255,13 @@ TEST_CASE("Meshes that cannot be compared are refused by name", "[mesh_error]") 
       {square(0.01F, 0.0F), "a: too small for a single"},
       {square(1.0F, 50.0F), "are both in one frame?"}};
   for (const auto& [mesh, message] : refused)
-    CHECK_THROWS_WITH(compare(good, mesh, {}), Catch::Contains(message));
-  CHECK_THROWS_WITH(compare({}, good, {}), Catch::StartsWith("truth: no faces"));
+    CHECK_THROWS_WITH(compare(good, mesh, {}), Contains(message));
+  CHECK_THROWS_WITH(compare({}, good, {}), StartsWith("truth: no faces"));
   MeshErrorOptions options{.crop_m = -1.0};
-  CHECK_THROWS_WITH(compare(good, good, options), Catch::StartsWith("a reach of -1"));
+  CHECK_THROWS_WITH(compare(good, good, options), StartsWith("a reach of -1"));
   CHECK_THROWS_AS(mesh_error(good, {}, {}), std::invalid_argument);
   const std::vector<MeshInput> one = {{"a", good}}, two = {{"a", good}, {"b", good}};
-  CHECK_THROWS_WITH(mesh_change(good, one, two), Catch::Contains("1 meshes before and 2 after"));
+  CHECK_THROWS_WITH(mesh_change(good, one, two), Contains("1 meshes before and 2 after"));
 }
 
 TEST_CASE("A mesh ends at an edge of one face with shared and with separate vertices",

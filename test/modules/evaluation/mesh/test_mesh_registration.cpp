@@ -1,11 +1,8 @@
-#include <catch2/catch.hpp>
-#include <random>
-#include <vector>
-
 #include "modules/core/lie.hpp"
 #include "modules/evaluation/mesh/mesh_error.hpp"
 #include "modules/evaluation/trajectory_error.hpp"
 #include "test/modules/evaluation/mesh/shapes.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -89,7 +86,7 @@ TEST_CASE("A large move is noted", "[mesh_error]") {
   estimate.transform(make_pose(Eigen::Matrix3d::Identity(), {0.6, 0.0, 0.0}));
   const MeshReport report = report_of(room(), estimate);
   REQUIRE_FALSE(report.notes.empty());
-  CHECK_THAT(report.notes[0], Catch::StartsWith("registration moved the estimate by up to 0.6"));
+  CHECK_THAT(report.notes[0], StartsWith("registration moved the estimate by up to 0.6"));
 }
 
 }  // namespace km

@@ -1,10 +1,4 @@
-#include <catch2/catch.hpp>
-#include <cstdint>
-#include <cstring>
-#include <filesystem>
 #include <nlohmann/json.hpp>
-#include <string>
-#include <vector>
 
 #include "apps/lab/simulation/dataset/recording.hpp"
 #include "apps/lab/simulation/world/scene.hpp"
@@ -12,11 +6,10 @@
 #include "modules/core/lie.hpp"
 #include "modules/sensors/node/open_folder.hpp"
 #include "test/support/temporary_folder.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
-
-namespace fs = std::filesystem;
 
 Camera some_camera(double shift_m) {
   Camera camera{
@@ -113,10 +106,10 @@ TEST_CASE("The world's mesh is written with classes and their colours", "[simula
   const std::string text(bytes.begin(), bytes.end());
   const std::string end = "end_header\n";
   const std::size_t body = text.find(end) + end.size();
-  CHECK_THAT(text.substr(0, body), Catch::StartsWith("ply\nformat binary_little_endian 1.0\n") &&
-                                       Catch::Contains("element vertex 3\n") &&
-                                       Catch::Contains("element face 2\n") &&
-                                       Catch::Contains("property uchar label\n"));
+  CHECK_THAT(text.substr(0, body), StartsWith("ply\nformat binary_little_endian 1.0\n") &&
+                                       Contains("element vertex 3\n") &&
+                                       Contains("element face 2\n") &&
+                                       Contains("property uchar label\n"));
   REQUIRE(bytes.size() == body + 3 * 12 + 2 * 17);
   CHECK(value_at<float>(bytes, body + 12) == 4.0F);
   CHECK(value_at<float>(bytes, body + 32) == 9.0F);

@@ -1,9 +1,3 @@
-#include <catch2/catch.hpp>
-#include <cmath>
-#include <cstddef>
-#include <cstdint>
-#include <vector>
-
 #include "apps/lab/simulation/motion/default_rig.hpp"
 #include "apps/lab/simulation/motion/depth_sensor.hpp"
 #include "apps/lab/simulation/motion/flight_trajectory.hpp"
@@ -12,6 +6,7 @@
 #include "apps/lab/simulation/motion/vehicle_trajectory.hpp"
 #include "modules/core/lie.hpp"
 #include "modules/vio/preintegration.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,12 +1,5 @@
-#include <catch2/catch.hpp>
-
 #include <Eigen/Core>
-#include <algorithm>
-#include <cmath>
 #include <complex>
-#include <limits>
-#include <numbers>
-#include <vector>
 
 #include "apps/lab/simulation/motion/flight_trajectory.hpp"
 #include "apps/lab/simulation/motion/road.hpp"
@@ -14,6 +7,7 @@
 #include "apps/lab/simulation/motion/vehicle_trajectory.hpp"
 #include "apps/lab/simulation/world/seeded_random.hpp"
 #include "modules/core/lie.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

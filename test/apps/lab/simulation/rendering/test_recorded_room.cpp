@@ -1,11 +1,5 @@
-#include <catch2/catch.hpp>
-#include <filesystem>
-#include <fstream>
-#include <map>
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
-#include <string>
-#include <vector>
 
 #include "apps/lab/simulation/dataset/recording.hpp"
 #include "apps/lab/simulation/motion/default_rig.hpp"
@@ -15,6 +9,7 @@
 #include "modules/evaluation/trajectory_file.hpp"
 #include "test/support/image_file.hpp"
 #include "test/support/shared_data.hpp"
+#include "test/support/test.hpp"
 
 // The Vicon room, seen from the poses of EuRoC's V1_01_easy: same lens and same motion, furniture
 // of the same kind in other places.
@@ -24,7 +19,7 @@ namespace {
 
 constexpr std::size_t kEvery = 10;  // step through the 100 recorded images
 
-std::vector<Stamp> recorded_stamps(const std::filesystem::path& keyframes) {
+std::vector<Stamp> recorded_stamps(const fs::path& keyframes) {
   std::ifstream file(keyframes / "pairs.csv");
   std::string line;
   std::vector<Stamp> stamps;
@@ -83,7 +78,7 @@ TEST_CASE("Rendered images of the Vicon room are like those recorded in it",
           "[simulation][rendering]") {
   const auto recording = shared_data("euroc/V1_01_easy");
   if (!recording) return;
-  const std::filesystem::path keyframes = *recording / "keyframes";
+  const fs::path keyframes = *recording / "keyframes";
   const auto truth = read_trajectory(*recording / "mav0/state_groundtruth_estimate0");
   const RecordedTrajectory flight = fit_recording(truth, truth.front().stamp);
   const RoomCamera camera;

@@ -1,13 +1,7 @@
-#include <catch2/catch.hpp>
-
-#include <algorithm>
-#include <cmath>
-#include <random>
-#include <vector>
-
 #include "apps/lab/simulation/rendering/renderer.hpp"
 #include "modules/core/lie.hpp"
 #include "test/apps/lab/simulation/rendering/small_world.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

@@ -1,13 +1,9 @@
-#include <catch2/catch.hpp>
-
-#include <algorithm>
-#include <cmath>
-
 #include "apps/lab/simulation/rendering/sensor_effects.hpp"
 #include "apps/lab/simulation/rendering/surfaces.hpp"
 #include "apps/lab/simulation/world/objects.hpp"
 #include "modules/core/lie.hpp"
 #include "test/apps/lab/simulation/rendering/small_world.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {

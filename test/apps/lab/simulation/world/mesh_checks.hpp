@@ -1,10 +1,7 @@
 #pragma once
 
-#include <algorithm>
-#include <catch2/catch.hpp>
-#include <cmath>
-
 #include "apps/lab/simulation/world/world.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 

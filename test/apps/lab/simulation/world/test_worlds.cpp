@@ -1,14 +1,3 @@
-#include <algorithm>
-#include <array>
-#include <catch2/catch.hpp>
-#include <cmath>
-#include <filesystem>
-#include <limits>
-#include <numbers>
-#include <set>
-#include <string>
-#include <vector>
-
 #include "apps/lab/simulation/motion/road.hpp"
 #include "apps/lab/simulation/rendering/ray_tracer.hpp"
 #include "apps/lab/simulation/world/scene.hpp"
@@ -18,6 +7,7 @@
 #include "test/apps/lab/simulation/world/mesh_checks.hpp"
 #include "test/support/command.hpp"
 #include "test/support/shared_data.hpp"
+#include "test/support/test.hpp"
 
 namespace km {
 namespace {
@@ -223,7 +213,7 @@ float distance(const Vector3f& p, const Corners& t) {
 }
 
 /// Positions of a recorded flight, one in `keep_every`; the file may be gzipped.
-std::vector<Vector3f> flight(const std::filesystem::path& file, std::size_t keep_every) {
+std::vector<Vector3f> flight(const fs::path& file, std::size_t keep_every) {
   const bool zipped = file.extension() == ".gz";
   const CommandResult text = run_command((zipped ? "gzip -dc " : "cat ") + file.string());
   REQUIRE(text.exit_code == 0);
