@@ -353,7 +353,7 @@ std::unique_ptr<DatasetReader> open_messages(const RobotOptions& options, const 
                                 "sensors, not what a robot has published (--record)");
   throw std::invalid_argument(bag +
                               ": --rig FILE must state which of its topics are the sensors; " +
-                              "--inspect " + bag + " rig.yaml writes one");
+                              "kimera_multi_robot --inspect " + bag + " rig.yaml writes one");
 }
 
 // Null: a signal arrived.
