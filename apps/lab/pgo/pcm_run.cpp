@@ -19,55 +19,6 @@
 namespace km {
 namespace {
 
-// The clique search of one run and the record of its additions.
-class RecordedSearch {
- public:
-  explicit RecordedSearch(CliqueMethod method) : clique_(search_by(method)) {
-    run.search = to_string(method);
-  }
-
-  PcmAddition& add(const std::vector<std::size_t>& neighbours, double check_s) {
-    const double begin_s = thread_cpu_s();
-    run.edges += neighbours.size();
-    return std::visit(
-        [&](auto& clique) -> PcmAddition& {
-          clique.add(neighbours);
-          const double search_s = thread_cpu_s() - begin_s;
-          return run.additions.emplace_back(PcmAddition{.vertices = clique.size(),
-                                                        .check_s = check_s,
-                                                        .search_s = search_s,
-                                                        .clique = clique.clique().size(),
-                                                        .bound = clique.bound()});
-        },
-        clique_);
-  }
-
-  [[nodiscard]] std::span<const std::size_t> clique() const {
-    return std::visit([](const auto& clique) { return clique.clique(); }, clique_);
-  }
-
-  [[nodiscard]] PcmRun take() {
-    if (const auto* exact = std::get_if<MaxClique>(&clique_)) {
-      run.search_nodes = exact->search_nodes();
-      run.searches_ended = exact->searches_ended();
-    }
-    return std::move(run);
-  }
-
-  PcmRun run;
-
- private:
-  using Clique = std::variant<MaxClique, GreedyClique>;
-
-  static Clique search_by(CliqueMethod method) {
-    using enum GreedyClique::Starts;
-    if (method == CliqueMethod::kExact) return MaxClique(MaxClique::kMaxSearchNodes);
-    return GreedyClique(method == CliqueMethod::kBatch ? kAllVertices : kNewVertex);
-  }
-
-  Clique clique_;
-};
-
 // True if the closure agrees with the odometry between its ends: the cycle through it and through
 // the keyframe `a` itself is consistent.
 bool agrees_with_odometry(const CycleTest& test, const Closure& closure) {
@@ -95,8 +46,12 @@ void GreedyClique::add(std::span<const std::size_t> neighbours) {
 
 PcmRun run_pcm(const std::vector<LabelledClosure>& closures, CliqueMethod method,
                const PcmProgress& progress) {
+  using enum GreedyClique::Starts;
   const CycleTest test(PcmConfig{});
-  RecordedSearch additions(method);
+  std::variant<MaxClique, GreedyClique> search = MaxClique(MaxClique::kMaxSearchNodes);
+  if (method != CliqueMethod::kExact)
+    search = GreedyClique(method == CliqueMethod::kBatch ? kAllVertices : kNewVertex);
+  PcmRun run{.search = to_string(method), .additions = {}};
   std::vector<PreparedClosure> vertices;
   std::vector<bool> is_true;
   for (std::size_t n = 0; n < closures.size(); ++n) {
@@ -108,21 +63,35 @@ PcmRun run_pcm(const std::vector<LabelledClosure>& closures, CliqueMethod method
     const double begin_s = thread_cpu_s();
     const Closure oriented = test.orient(closure);
     if (!agrees_with_odometry(test, oriented)) {
-      ++(outlier ? additions.run.dropped_false : additions.run.dropped_true);
+      ++(outlier ? run.dropped_false : run.dropped_true);
       continue;
     }
     PreparedClosure added(oriented);
     const std::vector<std::size_t> consistent = test.consistent_with(added, vertices);
     vertices.push_back(std::move(added));
     is_true.push_back(!outlier);
-    PcmAddition& addition = additions.add(consistent, thread_cpu_s() - begin_s);
-    const auto members = additions.clique();
-    addition.true_members = static_cast<std::size_t>(
-        std::count_if(members.begin(), members.end(), [&](std::size_t v) { return is_true[v]; }));
+    run.edges += consistent.size();
+    PcmAddition& addition = run.additions.emplace_back();
+    const double checked_s = thread_cpu_s();
+    addition.check_s = checked_s - begin_s;
+    std::visit(
+        [&](auto& clique) {
+          clique.add(consistent);
+          addition.search_s = thread_cpu_s() - checked_s;
+          addition.vertices = clique.size();
+          addition.clique = clique.clique().size();
+          addition.bound = clique.bound();
+          for (const std::size_t v : clique.clique()) addition.true_members += is_true[v] ? 1 : 0;
+        },
+        search);
     addition.true_vertices =
         static_cast<std::size_t>(std::count(is_true.begin(), is_true.end(), true));
   }
-  return additions.take();
+  if (const auto* exact = std::get_if<MaxClique>(&search)) {
+    run.search_nodes = exact->search_nodes();
+    run.searches_ended = exact->searches_ended();
+  }
+  return run;
 }
 
 std::string to_string(CliqueMethod method) {
