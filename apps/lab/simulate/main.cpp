@@ -23,7 +23,7 @@ Examples:
 With --trajectory and --imu the robots move as recorded flights did, and keep the recorded inertial
 data; only the images are rendered:
   kimera_multi_simulate --world vicon_room --trajectory V1_02.csv V1_03.csv \
-      --imu V1_02.imu.csv V1_03.imu.csv --names a b --end 60 --output vicon1
+      --imu V1_02.imu.csv V1_03.imu.csv --names a b --output vicon1
 
 Exit code: 0 if the recordings are complete, 1 for input that cannot be used or a disk that cannot be
 written, 2 for a bad command line.)";

@@ -200,8 +200,7 @@ std::vector<Row> part_of(const std::vector<Row>& rows, Stamp from, Stamp to) {
 // Stamps of images, within the time of both truth and inertial data.
 std::vector<Stamp> recorded_stamps(const RecordedFlight& flight, const SimulationOptions& options) {
   const Stamp origin = flight.truth.front().stamp;
-  Stamp last = std::min(flight.truth.back().stamp, flight.imu.back().stamp);
-  if (options.end_s > 0.0) last = std::min(last, origin + nanoseconds(options.end_s));
+  const Stamp last = std::min(flight.truth.back().stamp, flight.imu.back().stamp);
   const Stamp start = std::max(origin, flight.imu.front().stamp);
   const auto first =
       std::lower_bound(flight.imu.begin(), flight.imu.end(), start,
@@ -219,15 +218,11 @@ RobotScenario recorded_robot(const RecordedFlight& flight, const SimulationOptio
   scenario.rig = default_rig(RigKind::kFlying, options.width, options.height);
   scenario.images = recorded_stamps(flight, options);
   if (scenario.images.empty())
-    throw std::invalid_argument(
-        scenario.name + ": nothing was recorded until --end; the flight lasts " +
-        std::to_string(seconds_between(flight.truth.front().stamp, flight.truth.back().stamp)) +
-        " s");
+    throw std::invalid_argument(scenario.name + ": no inertial sample is within the flight");
   std::vector<StampedPose> poses;
   for (const TrueState& state : flight.truth) poses.push_back({state.stamp, state.T_world_body});
-  RecordedTrajectory fitted = fit_recording(poses, poses.front().stamp);
-  scenario.epoch = fitted.epoch;
-  scenario.trajectory = std::make_unique<SplineTrajectory>(std::move(fitted.trajectory));
+  scenario.epoch = poses.front().stamp;
+  scenario.trajectory = std::make_unique<SplineTrajectory>(fit_recording(poses, scenario.epoch));
   const Stamp first = scenario.images.front();
   const Stamp last = scenario.images.back();
   scenario.imu =

@@ -57,7 +57,7 @@ struct RobotScenario {
                                                           const SimulationOptions& options);
 
 /// The robots with the recorded motion of `flights`; inertial data and true states are the recorded
-/// ones. Throws std::invalid_argument if no part of a flight is before the end.
+/// ones. Throws std::invalid_argument for a flight without an inertial sample before its end.
 [[nodiscard]] std::vector<RobotScenario> recorded_robots(const std::vector<RecordedFlight>& flights,
                                                          const SimulationOptions& options);
 

@@ -44,9 +44,7 @@ World make_world(const SimulationOptions& options) {
 }
 
 DepthSensorOptions depth_sensor(const SensorRig& rig) {
-  DepthSensorOptions options{.focal_px = rig.stereo.cameras[0].fx,
-                             .baseline_m = rig.stereo.baseline_m()};
-  return options;
+  return {.focal_px = rig.stereo.cameras[0].fx, .baseline_m = rig.stereo.baseline_m()};
 }
 
 std::size_t depth_step(const SimulationOptions& options) {
@@ -98,8 +96,7 @@ class RobotCameras {
         left_effects_(left_, options.effects.sensor, derived_seed(scenario.seed, kLeftDirt)),
         right_effects_(right_, options.effects.sensor, derived_seed(scenario.seed, kRightDirt)),
         passages_(options.effects.sensor, scenario.duration_s(),
-                  derived_seed(scenario.seed, kPassages)),
-        depth_sensor_(depth_sensor(scenario.rig)) {}
+                  derived_seed(scenario.seed, kPassages)) {}
 
   [[nodiscard]] const RecordingLayout& layout() const { return layout_; }
   [[nodiscard]] std::size_t frame_count() const { return scenario_.images.size(); }
@@ -204,9 +201,9 @@ class RobotCameras {
         return encode_gray(right_effects_.gray(right, taken));
       }
       case ImageChannel::kDepth:
-        return encode_depth(
-            left.width, left.height,
-            depth_sensor_.measure(left.depth_m, left.width, left.height, taken.noise_seed));
+        return encode_depth(left.width, left.height,
+                            measured_depth(left.depth_m, left.width, left.height, taken.noise_seed,
+                                           depth_sensor(scenario_.rig)));
       case ImageChannel::kLabels:
         break;
     }
@@ -225,7 +222,6 @@ class RobotCameras {
   SensorEffects left_effects_;
   SensorEffects right_effects_;
   LightPassages passages_;
-  DepthSensor depth_sensor_;
   std::vector<Exposure> exposures_;
 };
 

@@ -152,8 +152,8 @@ SimulationOptions completed(SimulationOptions options) {
   if (options.is_recorded()) {
     complete_recorded(options);
   } else {
-    if (!options.imus.empty() || !options.names.empty() || options.end_s > 0.0)
-      throw std::invalid_argument("--imu, --names and --end need --trajectory");
+    if (!options.imus.empty() || !options.names.empty())
+      throw std::invalid_argument("--imu and --names need --trajectory");
     for (int i = 0; i < options.robots; ++i) options.names.push_back("robot" + std::to_string(i));
   }
   complete_names(options);

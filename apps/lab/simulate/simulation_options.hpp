@@ -43,7 +43,6 @@ struct SimulationOptions {
   std::vector<std::filesystem::path> truths;
   std::vector<std::filesystem::path> imus;
   std::vector<std::string> names;
-  double end_s = 0.0;
   std::filesystem::path output;
   int threads = 0;
 
@@ -81,9 +80,6 @@ struct SimulationOptions {
                   "also gzipped; in the frame of the world");
     visitor.field("imu", imus, Input{}, "The recorded inertial data, one CSV per --trajectory");
     visitor.field("names", names, "Names of the robots of recorded motion (default: the files')");
-    visitor.field(
-        "end", end_s, {0.0, kDay_s},
-        "For recorded motion: last image [s since the first true pose], 0: the flight's end");
     visitor.field("output", output, "Folder of the recordings; a stopped run is continued");
     visitor.field("threads", threads, {0, 256},
                   "Number of threads that render; 0: one per processor");

@@ -99,12 +99,18 @@ bool at_edge(std::span<const double> disparity, std::size_t width, std::size_t x
          (k >= width && jumps(k - width)) || (k + width < disparity.size() && jumps(k + width));
 }
 
+std::uint16_t depth_at(double disparity_px, double focal_baseline) {
+  if (!(disparity_px > 0.0)) return 0;
+  disparity_px = kStep_px * rounded(disparity_px / kStep_px);
+  return disparity_px > 0.0 ? millimetres(focal_baseline / disparity_px) : std::uint16_t{0};
+}
+
 }  // namespace
 
-std::vector<std::uint16_t> DepthSensor::measure(std::span<const float> depth_m, int width,
-                                                int height, std::uint64_t seed) const {
+std::vector<std::uint16_t> measured_depth(std::span<const float> depth_m, int width, int height,
+                                          std::uint64_t seed, const DepthSensorOptions& options) {
   std::vector<std::uint16_t> measured(depth_m.size(), 0);
-  const double focal_baseline = options_.focal_px * options_.baseline_m;
+  const double focal_baseline = options.focal_px * options.baseline_m;
   const auto columns = static_cast<std::size_t>(width), rows = static_cast<std::size_t>(height);
   const std::vector<double> disparity = disparities(depth_m, focal_baseline);
   std::vector<bool> lost(depth_m.size(), false);
@@ -118,19 +124,12 @@ std::vector<std::uint16_t> DepthSensor::measure(std::span<const float> depth_m, 
     for (std::size_t x = 0; x < columns; ++x) {
       const std::size_t k = y * columns + x;
       const auto z = static_cast<double>(depth_m[k]);
-      if (lost[k] || !(z >= options_.min_range_m && z <= options_.max_range_m)) continue;
+      if (lost[k] || !(z >= options.min_range_m && z <= options.max_range_m)) continue;
       if (at_edge(disparity, columns, x, k, kEdge_px) && edges.chance(kEdgeLoss)) continue;
-      measured[k] = depth_at(disparity[k] + kNoise_px * errors[x]);
+      measured[k] = depth_at(disparity[k] + kNoise_px * errors[x], focal_baseline);
     }
   }
   return measured;
-}
-
-std::uint16_t DepthSensor::depth_at(double disparity_px) const {
-  if (!(disparity_px > 0.0)) return 0;
-  disparity_px = kStep_px * rounded(disparity_px / kStep_px);
-  return disparity_px > 0.0 ? millimetres(options_.focal_px * options_.baseline_m / disparity_px)
-                            : std::uint16_t{0};
 }
 
 }  // namespace km

@@ -163,7 +163,7 @@ Eigen::MatrixXd pose_rows(std::span<const StampedPose> poses) {
 
 }  // namespace
 
-RecordedTrajectory fit_recording(std::span<const StampedPose> poses, Stamp epoch) {
+SplineTrajectory fit_recording(std::span<const StampedPose> poses, Stamp epoch) {
   // The intervals are stretched a little, so that a whole number of them spans the recording.
   const double span_s = seconds_between(poses.front().stamp, poses.back().stamp);
   const double intervals = std::max(1.0, std::round(span_s / kFitInterval_s));
@@ -187,9 +187,7 @@ RecordedTrajectory fit_recording(std::span<const StampedPose> poses, Stamp epoch
     const auto row = static_cast<Eigen::Index>(k);
     controls[k] << translations.row(row).transpose(), rotations.row(row).transpose();
   }
-  SplineTrajectory trajectory(seconds_between(epoch, poses.front().stamp), interval_s,
-                              std::move(controls));
-  return {std::move(trajectory), epoch};
+  return {seconds_between(epoch, poses.front().stamp), interval_s, std::move(controls)};
 }
 
 }  // namespace km

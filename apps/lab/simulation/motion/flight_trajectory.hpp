@@ -25,15 +25,10 @@ struct FlightOptions {
 [[nodiscard]] SplineTrajectory make_flight_trajectory(const Eigen::AlignedBox3d& volume,
                                                       const FlightOptions& options);
 
-struct RecordedTrajectory {
-  SplineTrajectory trajectory;  ///< Time 0 is `epoch`.
-  Stamp epoch = 0;
-};
-
 /// A smooth motion through recorded poses, by penalised and robust linear least squares. It passes
 /// within the noise of the poses. Time 0 of the trajectory is `epoch`, so that stamps of images and
 /// inertial data convert by seconds_between(epoch, stamp). The curve covers the first to the last
 /// pose. Precondition: `poses` are at least two and ascend strictly in time. O(poses).
-[[nodiscard]] RecordedTrajectory fit_recording(std::span<const StampedPose> poses, Stamp epoch);
+[[nodiscard]] SplineTrajectory fit_recording(std::span<const StampedPose> poses, Stamp epoch);
 
 }  // namespace km

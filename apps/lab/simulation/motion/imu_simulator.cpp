@@ -57,12 +57,11 @@ std::vector<SimulatedImu> simulate_imu(const BodyTrajectory& trajectory, Stamp e
     simulated.gyro_bias = gyro.bias() + warmth * errors.gyro_warm;
     simulated.accel_bias = accel.bias() + warmth * errors.accel_warm;
     simulated.sample.gyro = errors.gyro_matrix * motion.angular_velocity_body +
-                            simulated.gyro_bias + gyro.draw_noise() +
-                            errors.gyro_vibration.cwiseProduct(sway);
+                            simulated.gyro_bias + gyro.draw_noise() + errors.gyro_vibration * sway;
     const Eigen::Vector3d force =
         motion.T_world_body.linear().transpose() * (motion.acceleration_world - gravity);
     simulated.sample.accel = errors.accel_matrix * force + simulated.accel_bias +
-                             accel.draw_noise() + errors.accel_vibration.cwiseProduct(sway);
+                             accel.draw_noise() + errors.accel_vibration * sway;
     samples.push_back(simulated);
     gyro.walk();
     accel.walk();

@@ -47,8 +47,8 @@ InertialErrors draw_inertial_errors(const InertialErrorConfig& config, std::uint
   InertialErrors errors{
       .gyro_matrix = scaled_and_tilted(config.gyro_scale, config.misalignment_rad, random),
       .accel_matrix = scaled_and_tilted(config.accel_scale, config.misalignment_rad, random)};
-  errors.gyro_vibration.setConstant(config.vibration_gyro_rps);
-  errors.accel_vibration.setConstant(config.vibration_accel_mps2);
+  errors.gyro_vibration = config.vibration_gyro_rps;
+  errors.accel_vibration = config.vibration_accel_mps2;
   for (double& phase : errors.phase) phase = 2.0 * std::numbers::pi * random.unit();
   errors.vibration_hz = config.vibration_hz;
   errors.gyro_warm = signed_size(config.warm_gyro_rps, random);

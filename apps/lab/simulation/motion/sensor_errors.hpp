@@ -44,8 +44,8 @@ struct InertialErrorConfig {
 struct InertialErrors {
   Eigen::Matrix3d gyro_matrix = Eigen::Matrix3d::Identity();   ///< Scale and misalignment.
   Eigen::Matrix3d accel_matrix = Eigen::Matrix3d::Identity();  ///< Scale and misalignment.
-  Eigen::Vector3d gyro_vibration = Eigen::Vector3d::Zero();    ///< Amplitude [rad/s].
-  Eigen::Vector3d accel_vibration = Eigen::Vector3d::Zero();   ///< Amplitude [m/s^2].
+  double gyro_vibration = 0.0;                                 ///< Amplitude [rad/s].
+  double accel_vibration = 0.0;                                ///< Amplitude [m/s^2].
   Eigen::Vector3d phase = Eigen::Vector3d::Zero();             ///< Phase of both vibrations [rad].
   double vibration_hz = 37.0;
   Eigen::Vector3d gyro_warm = Eigen::Vector3d::Zero();   ///< Bias of the warm sensor [rad/s].

@@ -74,18 +74,8 @@ struct CampPlan {
   }
 
   [[nodiscard]] std::vector<Route> routes() const {
-    std::vector<Route> routes;
-    for (const std::vector<Crossing>& crossings : crossing_routes()) {
-      std::vector<Eigen::Vector2d> nodes;
-      for (const auto& [i, j] : crossings)
-        nodes.emplace_back(x[static_cast<std::size_t>(i)], y[static_cast<std::size_t>(j)]);
-      nodes.insert(nodes.begin() + 1, 0.5 * (nodes[0] + nodes[1]));  // a start between crossings
-      Route route{right_hand_lane(nodes, 0.5 * static_cast<double>(kLanesApart_m)),
-                  kTrackSpeed_mps};
-      std::ranges::rotate(route.points, route.points.begin() + 1);
-      routes.push_back(std::move(route));
-    }
-    return routes;
+    return crossing_routes(x, y, {0.5, 0.5}, 0.5 * static_cast<double>(kLanesApart_m),
+                           kTrackSpeed_mps);
   }
 };
 

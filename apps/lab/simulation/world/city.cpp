@@ -108,18 +108,8 @@ struct CityPlan {
   }
   /// Closed right-hand ways over the grid. Each drives one street twice in the same direction.
   [[nodiscard]] std::vector<Route> routes() const {
-    std::vector<Route> routes;
-    for (const std::vector<Crossing>& crossings : crossing_routes()) {
-      std::vector<Eigen::Vector2d> nodes;
-      for (const auto& [i, j] : crossings)
-        nodes.emplace_back(x[static_cast<std::size_t>(i)], y[static_cast<std::size_t>(j)]);
-      // It starts on the first street, where a vehicle may stand.
-      nodes.insert(nodes.begin() + 1, 0.7 * nodes[0] + 0.3 * nodes[1]);
-      Route route{right_hand_lane(nodes, static_cast<double>(kLaneOffset_m)), kStreetSpeed_mps};
-      std::ranges::rotate(route.points, route.points.begin() + 1);
-      routes.push_back(std::move(route));
-    }
-    return routes;
+    // They start on the first street, where a vehicle may stand.
+    return crossing_routes(x, y, {0.7, 0.3}, static_cast<double>(kLaneOffset_m), kStreetSpeed_mps);
   }
 };
 

@@ -60,14 +60,26 @@ Route opposite_route(const Route& route) {
   return {right_hand_lane(back, static_cast<double>(kLanesApart_m)), route.speed_mps};
 }
 
-const std::array<std::vector<Crossing>, 4>& crossing_routes() {
-  static const std::array<std::vector<Crossing>, 4> kRoutes = {{
+std::vector<Route> crossing_routes(std::span<const float> x, std::span<const float> y,
+                                   const std::array<double, 2>& start, double right_m,
+                                   double speed_mps) {
+  using Crossings = std::vector<std::array<std::size_t, 2>>;  // column and row
+  const std::array<Crossings, 4> all = {{
       {{1, 1}, {2, 1}, {2, 2}, {1, 2}, {1, 1}, {0, 1}, {0, 2}, {1, 2}},
       {{1, 2}, {1, 1}, {2, 1}, {2, 2}, {3, 2}, {3, 1}, {2, 1}, {2, 2}},
       {{2, 2}, {2, 1}, {2, 0}, {1, 0}, {1, 1}, {2, 1}, {2, 0}, {1, 0}, {1, 1}, {1, 2}},
       {{3, 1}, {2, 1}, {2, 0}, {3, 0}, {3, 1}, {2, 1}, {2, 2}, {3, 2}},
   }};
-  return kRoutes;
+  std::vector<Route> routes;
+  for (const Crossings& crossings : all) {
+    std::vector<Vector2d> nodes;
+    for (const auto& [i, j] : crossings) nodes.emplace_back(x[i], y[j]);
+    nodes.insert(nodes.begin() + 1, start[0] * nodes[0] + start[1] * nodes[1]);
+    Route route{right_hand_lane(nodes, right_m), speed_mps};
+    std::ranges::rotate(route.points, route.points.begin() + 1);
+    routes.push_back(std::move(route));
+  }
+  return routes;
 }
 
 }  // namespace km

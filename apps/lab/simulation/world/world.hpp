@@ -133,14 +133,14 @@ struct World {
 /// The route in the opposite direction, on the lane to the left of `route`.
 [[nodiscard]] Route opposite_route(const Route& route);
 
-/// A crossing in a grid of streets: its column and row.
-using Crossing = std::array<int, 2>;
-
-/// Four closed routes over a grid of at least 4 columns and 3 rows of crossings, which begin
-/// between the first crossing and the second. The second route follows the first from one street
-/// behind over three streets. The third meets both in the opposite direction first, and follows
-/// them on the street on which both begin. The fourth follows the second and the third. Each
-/// returns to a street of its own, in the same direction, after one block.
-[[nodiscard]] const std::array<std::vector<Crossing>, 4>& crossing_routes();
+/// Four closed routes over a grid of crossings at columns `x` and rows `y` [m], `right_m` to the
+/// right of the middle. They begin between their first and second crossing, whose weights are
+/// `start`. The second route follows the first from one street behind over three streets. The third
+/// meets both in the opposite direction first, and follows them on the street on which both begin.
+/// The fourth follows the second and the third. Each returns to a street of its own, in the same
+/// direction, after one block. Precondition: at least 4 columns and 3 rows.
+[[nodiscard]] std::vector<Route> crossing_routes(std::span<const float> x, std::span<const float> y,
+                                                 const std::array<double, 2>& start, double right_m,
+                                                 double speed_mps);
 
 }  // namespace km

@@ -50,7 +50,7 @@ TEST_CASE("Bad arguments are refused with their name and value", "[simulate]") {
       Row{{"--rig", "mono"}, "rgbd"}, Row{{"--seed", "-1"}, "seed = "},
       Row{{"--depth", "--depth-rate", "7"}, "--rate 20 is not a multiple of --depth-rate 7"},
       Row{{"--depth-rate", "5"}, "--depth-rate needs --depth"},
-      Row{{"--end", "3"}, "need --trajectory"},
+      Row{{"--names", "a"}, "need --trajectory"},
       Row{{"--set", "timing.drift=7"}, "unknown key timing.drift"},
       Row{{"--set", "sensor.dirt=7"}, "sensor.dirt = 7 is outside 0 .. 1"},
       Row{{"--set", "dirt=1"}, "not of the form section.key=value"},

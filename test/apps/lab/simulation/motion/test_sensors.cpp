@@ -19,7 +19,6 @@ std::vector<float> plane(double z_m) {
 }
 
 TEST_CASE("The error of depth grows with the square of range", "[motion]") {
-  const DepthSensor sensor(DepthSensorOptions{});
   // Rounding to steps of 1/16 px adds the variance of a uniform distribution; noise hides the
   // steps.
   const double sigma_d = std::sqrt(0.15 * 0.15 + 1.0 / (16.0 * 16.0 * 12.0));
@@ -28,7 +27,7 @@ TEST_CASE("The error of depth grows with the square of range", "[motion]") {
     double sum = 0.0, squares = 0.0;
     int count = 0;
     for (std::uint64_t seed = 0; seed < 4; ++seed)
-      for (const std::uint16_t mm : sensor.measure(plane(z), kWidth, kHeight, seed)) {
+      for (const std::uint16_t mm : measured_depth(plane(z), kWidth, kHeight, seed, {})) {
         if (mm == 0) continue;
         // Through disparity, in which the error is normal.
         const double error = 458.0 * 0.1 / (mm * 1e-3) - 458.0 * 0.1 / z;
@@ -43,16 +42,15 @@ TEST_CASE("The error of depth grows with the square of range", "[motion]") {
     CHECK(std::abs(sum / count) < 0.006);
   }
   for (const double z : {0.0, 0.2, 25.0, 1000.0})  // the sky, or out of range
-    for (const std::uint16_t mm : sensor.measure(plane(z), kWidth, kHeight, 1)) CHECK(mm == 0);
+    for (const std::uint16_t mm : measured_depth(plane(z), kWidth, kHeight, 1, {})) CHECK(mm == 0);
 }
 
 TEST_CASE("A nearer box leaves a shadow of its disparity on its left", "[motion]") {
-  const DepthSensor sensor(DepthSensorOptions{});
   std::vector<float> depth = plane(8.0);  // d = 5.7 px
   for (int y = 80; y < 160; ++y)
     for (int x = 120; x < 200; ++x)
       depth[static_cast<std::size_t>(y * kWidth + x)] = 2.0F;  // 22.9 px
-  const auto measured = sensor.measure(depth, kWidth, kHeight, 1);
+  const auto measured = measured_depth(depth, kWidth, kHeight, 1, {});
   const auto at = [&](int x, int y) { return measured[static_cast<std::size_t>(y * kWidth + x)]; };
   // Pixels x with x - 5.7 > 120 - 22.9 and left of the box: 103.2 to 119.
   constexpr int kNear_mm = 100, kFar_mm = 1500;  // six standard deviations

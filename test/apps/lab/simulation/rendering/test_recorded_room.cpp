@@ -80,13 +80,14 @@ TEST_CASE("Rendered images of the Vicon room are like those recorded in it",
   if (!recording) return;
   const fs::path keyframes = *recording / "keyframes";
   const auto truth = read_trajectory(*recording / "mav0/state_groundtruth_estimate0");
-  const RecordedTrajectory flight = fit_recording(truth, truth.front().stamp);
+  const Stamp epoch = truth.front().stamp;
+  const SplineTrajectory flight = fit_recording(truth, epoch);
   const RoomCamera camera;
   Figures recorded, rendered;
   for (const Stamp stamp : recorded_stamps(keyframes)) {
     add(read_pixels(keyframes / (std::to_string(stamp) + "_0.jpg"), DecodedPixels::kGray),
         recorded);
-    add(camera.take(flight.trajectory.motion(seconds_between(flight.epoch, stamp))), rendered);
+    add(camera.take(flight.motion(seconds_between(epoch, stamp))), rendered);
   }
   REQUIRE(recorded.size() == 6);
   // The furniture stands elsewhere, so single views differ by more.
