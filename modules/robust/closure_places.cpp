@@ -11,8 +11,6 @@
 namespace km {
 namespace {
 
-constexpr KeyframeIndex kNear = 10;  // keyframes between closures of a row, and within a place
-
 constexpr std::size_t kMostRivals = 500;
 constexpr double kAgree_rad = 0.1, kAgree_m = 0.5, kNoRival_m = 1.0, kByDistance = 0.02;
 
@@ -36,7 +34,7 @@ std::vector<AlignedOdometry> select(std::span<const AlignedOdometry> all,
 }
 
 bool are_near(const KeyframeId& a, const KeyframeId& b) {
-  return a.robot == b.robot && steps_between(a, b) <= kNear;
+  return a.robot == b.robot && steps_between(a, b) <= kNearSteps;
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <utility>
 #include <vector>
@@ -19,6 +20,9 @@ namespace km {
 /// Ascending, each from its end on the first robot, with its index among the closures.
 using ClosureOrder = std::vector<std::pair<ClosureId, std::size_t>>;
 [[nodiscard]] ClosureOrder order_of(std::span<const PoseEdge> closures);
+
+/// Largest number of steps of odometry between closures that are near each other.
+inline constexpr std::uint32_t kNearSteps = 10;
 
 /// Largest sum of the votes of the closures of a place.
 inline constexpr double kVotesOfPlace = 3.0;

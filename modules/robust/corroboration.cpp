@@ -16,7 +16,6 @@
 namespace km {
 namespace {
 
-constexpr std::uint32_t kSteps = 10;  // largest number of steps of odometry in a cycle
 constexpr std::uint32_t kBeside = 5;  // largest distance of near closures, at both ends [keyframes]
 constexpr double kLargestTurn = 0.25 * std::numbers::pi;
 // Largest number of steps of odometry in a cycle between two places. The noise of more steps would
@@ -105,10 +104,11 @@ void Corroboration::count_lengths(NoiseHistogram& histogram, std::size_t most) c
   std::vector<Near> cycles;
   for (std::size_t a = 0; a < closures_.size(); ++a)
     for (std::size_t b = a + 1; b < closures_.size(); ++b) {
-      if (steps_between(closures_[a].lower, closures_[b].lower) > kSteps) break;
+      if (steps_between(closures_[a].lower, closures_[b].lower) > kNearSteps) break;
       const std::uint32_t steps = steps_between(closures_[a].lower, closures_[b].lower) +
                                   steps_between(closures_[a].upper, closures_[b].upper);
-      if (steps <= kSteps && same_runs(closures_[a], closures_[b])) cycles.push_back({steps, a, b});
+      if (steps <= kNearSteps && same_runs(closures_[a], closures_[b]))
+        cycles.push_back({steps, a, b});
     }
   for (const Near& c : nearest(std::move(cycles), most))
     count_length(histogram, cycle_length(closures_[c.a], closures_[c.b]));
@@ -158,7 +158,7 @@ void Corroboration::count_cycles(PairCycles& cycles) const {
       if (steps == 0) continue;  // no odometry between them
       if (!same_runs(closures_[a], closures_[b])) continue;
       const bool same = places.group_of[closures_[a].index] == places.group_of[closures_[b].index];
-      if (same && steps <= kSteps) inside.push_back({steps, a, b});
+      if (same && steps <= kNearSteps) inside.push_back({steps, a, b});
       if (!same && is_first[a] && is_first[b] && steps <= kStepsBetweenPlaces &&
           turn_rad(closures_[a], closures_[b]) <= kLargestTurnSigma_rad)
         between.push_back({steps, a, b});

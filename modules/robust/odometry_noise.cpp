@@ -16,8 +16,6 @@ namespace km {
 namespace {
 
 constexpr std::size_t kMostCycles = 200;
-// Largest number of steps in a cycle of two closures.
-constexpr std::uint32_t kMaxShortCycleSteps = 10;
 // Largest standard deviation of the rotation of odometry in a cycle of one closure, on each axis.
 // Errors of cycles with a larger one are not normally distributed.
 constexpr double kLargestNormalTurn_rad = 0.7;
@@ -69,8 +67,7 @@ std::vector<Cycle> short_cycles(const OdometryChain& chain, std::span<const Pose
   for (std::size_t k = 0; k + 1 < sorted.size(); ++k) {
     const ClosureId one = sorted[k].id(), other = sorted[k + 1].id();
     const auto steps = steps_between(one.from, other.from) + steps_between(one.to, other.to);
-    if (steps == 0 || steps > kMaxShortCycleSteps ||
-        !chain.joins(one.from.index, other.from.index) ||
+    if (steps == 0 || steps > kNearSteps || !chain.joins(one.from.index, other.from.index) ||
         !chain.joins(one.to.index, other.to.index))
       continue;
     cycles.push_back(chain.close(sorted[k], sorted[k + 1]));
