@@ -56,8 +56,9 @@ constexpr double kClaimsTooMuch = 0.5;
 constexpr std::uint32_t kWorthDoubting = 100;  // rejected closures
 constexpr int kMaxDoubts = 4;
 
-// Predicted decrease of a step, relative to the cost: of nearly converged poses, and of poses from
-// which a second look starts.
+// Predicted decrease of a step, relative to the cost: of poses for which mu waits, of nearly
+// converged poses, and of poses from which a second look starts.
+constexpr double kFar = 0.3;
 constexpr double kNearlyConverged = 1e-8;
 constexpr double kGoodStart = 1e-9;
 // Largest ratio of the predicted decreases at two second derivatives that make progress.
@@ -244,10 +245,10 @@ DownMessage TreeRoot::step(const TreeSums& sums, const TreeFront& front,
   const TreeFront::Reduced root = front.solve_root(upright_);
   decrement_ = sums.decrement + root.decrement;
   // If odometry is noisy, the poses may be far from the minimum of the nearly convex cost at the
-  // beginning. A predicted decrease of more than the whole cost shows that the quadratic model does
-  // not hold there; mu then waits for another step.
-  const bool far =
-      odometry_is_noisy_ && !at_base_ && schedule_.is_nearly_convex() && 0.5 * decrement_ > cost_;
+  // beginning. A large predicted decrease shows that the quadratic model does not hold there; mu
+  // then waits for another step.
+  const bool far = odometry_is_noisy_ && !at_base_ && schedule_.is_nearly_convex() &&
+                   0.5 * decrement_ > kFar * cost_;
   if (!far && weighing_ != Weighing::kHold) schedule_.next({sums.changed, sums.fractional});
   if (decrement_ <= kNearRounding * (1.0 + cost_))
     for (double* limit : {&options_.tolerance, &options_.absolute_tolerance}) *limit *= kRelax;
