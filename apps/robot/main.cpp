@@ -43,7 +43,9 @@ Examples
   The back-end alone, on a recorded pose graph:
     kimera_multi_robot --config config/datasets/tunnels.yaml --robot 3 --graph robot3.csv --rate max --output results/3
 
-Files in --output: see apps/robot/outputs.md.
+Files written to --output: odometry.tum, live.tum, optimized.tum, optimized_keyframes.tum, pose_graph.g2o,
+loop_closures.csv, summary.json, config.yaml, run.journal (for --resume and --session) and others; with a map also
+mesh.ply, mesh_optimized.ply, map.yaml and map.pgm. apps/robot/outputs.md describes all of them.
 Ctrl-C, SIGTERM and SIGHUP end the run in order with everything written; a second Ctrl-C or SIGTERM ends it at once.
 Exit codes: 0 done; 1 missing or bad input, a recording without a pose, or live sensors without an image;
 2 bad command line; 3 a module failed, or another robot uses this robot's id; 4 results could not be written (the log
