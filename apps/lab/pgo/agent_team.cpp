@@ -301,8 +301,8 @@ class AgentTeam {
                          Delivery{robot, to, std::move(*decoded.value)});
       const std::size_t sent = kMessageHead + bytes.size();
       members_[robot].session_bytes += std::holds_alternative<TeamStatus>(message) ? 0 : sent;
-      members_[robot].cost.sent[message.index()] += sent;
-      members_[to].cost.received[message.index()] += sent;
+      members_[robot].cost.sent += sent;
+      members_[to].cost.received += sent;
       bytes_ += sent;
     }
   }

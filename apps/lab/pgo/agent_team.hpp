@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <vector>
 
@@ -40,9 +39,8 @@ struct AgentTeamOptions {
 
 /// Messages and processor time of one robot of a run.
 struct AgentCost {
-  std::array<std::size_t, 4> sent = {};      ///< Bytes by TeamMessageKind; a message counts once
-                                             ///< per receiver.
-  std::array<std::size_t, 4> received = {};  ///< Bytes by TeamMessageKind.
+  std::size_t sent = 0;      ///< Bytes; a message counts once per receiver.
+  std::size_t received = 0;  ///< Bytes.
   double cpu_s = 0.0;
 };
 

@@ -1,9 +1,7 @@
 #include "apps/lab/pgo/solvers.hpp"
 
 #include <algorithm>
-#include <array>
 #include <memory>
-#include <numeric>
 #include <stdexcept>
 
 #include "apps/lab/pgo/agent_team.hpp"
@@ -169,13 +167,10 @@ SolverRun run_agents(const TeamGraph& graph, const SolverOptions& options, const
                     .noise_scale = robots.last.noise_scale,
                     .threshold = robots.last.barc,
                     .decided = robots.settled && end.round < options.max_rounds};
-  const auto bytes = [](const std::array<std::size_t, 4>& by_kind) {
-    return std::accumulate(by_kind.begin(), by_kind.end(), std::size_t{0});
-  };
   for (const AgentCost& cost : robots.costs) {
     end.work.total_cpu_s += cost.cpu_s;
-    decision.most_sent = std::max(decision.most_sent, bytes(cost.sent));
-    decision.most_received = std::max(decision.most_received, bytes(cost.received));
+    decision.most_sent = std::max(decision.most_sent, cost.sent);
+    decision.most_received = std::max(decision.most_received, cost.received);
   }
   return {{end}, std::move(robots.T_world_kf), std::move(decision)};
 }
