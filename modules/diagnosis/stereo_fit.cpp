@@ -168,7 +168,9 @@ StereoAlternative best_alternative(std::span<const StereoMatches> images, const 
   // Only without such a fault, because another focal length compensates some errors of a fault.
   if (best.fit.inlier_ratio < given.fit.inlier_ratio + kClearGain) {
     const StereoAlternative focal = best_focal_ratio(images, rig);
-    if (focal.fit.inlier_ratio > best_turned_ratio(images, rig) + kClearGain) consider(focal);
+    if (focal.fit.inlier_ratio > given.fit.inlier_ratio + kClearGain &&
+        focal.fit.inlier_ratio > best_turned_ratio(images, rig) + kClearGain)
+      consider(focal);
   }
   const bool is_clear =
       best.fit.inlier_ratio > given.fit.inlier_ratio + kClearGain && best.fit.inlier_ratio > kFair;
