@@ -21,15 +21,15 @@ std::string ros_type(std::string name) {
   return name;
 }
 
-// "Imu" for "sensor_msgs/Imu", of ROS 1, and "sensor_msgs/msg/Imu".
-std::string last_name(const std::string& type) {
-  return type.substr(type.rfind('/') + 1);
+// "sensor_msgs/Imu", as in ROS 1, for "sensor_msgs/msg/Imu" too.
+std::string plain(const std::string& type) {
+  return type.substr(0, type.find('/')) + '/' + type.substr(type.rfind('/') + 1);
 }
 
 // Images, compressed or not, are of one kind.
 std::string kind_of(const std::string& type) {
-  const std::string name = last_name(type);
-  return type.substr(0, type.find('/')) + (name == "CompressedImage" ? "Image" : name);
+  const std::string name = plain(type);
+  return name == "sensor_msgs/CompressedImage" ? "sensor_msgs/Image" : name;
 }
 
 }  // namespace
@@ -38,7 +38,7 @@ Silence why_silent(const std::string& topic, const std::string& type,
                    const std::function<bool(const std::string&)>& is_named,
                    std::span<const TopicPublisher> publishers) {
   const auto same = std::ranges::find(publishers, topic, &TopicPublisher::topic);
-  if (same != publishers.end() && last_name(same->type) != last_name(type))
+  if (same != publishers.end() && plain(same->type) != plain(type))
     return {"other_type", "its publisher sends " + same->type,
             "name a topic of " + type + ": those of compressed images end with /compressed"};
   if (same != publishers.end())
@@ -73,7 +73,8 @@ RosDiscovery::RosDiscovery(const RosNetwork& network)
             "cannot wait for publications");
 }
 
-void RosDiscovery::take() {
+bool RosDiscovery::take() {
+  bool any_new = false;
   std::array<void*, 1> sample{};
   std::array<dds_sample_info_t, 1> info{};
   while (dds_take(reader_.handle(), sample.data(), info.data(), 1, 1) == 1) {
@@ -83,29 +84,29 @@ void RosDiscovery::take() {
     // The sample of a publisher that has ended has no names.
     const bool has_ended = !info[0].valid_data || info[0].instance_state != DDS_IST_ALIVE;
     const std::string topic = has_ended ? "" : found.topic_name;
-    if (topic.starts_with("rt/"))
+    if (topic.starts_with("rt/")) {
       publishers_.push_back({topic.substr(2), ros_type(found.type_name), instance});
+      any_new = true;
+    }
     dds_return_loan(reader_.handle(), sample.data(), 1);
     sample = {};
   }
+  return any_new;
 }
 
 bool RosDiscovery::wait(double patience_s) {
-  const auto newest = [this] { return publishers_.empty() ? 0 : publishers_.back().instance; };
-  const std::uint64_t before = newest();
   const double end_s = steady_now_s() + patience_s;
   // Writers without a topic of ROS end the wait of DDS, too.
   for (double left_s = patience_s; left_s > 0.0; left_s = end_s - steady_now_s()) {
     check_dds(dds_waitset_wait(waitset_.handle(), nullptr, 0, nanoseconds(left_s)),
               "cannot wait for publications");
-    take();
-    if (newest() != before) return true;
+    if (take()) return true;
   }
   return false;
 }
 
 const std::vector<TopicPublisher>& RosDiscovery::publishers() {
-  take();
+  (void)take();
   return publishers_;
 }
 

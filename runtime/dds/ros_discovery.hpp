@@ -42,7 +42,8 @@ class RosDiscovery {
   [[nodiscard]] const std::vector<TopicPublisher>& publishers();
 
  private:
-  void take();
+  // True if there is a new publisher.
+  [[nodiscard]] bool take();
 
   DdsEntity reader_, waitset_;
   std::vector<TopicPublisher> publishers_;
