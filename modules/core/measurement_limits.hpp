@@ -32,8 +32,8 @@ inline constexpr Bounds<double> kAxisVariance{1e-15, 1e12};
 /// that the length of the step is unknown. No step inside a run has a tenth of it.
 inline constexpr double kUnknownStep_m = 1e4;
 /// Each coordinate of a fix [m]. The step from the datum to the first keyframe is unknown, and four
-/// of its standard deviations are the most that it agrees with. The solver rounds couplings of
-/// poses relative to their lever arms: from 900 km on, it loses the closures of other robots.
+/// of its standard deviations are the most that it agrees with. Fixes 900 km away make a team
+/// reject true closures between other robots.
 inline constexpr Bounds<double> kFix_m{-4.0 * kUnknownStep_m, 4.0 * kUnknownStep_m};
 /// Standard deviation of the rotation of such a step: about that of a uniform rotation.
 inline constexpr double kUnknownTurn_rad = 2.0;
