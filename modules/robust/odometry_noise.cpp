@@ -133,6 +133,7 @@ struct FactorFit {
   Factors factors{1.0, 1.0, 1.0, 1.0};
   double log_posterior = 0.0;
   double log_odds = 0.0;  // that odometry is noisier than it claims
+  double share = 0.0;     // of true cycles
 };
 
 // The largest posterior density without noise of odometry: errors that noise of closures alone
@@ -190,6 +191,7 @@ FactorFit fit_factors(const Cycles& all, double least = 1.0) {
     }
   fit.log_posterior = most;
   fit.log_odds = most - log_posterior_of_claims(all);
+  fit.share = fit_cycle_mixture(log_ratios(all, fit.factors), weights_of(all.cycles)).share;
   return fit;
 }
 
@@ -266,6 +268,7 @@ OdometryNoise estimate_odometry_noise(std::span<const PoseEdge> steps,
     noise.beside = noise_beside_odometry({cycles, volume, dimension});
     return noise;
   }
+  if (!(fit.share > kMostlyTrue)) return noise;
   const std::vector<Cycle> near = short_cycles(chain, closures);
   std::vector<Cycle> normal = with_normal_errors(cycles, fit.factors, dimension);
   // If most cycles of one closure are left out, noise of closures alone may explain the cycles of

@@ -39,7 +39,8 @@ struct OdometryNoise {
 /// translations are variance components (Foerstner 1979). The priors are normal with mean 0: that
 /// of log sqrt(v) has standard deviation log 3, and that of log sqrt(v_R / v_t) log 2. `steps[k]`
 /// is from keyframe k to keyframe k + 1 of one robot, and `closures` are between two of its
-/// keyframes. Some closures may be false. `dimension` 2: poses are planar. O(steps + closures).
+/// keyframes. Some closures may be false; if most cycles seem false, the result is what odometry
+/// claims. `dimension` 2: poses are planar. O(steps + closures).
 [[nodiscard]] OdometryNoise estimate_odometry_noise(std::span<const PoseEdge> steps,
                                                     std::span<const PoseEdge> closures,
                                                     int dimension);
