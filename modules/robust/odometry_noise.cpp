@@ -232,10 +232,11 @@ std::vector<PoseEdge> likely_closures(const Cycles& all, const Factors& v) {
 }
 
 // How much noisier closures are than odometry, relative to what both claim: a power of two, see
-// OdometryNoise::beside. The noise of odometry may be any fraction of what it claims.
-double noise_beside_odometry(const Cycles& all) {
+// OdometryNoise::beside. The noise of odometry may be any fraction of what it claims. `otherwise`:
+// log posterior density if odometry or closures are noisier than they claim.
+double noise_beside_odometry(const Cycles& all, double otherwise) {
   const std::vector<double> weights = weights_of(all.cycles);
-  double equal = 0.0, most = -std::numeric_limits<double>::infinity(), best = 1.0, share = 0.0;
+  double equal = otherwise, most = -std::numeric_limits<double>::infinity(), best = 1.0, share = 0.0;
   for (double ratio = 1.0; ratio <= kMostBeside; ratio *= 2.0) {
     const double away = std::log(ratio) / kNoiseFactorWidth;
     for (double noise = 1.0; noise >= 1.0 / kMostBeside; noise *= 0.5) {
@@ -248,7 +249,7 @@ double noise_beside_odometry(const Cycles& all) {
       best = ratio;
       share = mixture.share;
     }
-    if (ratio == 1.0) equal = most;
+    if (ratio == 1.0) equal = std::max(equal, most);
   }
   const bool likely = most - equal >= kThousandToOne && share > kMostlyTrue;
   return likely && best >= kLeastBeside ? best : 1.0;
@@ -265,7 +266,7 @@ OdometryNoise estimate_odometry_noise(std::span<const PoseEdge> steps,
   const double volume = volume_of(chain, closures, dimension);
   FactorFit fit = fit_factors({cycles, volume, dimension});
   if (!(fit.log_odds >= kThousandToOne)) {
-    noise.beside = noise_beside_odometry({cycles, volume, dimension});
+    noise.beside = noise_beside_odometry({cycles, volume, dimension}, fit.log_posterior);
     return noise;
   }
   if (!(fit.share > kMostlyTrue)) return noise;

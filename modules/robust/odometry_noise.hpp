@@ -15,8 +15,8 @@ struct OdometryNoise {
   double translation = 1.0;  ///< At least 1.
   bool of_closures = false;  ///< The closures inside the robot have these ratios, too.
   /// Ratio of closures to odometry, each with its actual over claimed noise. It is 1 unless it
-  /// reaches 16, the odds are 1000 to 1, and most cycles are true. Odometry is then no noisier than
-  /// it claims.
+  /// reaches 16, the odds are 1000 to 1, also against any noise above the claims, and most cycles
+  /// are true. Odometry is then no noisier than it claims.
   double beside = 1.0;
   std::size_t places = 0;  ///< Number of places behind the estimate.
   /// Closures that are more likely true than false; a subset if there are very many. Empty if the

@@ -228,6 +228,16 @@ TEST_CASE("Closures that are much noisier than odometry, as shares of their clai
   CHECK(beside(1.0, 1.0, 1000) == 1.0);  // false closures are no noise
 }
 
+// Two or three cycles show either noise equally well.
+TEST_CASE("Noise of odometry is not read as that of few closures", "[odometry_noise]") {
+  const unsigned seed = GENERATE(range(1U, 31U));
+  CAPTURE(seed);
+  Walk walk(seed);
+  walk.walk(3.0, 3.0);
+  walk.close(100);
+  CHECK(walk.noise().beside == 1.0);
+}
+
 TEST_CASE("Without closures, or with a single one, the noise of odometry is the claimed one",
           "[odometry_noise]") {
   Walk walk(1);
