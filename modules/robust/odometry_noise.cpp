@@ -133,7 +133,7 @@ struct FactorFit {
   Factors factors{1.0, 1.0, 1.0, 1.0};
   double log_posterior = 0.0;
   double log_odds = 0.0;  // that odometry is noisier than it claims
-  double share = 0.0;     // of true cycles
+  double share = 0.0;     // share of true cycles
 };
 
 // The largest posterior density without noise of odometry: errors that noise of closures alone
@@ -236,7 +236,8 @@ std::vector<PoseEdge> likely_closures(const Cycles& all, const Factors& v) {
 // log posterior density if odometry or closures are noisier than they claim.
 double noise_beside_odometry(const Cycles& all, double otherwise) {
   const std::vector<double> weights = weights_of(all.cycles);
-  double equal = otherwise, most = -std::numeric_limits<double>::infinity(), best = 1.0, share = 0.0;
+  double equal = otherwise, most = -std::numeric_limits<double>::infinity(), best = 1.0,
+         share = 0.0;
   for (double ratio = 1.0; ratio <= kMostBeside; ratio *= 2.0) {
     const double away = std::log(ratio) / kNoiseFactorWidth;
     for (double noise = 1.0; noise >= 1.0 / kMostBeside; noise *= 0.5) {
