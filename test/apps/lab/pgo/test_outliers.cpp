@@ -157,9 +157,9 @@ TEST_CASE("a robot with few closures and imprecise odometry keeps its true ones"
 TEST_CASE("random closures do not pass for noise of odometry", "[outliers]") {
   const auto folder = shared_data("multi_robot/tunnels_8robots");
   if (!folder) return;
-  const OutlierStudy study = run_outlier_study(
-      read_team_folder(*folder), {.shares_percent = {10.0}, .methods = {"robots"}, .seeds = {1}},
-      {});
+  const OutlierStudy study =
+      run_outlier_study(read_team_folder(*folder),
+                        {.shares_percent = {10.0}, .methods = {"robots"}, .seeds = {1}}, {});
   CHECK(study.results.front().false_kept == 0);
 }
 
