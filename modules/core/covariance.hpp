@@ -1,5 +1,6 @@
 #pragma once
 
+#include "modules/core/camera.hpp"
 #include "modules/core/geometry.hpp"
 #include "modules/core/odometry.hpp"
 
@@ -37,6 +38,10 @@ struct UncertainPose {
 [[nodiscard]] Matrix6 along_fixed_axes(const UncertainPose& T_a_b);
 /// Inverse of along_fixed_axes(): covariance of the pose T_a_b.
 [[nodiscard]] Matrix6 from_fixed_axes(const SE3& T_a_b, const Matrix6& fixed);
+
+/// Covariance of the errors in T_a_b by the calibration of the cameras that measured it: they scale
+/// distances and angles.
+[[nodiscard]] Matrix6 calibration_covariance(const SE3& T_a_b, DepthSource depth);
 
 /// The pose T_a_b with the covariance of a wrong scale added: all distances from a are wrong by one
 /// factor, whose standard deviation is `scale_sigma`. So the position p errs by this share of p:

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "modules/core/camera.hpp"
 #include "modules/core/geometry.hpp"
 #include "modules/core/ids.hpp"
 #include "modules/core/stamp.hpp"
@@ -39,6 +40,9 @@ struct Keypoint {
 /// `matched`. See matched_by().
 struct KeyframeFeatures {
   SE3 T_body_cam = SE3::Identity();  ///< Pose of the left camera.
+  /// Covariance of the error delta of T_body_cam = delta * (true one), absent from messages.
+  Matrix6 mounting = Matrix6::Zero();
+  DepthSource depth_source = DepthSource::kRightImage;  ///< Absent from messages.
   double focal_px = 0.0;
   double baseline_m = 0.0;
   std::vector<Keypoint> keypoints;

@@ -45,7 +45,9 @@ void describe(auto& archive, As<OdometryPose> auto& pose) {
 void describe(auto& archive, As<Keyframe> auto& keyframe) {
   describe(archive, keyframe.odometry);
   auto& features = keyframe.features;
-  archive(keyframe.stamp, features.T_body_cam, features.focal_px, features.baseline_m);
+  archive(keyframe.stamp, features.T_body_cam, features.mounting, features.focal_px,
+          features.baseline_m);
+  archive.choice(features.depth_source, DepthSource::kDepthImage);
   constexpr std::size_t kPoint_bytes = 13, kDescriptor_bytes = sizeof(BinaryDescriptor);
   archive.list(features.keypoints, kMostKeypoints, kPoint_bytes,
                [&](auto& point) { archive(point.bearing, point.inverse_depth, point.octave); });

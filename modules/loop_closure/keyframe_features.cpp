@@ -26,6 +26,7 @@ KeyframeFeatures KeyframeFeatureExtractor::extract(const StereoFrame& frame) {
 
   KeyframeFeatures features;
   features.T_body_cam = rig_.cameras[0].T_body_cam;
+  features.depth_source = rig_.depth_source;
   features.focal_px = 0.5 * (rig_.cameras[0].fx + rig_.cameras[0].fy);
   features.baseline_m = rig_.baseline_m();
   std::vector<MatchedDescriptor> by_network;

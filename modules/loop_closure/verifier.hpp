@@ -47,8 +47,9 @@ struct Verification {
 ///     are excluded.
 ///  4. Tests of the number of inliers and of the uncertainty (VerificationStatus).
 ///
-/// The covariance is that of the refinement, scaled up if the residuals exceed the noise, times a
-/// factor for common errors of neighbouring points, plus systematic errors.
+/// The covariance is that of the refinement, scaled to the residuals, times a factor for common
+/// errors of neighbouring points. It includes the errors of the calibration's scale and of the
+/// mounting of both cameras.
 ///
 /// Deterministic: equal features give equal results. verify() is safe to call from several threads.
 class Verifier {

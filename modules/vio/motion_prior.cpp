@@ -18,12 +18,6 @@ constexpr double kHeldAccel = 1e-4;
 // tracks.
 constexpr double kLossShare = 1.0 / 3.0;
 
-// Standard deviations of the scale of a motion by images alone, with stereo and with a depth
-// camera. On KITTI's recording it is 0.5 %. The second one is a compromise. The errors in the
-// kitchen of 7-Scenes, whose depth images are not registered to the colour images, ask for about
-// 12 %. On tartanair_hospital, where they are registered, 1 % suffices.
-constexpr double kStereoScaleSigma = 0.01, kDepthScaleSigma = 0.05;
-
 }  // namespace
 
 VioConfig config_for(const SensorRig& rig, const VioConfig& config) {
@@ -74,14 +68,6 @@ OdometryState moved_by_images(const OdometryState& before, const TrackedFrame& t
   now.v_odom = before.T_odom_body.linear() * motion.translation() / dt_s;
   now.gyro_bias = -so3_log(motion.linear()) / dt_s;
   return now;
-}
-
-Matrix6 scale_covariance(const SE3& T_previous_kf, DepthSource depth) {
-  const double scale = depth == DepthSource::kRightImage ? kStereoScaleSigma : kDepthScaleSigma;
-  Vector6 sigma;
-  sigma << Eigen::Vector3d::Constant(scale * angle_of(T_previous_kf.linear())),
-      Eigen::Vector3d::Constant(scale * T_previous_kf.translation().norm());
-  return sigma.cwiseAbs2().asDiagonal();
 }
 
 Eigen::Matrix3d level_with_camera(const SE3& T_body_left) {

@@ -72,10 +72,6 @@ class ShownMotion {
 [[nodiscard]] OdometryState moved_by_images(const OdometryState& before,
                                             const TrackedFrame& tracked, const SE3& T_body_left);
 
-/// Covariance that a motion by images alone gets in addition to that of the window, for errors of
-/// the calibration: they scale distances and angles.
-[[nodiscard]] Matrix6 scale_covariance(const SE3& T_previous_kf, DepthSource depth);
-
 /// Attitude R_odom_body at a start without gravity: x of odom is the viewing direction of the left
 /// camera, z its upward direction.
 [[nodiscard]] Eigen::Matrix3d level_with_camera(const SE3& T_body_left);

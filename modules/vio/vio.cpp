@@ -497,7 +497,7 @@ void Vio::add_keyframe(const OdometryState& state, VioResult& result) {
       relative ? keyframe_covariance(config_, moved_s(state.stamp), factor * relative->Sigma)
                : restart_covariance();
   if (!rig_.has_imu)
-    keyframe.covariance += scale_covariance(keyframe.T_previous_kf, rig_.stereo.depth_source);
+    keyframe.covariance += calibration_covariance(keyframe.T_previous_kf, rig_.stereo.depth_source);
   keyframe.T_odom_kf = last_keyframe_->T_odom_kf * keyframe.T_previous_kf;
   publish(keyframe, state, result);
 }

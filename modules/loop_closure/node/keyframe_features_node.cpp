@@ -38,6 +38,8 @@ void KeyframeFeaturesNode::step(const KeyframeOdometry& odometry) {
   Keyframe& keyframe = without_images_.emplace_back();
   keyframe.odometry = {odometry.id, odometry.T_odom_kf, chain_.Sigma};
   keyframe.stamp = odometry.stamp;
+  if (odometry.calibration)
+    keyframe.features.mounting = odometry.calibration->covariance.block<6, 6>(1, 1);
 }
 
 void KeyframeFeaturesNode::step(const LocatedFrame& located) {
@@ -47,6 +49,7 @@ void KeyframeFeaturesNode::step(const LocatedFrame& located) {
   unroll(camera_, located.readout_s, located.twist_body, features);
   Keyframe keyframe = std::move(without_images_.front());
   without_images_.pop_front();
+  features.mounting = keyframe.features.mounting;
   keyframe.features = std::move(features);
   keyframes_.publish(std::move(keyframe));
 }

@@ -26,7 +26,7 @@ inline Keypoint measured(const SE3& T_world_cam, const Eigen::Vector3d& p_world,
 }
 
 /// Two keyframes that see the same `count` random points 2 to 6 m ahead, descriptor i of one being
-/// descriptor i of the other. The cameras sit on bodies at T_body_cam.
+/// descriptor i of the other. The cameras sit on bodies at T_body_cam, `motion` [rad, m] apart.
 struct KeyframePair {
   SE3 T_from_to = SE3::Identity();  ///< Relative pose of the bodies.
   KeyframeFeatures from, to;
@@ -40,9 +40,9 @@ Descriptor random_descriptor(std::mt19937& rng) {
 }
 
 inline KeyframePair make_keyframe_pair(std::mt19937& rng, int count, const ImageNoise& noise,
-                                       double sigmas) {
+                                       double sigmas, double motion = 0.15) {
   const SE3 T_body_cam = random_pose(rng, 0.2);
-  Vector6 xi = 0.15 * random_vector<6>(rng);
+  Vector6 xi = motion * random_vector<6>(rng);
   const SE3 T_cam_cam = se3_exp(xi);  // from's camera is the world
   KeyframePair pair;
   pair.T_from_to = T_body_cam * T_cam_cam * T_body_cam.inverse();
