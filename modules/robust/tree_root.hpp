@@ -13,8 +13,8 @@ namespace km {
 struct TreeNewtonOptions {
   int dimension = 3;  ///< 2: poses and measurements are planar.
   /// Predicted decrease of a step at the end, relative to the cost F. No motion of the team then
-  /// errs by more than 5e-9 sqrt(F) of its standard deviation.
-  double tolerance = 1e-17;
+  /// errs by more than 1.5e-9 sqrt(F) of its standard deviation.
+  double tolerance = 1e-18;
   double absolute_tolerance = 1e-17;  ///< Predicted decrease at the end, if the cost is near 0.
   /// Second derivatives are sent again, at the price of an elimination and its bytes, if more
   /// rounds than this would remain at the convergence rate of the old ones.
