@@ -12,7 +12,7 @@
 namespace km {
 namespace {
 
-constexpr std::string_view kMark = "\x7FKMJRNL4";
+constexpr std::string_view kMark = "\x7FKMJRNL5";
 constexpr std::size_t kHead_bytes = kMark.size() + 4 + 8;
 constexpr std::size_t kLeast_bytes = kHead_bytes + 8;
 // Limit on the total length of entries that fail their check. Beyond it nothing more is read: a

@@ -57,7 +57,7 @@ function journalEntry(time_ns, bytes) {
   head.writeUInt32LE(bytes.length);
   head.writeBigUInt64LE(time_ns, 4);
   tail.writeBigUInt64LE(sum);
-  return Buffer.concat([Buffer.from('\x7fKMJRNL4', 'latin1'), head, bytes, tail]);
+  return Buffer.concat([Buffer.from('\x7fKMJRNL5', 'latin1'), head, bytes, tail]);
 }
 
 function doubles(values) {
