@@ -179,9 +179,9 @@ void write_keyframe_poses(std::ostream& out, const RunRecord& record) {
     write_pose(out, poses[k]);
     const Trajectory& solved = *record.trajectory();
     if (k < solved.covariances.size()) {
-      const UncertainPose pose =
-          with_scale_error({poses[k].T, solved.covariances[k]}, solved.scale_sigma);
-      for (const double x : along_fixed_axes(pose).reshaped()) out << ' ' << rounded(x, 9);
+      const Matrix6 Sigma = along_fixed_axes(
+          with_scale_error({poses[k].T, solved.covariances[k]}, solved.scale_sigma));
+      for (const double x : Sigma.reshaped()) out << ' ' << rounded(x, 9);
     }
     out << '\n';
   }

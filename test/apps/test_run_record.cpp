@@ -284,4 +284,26 @@ TEST_CASE("a closure is the same from whichever end it was found", "[robot]") {
                       "0.00000000,0.00000000,0.00000000,1.00000000,1,1,1,3.74,3.32,2.45,"));
 }
 
+TEST_CASE("each optimised keyframe is written with the 36 numbers of its covariance", "[robot]") {
+  KeyframeOdometry keyframe;
+  keyframe.id = {1, 0};
+  RunRecord record(1);
+  record.add(keyframe);
+  Matrix6 Sigma = Matrix6::Identity();
+  for (int row = 0; row < 6; ++row)
+    for (int column = 0; column < 6; ++column) Sigma(row, column) += 0.01 * (row + column);
+  record.add(Trajectory{1, 1, {SE3::Identity()}, {Sigma}});
+  const TemporaryFolder folder;
+  ResultWriter results;
+  write_results(folder.path(), record, results);
+  std::istringstream row(folder.read("optimized_keyframes.tum"));
+  double number = 0.0;
+  for (int pose = 0; pose < 8; ++pose) row >> number;
+  const Matrix6 along_axes = along_fixed_axes({SE3::Identity(), Sigma});
+  for (const double expected : along_axes.reshaped()) {
+    REQUIRE(row >> number);
+    CHECK(number == Approx(expected).epsilon(1e-8));
+  }
+}
+
 }  // namespace km
