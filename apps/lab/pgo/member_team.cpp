@@ -13,10 +13,7 @@ namespace km {
 using Eigen::Index;
 
 MemberTeam::MemberTeam(const TeamGraph& graph, std::vector<SE3> start, const Factory& make)
-    : graph_(graph),
-      parts_(graph.robots()),
-      sent_(graph.robots(), 0),
-      received_(graph.robots(), 0) {
+    : graph_(graph), parts_(graph.robots()) {
   if (static_cast<Index>(start.size()) != graph.poses())
     throw std::invalid_argument("MemberTeam: " + std::to_string(start.size()) +
                                 " start poses for " + std::to_string(graph.poses()));
@@ -64,12 +61,6 @@ void MemberTeam::announce_starts(std::vector<SE3> start) {
     public_poses[id] = T;
   }
   to_announce_ = kPoseBytes * ends.size();
-  for (const KeyframeId& id : ends)
-    for (std::size_t k = 0; k < parts_.size(); ++k) {
-      if (k == id.robot) continue;
-      sent_[id.robot] += kPoseBytes;
-      received_[k] += kPoseBytes;
-    }
   for (std::size_t k = 0; k < parts_.size(); ++k) {
     parts_[k].start.assign(start.begin() + graph_.first[k], start.begin() + graph_.first[k + 1]);
     parts_[k].public_poses.clear();
@@ -114,7 +105,6 @@ bool MemberTeam::done() const {
 bool MemberTeam::pass_on(std::uint32_t round, RoundMeter& meter) {
   bool worked = !in_flight_.empty();
   for (const Delivery& delivery : std::exchange(in_flight_, {})) {
-    received_[delivery.message.to] += delivery.message.bytes->size();
     const bool taken = meter.run(delivery.message.to, [&] {
       return members_[delivery.message.to]->receive(delivery.from, *delivery.message.bytes);
     });
@@ -127,7 +117,6 @@ bool MemberTeam::pass_on(std::uint32_t round, RoundMeter& meter) {
     worked = true;
     for (SolverMessage& message : meter.run(k, [&] { return members_[k]->advance(); })) {
       meter.sent(message.bytes->size());
-      sent_[k] += message.bytes->size();
       in_flight_.push_back({static_cast<RobotId>(k), std::move(message)});
     }
   }

@@ -32,9 +32,6 @@ class MemberTeam {
   [[nodiscard]] bool done() const;
   [[nodiscard]] const SolverState& state() const { return state_; }
   [[nodiscard]] std::uint32_t rounds() const { return rounds_; }
-  /// Bytes that `robot` has sent.
-  [[nodiscard]] std::size_t sent_by(std::size_t robot) const { return sent_[robot]; }
-  [[nodiscard]] std::size_t received_by(std::size_t robot) const { return received_[robot]; }
 
  private:
   struct Delivery {
@@ -51,8 +48,6 @@ class MemberTeam {
   std::map<std::size_t, TreePlace> places_;
   std::vector<std::unique_ptr<MemberSolver>> members_;
   std::vector<Delivery> in_flight_;
-  std::vector<std::size_t> sent_;
-  std::vector<std::size_t> received_;
   std::size_t to_announce_ = 0;  // bytes of the public poses still to be counted
   SolverState state_;
   std::uint32_t rounds_ = 0;
