@@ -1,5 +1,6 @@
 #include "modules/sensors/node/calibration_map.hpp"
 
+#include <yaml-cpp/yaml.h>
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -110,16 +111,20 @@ Distortion read_distortion(const CalibrationMap& map, const char* key) {
 
 CalibrationMap::CalibrationMap(const std::filesystem::path& file)
     : CalibrationMap(std::make_shared<const std::filesystem::path>(file), load(file)) {
-  if (!node_.IsMap()) throw DatasetError(file.string() + ": no keys found");
+  if (!node_->IsMap()) throw DatasetError(file.string() + ": no keys found");
 }
 
+CalibrationMap::CalibrationMap(std::shared_ptr<const std::filesystem::path> file,
+                               const YAML::Node& node)
+    : file_(std::move(file)), node_(std::make_shared<const YAML::Node>(node)) {}
+
 bool CalibrationMap::has(const char* key) const {
-  const YAML::Node node = node_[key];
+  const YAML::Node node = (*node_)[key];
   return node && !node.IsNull();
 }
 
 bool CalibrationMap::is_list(const char* key) const {
-  return has(key) && node_[key].IsSequence();
+  return has(key) && (*node_)[key].IsSequence();
 }
 
 const char* CalibrationMap::first_of(std::initializer_list<const char*> keys) const {
@@ -129,8 +134,8 @@ const char* CalibrationMap::first_of(std::initializer_list<const char*> keys) co
 }
 
 YAML::Node CalibrationMap::child(const char* key) const {
-  if (!has(key)) fail(node_, std::string("key ") + key + " is missing");
-  return node_[key];
+  if (!has(key)) fail(*node_, std::string("key ") + key + " is missing");
+  return (*node_)[key];
 }
 
 CalibrationMap CalibrationMap::map(const char* key) const {
@@ -226,7 +231,7 @@ SE3 CalibrationMap::transform(const char* key, const char* name) const {
 }
 
 void CalibrationMap::fail(const char* key, const std::string& problem) const {
-  fail(has(key) ? node_[key] : node_, problem);
+  fail(has(key) ? (*node_)[key] : *node_, problem);
 }
 
 void CalibrationMap::fail(const YAML::Node& node, const std::string& problem) const {

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <yaml-cpp/yaml.h>
 #include <cstddef>
 #include <filesystem>
 #include <initializer_list>
@@ -12,6 +11,10 @@
 
 #include "modules/core/camera.hpp"
 #include "modules/core/config.hpp"
+
+namespace YAML {
+class Node;
+}
 
 namespace km {
 
@@ -58,8 +61,7 @@ class CalibrationMap {
   [[nodiscard]] std::string place_of(const char* key) const;
 
  private:
-  CalibrationMap(std::shared_ptr<const std::filesystem::path> file, const YAML::Node& node)
-      : file_(std::move(file)), node_(node) {}
+  CalibrationMap(std::shared_ptr<const std::filesystem::path> file, const YAML::Node& node);
 
   [[nodiscard]] YAML::Node child(const char* key) const;
   [[noreturn]] void fail(const YAML::Node& node, const std::string& problem) const;
@@ -67,7 +69,7 @@ class CalibrationMap {
   void append(const YAML::Node& list, const char* name, std::vector<double>& values) const;
 
   std::shared_ptr<const std::filesystem::path> file_;
-  YAML::Node node_;
+  std::shared_ptr<const YAML::Node> node_;
 };
 
 /// The camera without its pose, from the keys `resolution`, `camera_model`, `intrinsics`,
