@@ -1,4 +1,8 @@
 #include "modules/robust/tree_root.hpp"
+
+#include <array>
+
+#include "modules/robust/odometry_evidence.hpp"
 #include "test/support/test.hpp"
 
 namespace km {
@@ -32,7 +36,53 @@ TreeVerdict start_after(std::uint32_t open, std::uint32_t alone) {
   return message.verdict;
 }
 
+// The verdicts on the first two steps of a team of three, with the predicted decreases `first` and
+// `second` of their cost of 2. Robot 0 is 8 times noisier than it claims, or `honest`.
+std::array<TreeVerdict, 2> two_steps(double first, double second, bool honest) {
+  TreeRoot root({0, 1, 2}, {}, false);
+  TreeSums sums{.base_cost = 2.0, .cost = 2.0, .largest = 1e3F, .open = 100, .poses = 100};
+  sums.largest_of_all = sums.largest;
+  for (const RobotId other : {RobotId{1}, RobotId{2}}) {
+    sums.votes.push_back({.a = 0, .b = other});
+    sums.votes.back().odometry.resize(kNoiseLevels * kNoiseLevels);
+    for (std::size_t k = 0; k < kNoiseLevels; ++k) {
+      const bool noisy = !honest && k == 3;
+      sums.votes.back().odometry[kNoiseLevels * k] = noisy ? 100.0F : 0.0F;
+    }
+  }
+  TreeVerdict verdict;
+  for (std::uint32_t round = 0; verdict.next != TreeVerdict::Next::kStart; ++round) {
+    REQUIRE(round < 4);
+    verdict = root.decide_start(sums, round).verdict;
+    if (round == 0) REQUIRE(verdict.odometry.empty() == honest);
+  }
+  const std::vector<SE3> poses(2, SE3::Identity());
+  TreeFront front({.poses = 2, .edges = {{.from = {0, 0}, .to = {0, 1}}}, .root = true});
+  front.linearise(poses, Curvature::kGaussNewton);
+  REQUIRE(front.factorise());
+  (void)front.reduce(poses, {});
+  std::array<TreeVerdict, 2> steps;
+  for (std::uint32_t k = 0; k < 2; ++k) {
+    sums.changed = sums.fractional = 50;
+    sums.decrement = 2.0 * (k == 0 ? first : second);
+    steps[k] = root.decide(sums, 10 + k, front, poses, true).verdict;
+    REQUIRE(steps[k].next == TreeVerdict::Next::kStep);
+  }
+  return steps;
+}
+
 }  // namespace
+
+TEST_CASE("Closures are weighed more strictly only near the minimum if odometry is noisy",
+          "[tree_root]") {
+  const auto waits = [](double first, double second, bool honest) {
+    const auto steps = two_steps(first, second, honest);
+    return steps[0].mu == steps[1].mu;
+  };
+  CHECK(waits(1.0, 1.0, false));
+  CHECK_FALSE(waits(1.0, 0.1, false));
+  CHECK_FALSE(waits(1.0, 1.0, true));
+}
 
 TEST_CASE("Robots decide closures alone if these are a tenth of all", "[tree_root]") {
   CHECK_FALSE(start_after(100, 100).weigh_all);
