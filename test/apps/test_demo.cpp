@@ -67,7 +67,7 @@ void check_map_2d(const fs::path& robot, const fs::path& world) {
 
 }  // namespace
 
-TEST_CASE("The demo joins three robots of a simulated world into one frame", "[demo][demo_world]") {
+TEST_CASE("The demo joins three robots of a simulated world into one frame", "[demo_world]") {
   constexpr std::size_t kFrames = 80;  // 8 s at 10 Hz
   constexpr double kMaxError_m = 0.3;  // robots in frames of their own are a metre off and more
   const TemporaryFolder folder;
@@ -104,7 +104,7 @@ TEST_CASE("The demo joins three robots of a simulated world into one frame", "[d
     CHECK(fs::exists(folder.path() / file));
 }
 
-TEST_CASE("The demo prints the commands to play a bag, to be pasted", "[demo]") {
+TEST_CASE("The demo prints the commands to play a bag, to be pasted") {
   const TemporaryFolder folder;
   const auto [file, dataset, pasted] = GENERATE(table<std::string, std::string, std::string>({
       {"walk.bag", "walk.bag", "walk.bag"},
@@ -151,7 +151,7 @@ struct StubbedDemo {
   }
 };
 
-TEST_CASE("The demo builds and draws a map of a recording with --map only", "[demo]") {
+TEST_CASE("The demo builds and draws a map of a recording with --map only") {
   const StubbedDemo demo;
   const std::string settings = "--set mapping.mode=metric";
   const CommandResult without = succeeded(demo.run(""));
@@ -184,7 +184,7 @@ TEST_CASE("The demo builds and draws a map of a recording with --map only", "[de
              StartsWith("demo: --programs: no kimera_multi_evaluate in "));
 }
 
-TEST_CASE("The demo lets robots be watched with --view only", "[demo]") {
+TEST_CASE("The demo lets robots be watched with --view only") {
   const StubbedDemo demo;
   demo.add("viewer", "echo Open http://here");
   const CommandResult without = demo.run("");
@@ -195,7 +195,7 @@ TEST_CASE("The demo lets robots be watched with --view only", "[demo]") {
                               Contains("/kimera_multi_team --config") && Contains(" --view\n"));
 }
 
-TEST_CASE("The demo refuses unusable input", "[demo]") {
+TEST_CASE("The demo refuses unusable input") {
   const auto refusal = [](const std::string& arguments) {
     const auto result = run_command("apps/demo " + arguments);
     CHECK(result.exit_code != 0);

@@ -10,7 +10,7 @@
 namespace km {
 namespace {
 
-TEST_CASE("Rows for which there was no room are written once there is room", "[robot]") {
+TEST_CASE("Rows for which there was no room are written once there is room") {
   const CapturedLog log;
   const TemporaryFolder folder;
   const fs::path path = folder.path() / "a.csv";
@@ -31,8 +31,7 @@ TEST_CASE("Rows for which there was no room are written once there is room", "[r
   CHECK(results.lost().empty());
 }
 
-TEST_CASE("Rows wait while the folder is gone, and a deleted file begins again with its header",
-          "[robot]") {
+TEST_CASE("Rows wait while the folder is gone, and a deleted file begins again with its header") {
   const CapturedLog log;
   const TemporaryFolder folder;
   const fs::path out = folder.path() / "out", moved = folder.path() / "moved";
@@ -59,8 +58,7 @@ TEST_CASE("Rows wait while the folder is gone, and a deleted file begins again w
   CHECK_THAT(results.lost().at((out / "a.csv").string()), Contains("rows are missing"));
 }
 
-TEST_CASE("A disk that is full for too long costs rows, and the file is reported as incomplete",
-          "[robot]") {
+TEST_CASE("A disk that is full for too long costs rows, and the file is reported as incomplete") {
   const CapturedLog log;
   const TemporaryFolder folder;
   const fs::path path = folder.path() / "a.csv";
@@ -77,7 +75,7 @@ TEST_CASE("A disk that is full for too long costs rows, and the file is reported
   CHECK_THAT(results.lost().at(path.string()), Contains("rows are missing"));
 }
 
-TEST_CASE("A file that is continued loses its incomplete row and no other", "[robot]") {
+TEST_CASE("A file that is continued loses its incomplete row and no other") {
   const TemporaryFolder folder;
   const fs::path path = folder.write("a.csv", "time\n1\n2\n3.");
   ResultWriter results;
@@ -91,8 +89,7 @@ TEST_CASE("A file that is continued loses its incomplete row and no other", "[ro
   CHECK(results.lost().empty());
 }
 
-TEST_CASE("A file that is missing, or incomplete in its first row, begins from scratch",
-          "[robot]") {
+TEST_CASE("A file that is missing, or incomplete in its first row, begins from scratch") {
   const TemporaryFolder folder;
   const fs::path path = folder.path() / "a.csv";
   if (GENERATE(false, true)) folder.write("a.csv", "tim");
@@ -106,7 +103,7 @@ TEST_CASE("A file that is missing, or incomplete in its first row, begins from s
 }
 
 }  // namespace
-TEST_CASE("Results replace an empty file of no run, and no other", "[result_files]") {
+TEST_CASE("Results replace an empty file of no run, and no other") {
   const TemporaryFolder folder;
   folder.write("traffic.csv", "");  // as one who watches the file creates it before the run
   CHECK_NOTHROW(expect_no_other_files(folder.path()));
@@ -119,7 +116,7 @@ namespace {
 
 constexpr std::uint64_t kMega = 1'000'000;
 
-TEST_CASE("Memory that is taken shows, and processor time does", "[robot]") {
+TEST_CASE("Memory that is taken shows, and processor time does") {
   const ProcessUsage before = process_usage();
   CHECK(before.resident_bytes > kMega);
   CHECK(before.peak_bytes >= before.resident_bytes / 2);  // counted lazily by the kernel
@@ -136,7 +133,7 @@ TEST_CASE("Memory that is taken shows, and processor time does", "[robot]") {
   CHECK(after.system_s <= after.cpu_s);
 }
 
-TEST_CASE("Free memory between blocks in use returns to the kernel", "[robot]") {
+TEST_CASE("Free memory between blocks in use returns to the kernel") {
   constexpr std::size_t kBlock = 1024, kBlocks = 65536;
   std::vector<std::unique_ptr<char[]>> blocks(kBlocks);
   for (auto& block : blocks) {
@@ -155,7 +152,7 @@ TEST_CASE("Free memory between blocks in use returns to the kernel", "[robot]") 
   CHECK(process_usage().resident_bytes + kBlock * kBlocks / 2 < before);
 }
 
-TEST_CASE("The growth of memory is measured in the second half of the time", "[robot]") {
+TEST_CASE("The growth of memory is measured in the second half of the time") {
   std::ostringstream text;
   ProcessCsv csv(text);
   CHECK_FALSE(csv.summary().memory_growth_bytes_per_minute);
@@ -172,7 +169,7 @@ TEST_CASE("The growth of memory is measured in the second half of the time", "[r
         Approx(60.0 * static_cast<double>(per_s)).margin(1.0));
 }
 
-TEST_CASE("process.csv has a row for each sample", "[robot]") {
+TEST_CASE("process.csv has a row for each sample") {
   std::ostringstream text;
   ProcessCsv csv(text);
   csv.append(0.5, {.cpu_s = 0.25, .system_s = 0.125, .page_faults = 10, .resident_bytes = 12345});
@@ -186,7 +183,7 @@ TEST_CASE("process.csv has a row for each sample", "[robot]") {
   CHECK_FALSE(csv.summary().memory_growth_bytes_per_minute);  // too short
 }
 
-TEST_CASE("process.csv continues the time of the run, and sums up the processor time", "[robot]") {
+TEST_CASE("process.csv continues the time of the run, and sums up the processor time") {
   std::ostringstream text;
   ProcessCsv csv(text,
                  "time_s,cpu_s,resident_bytes,system_s,page_faults\n"
@@ -197,7 +194,7 @@ TEST_CASE("process.csv continues the time of the run, and sums up the processor 
   CHECK(csv.summary().cpu_s == 0.25);
 }
 
-TEST_CASE("optimizer.csv has a row for each round, and continues the numbers", "[robot]") {
+TEST_CASE("optimizer.csv has a row for each round, and continues the numbers") {
   std::ostringstream text;
   std::vector<OptimizerProgress> rounds{
       {.members = {1, 2}, .round = 1, .cost = 4.0, .seconds = 0.5}};

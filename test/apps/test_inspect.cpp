@@ -24,7 +24,7 @@ using Words = std::vector<std::string>;
 
 }  // namespace
 
-TEST_CASE("A right camera that is stamped later than the left one is seen", "[robot]") {
+TEST_CASE("A right camera that is stamped later than the left one is seen") {
   const auto folder = shared_data("ros_recordings/rosbag2/s3e_playground_2");
   if (!folder) return;
   const std::string text = inspect_recording(*folder);
@@ -42,7 +42,7 @@ TEST_CASE("A right camera that is stamped later than the left one is seen", "[ro
   CHECK(words_of_line(text, "/Alpha/imu/data ").at(2) == "14");
 }
 
-TEST_CASE("The lists of a EuRoC folder are its topics", "[robot]") {
+TEST_CASE("The lists of a EuRoC folder are its topics") {
   const TemporaryFolder folder;
   folder.write("mav0/cam0/data.csv", "#timestamp [ns],filename\n1000000000,a\n1050000000,b\n");
   folder.write("mav0/cam1/data.csv", "#timestamp [ns],filename\n1000000000,a\n1050000000,b\n");
@@ -55,7 +55,7 @@ TEST_CASE("The lists of a EuRoC folder are its topics", "[robot]") {
         Words{"cam0", "cam1", "2", "2", "0.000", "0.000", "0", "0"});
 }
 
-TEST_CASE("A EuRoC folder needs no rig file, and the message names the alternative", "[robot]") {
+TEST_CASE("A EuRoC folder needs no rig file, and the message names the alternative") {
   const TemporaryFolder folder;
   folder.write("mav0/cam0/data.csv", "1000000000,a\n");
   const auto rig = folder.path() / "rig.yaml";
@@ -65,7 +65,7 @@ TEST_CASE("A EuRoC folder needs no rig file, and the message names the alternati
   CHECK_FALSE(fs::exists(rig));
 }
 
-TEST_CASE("Skipped parts of a recording are reported with their place", "[robot]") {
+TEST_CASE("Skipped parts of a recording are reported with their place") {
   const auto file = shared_data("ros_recordings/mcap/nav2_turtlebot.mcap");
   if (!file) return;
   const TemporaryFolder folder;
@@ -77,7 +77,7 @@ TEST_CASE("Skipped parts of a recording are reported with their place", "[robot]
   CHECK(text.find("\n\n") == text.npos);  // no cameras
 }
 
-TEST_CASE("A file that is no recording is refused with its name", "[robot]") {
+TEST_CASE("A file that is no recording is refused with its name") {
   const TemporaryFolder folder;
   CHECK_THROWS_WITH(inspect_recording(folder.path()),
                     folder.path().string() +
@@ -102,7 +102,7 @@ TopicSummary topic(const std::string& name, std::string_view type, double rate_h
 
 }  // namespace
 
-TEST_CASE("A rig is proposed by types, rates and names", "[robot]") {
+TEST_CASE("A rig is proposed by types, rates and names") {
   const auto image = RosImage::kType, imu = RosImu::kType;
   RigFile rig = propose_rig(
       {topic("/thermal", image, 9.0, "mono8"), topic("/cam1/image_raw", image, 20.0, "mono8"),
@@ -142,7 +142,7 @@ TEST_CASE("A rig is proposed by types, rates and names", "[robot]") {
   CHECK(rig.depth.topic == "/camera/depth/image");
 }
 
-TEST_CASE("Aligned depth is proposed, or depth is reported as not aligned", "[robot]") {
+TEST_CASE("Aligned depth is proposed, or depth is reported as not aligned") {
   const auto framed = [](const std::string& name, const std::string& encoding,
                          const std::string& frame) {
     TopicSummary summary = topic(name, RosImage::kType, 30.0, encoding);
@@ -161,7 +161,7 @@ TEST_CASE("Aligned depth is proposed, or depth is reported as not aligned", "[ro
   CHECK(depth_problem(topics, rig).empty());
 }
 
-TEST_CASE("Topics with the calibration of cameras are proposed if they exist", "[robot]") {
+TEST_CASE("Topics with the calibration of cameras are proposed if they exist") {
   const auto image = RosImage::kType;
   std::vector<TopicSummary> topics = {topic("/left/image_raw", image, 20.0, "mono8"),
                                       topic("/right/image_raw", image, 20.0, "mono8"),
@@ -173,7 +173,7 @@ TEST_CASE("Topics with the calibration of cameras are proposed if they exist", "
   CHECK(rig.right.info_topic.empty());
 }
 
-TEST_CASE("A rig file is written for a recording, once", "[robot]") {
+TEST_CASE("A rig file is written for a recording, once") {
   const auto bag = shared_data("ros_recordings/rosbag2/s3e_playground_2");
   if (!bag) return;
   const TemporaryFolder folder;

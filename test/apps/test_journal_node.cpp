@@ -48,7 +48,7 @@ struct Journal {
   JournalNode node;
 };
 
-TEST_CASE("Closures found while the journal stops are written and published", "[robot]") {
+TEST_CASE("Closures found while the journal stops are written and published") {
   Journal journal;
   Inbox<Closure> passed(journal.topics.own_closures);
   Closure closure;
@@ -63,7 +63,7 @@ TEST_CASE("Closures found while the journal stops are written and published", "[
   CHECK(written[0].id() == closure.id());
 }
 
-TEST_CASE("The journal knows a published keyframe as long as its file exists", "[robot]") {
+TEST_CASE("The journal knows a published keyframe as long as its file exists") {
   Journal journal;
   Inbox<Keyframe> passed(journal.topics.keyframes);
   Keyframe keyframe;
@@ -81,7 +81,7 @@ TEST_CASE("The journal knows a published keyframe as long as its file exists", "
   CHECK(journal.node.recall(0) == nullptr);
 }
 
-TEST_CASE("Events of nodes that stop later are written, with their times", "[robot]") {
+TEST_CASE("Events of nodes that stop later are written, with their times") {
   Journal journal;
   journal.node.stop();
   journal.node.append(RobotSample{.name = "toy"});
@@ -96,7 +96,7 @@ TEST_CASE("Events of nodes that stop later are written, with their times", "[rob
   CHECK(times.front() > 1'600'000'000'000'000'000);  // after 2020
 }
 
-TEST_CASE("A journal holds the product of all corrections of the cameras", "[robot]") {
+TEST_CASE("A journal holds the product of all corrections of the cameras") {
   Journal journal({0.02, make_pose(Eigen::Matrix3d::Identity(), {0.1, 0.0, 0.0})});
   KeyframeOdometry keyframe;
   keyframe.id = {1, 0};
@@ -112,8 +112,7 @@ TEST_CASE("A journal holds the product of all corrections of the cameras", "[rob
 }
 
 // Nodes stop in this order.
-TEST_CASE("The journal stops after all nodes that find closures and before those that use them",
-          "[robot]") {
+TEST_CASE("The journal stops after all nodes that find closures and before those that use them") {
   const TemporaryFolder folder;
   RobotOptions options;
   options.robot = 1;
@@ -151,7 +150,7 @@ Closure closure_of(KeyframeId from, KeyframeId to) {
 }
 
 // Whether a place is known depends on the closures found until then.
-TEST_CASE("A restored closure follows the last keyframe on which it ends", "[robot][restore]") {
+TEST_CASE("A restored closure follows the last keyframe on which it ends") {
   constexpr RobotId kSelf = 1;
   RestoredRun run;
   run.robot = kSelf;

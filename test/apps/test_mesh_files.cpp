@@ -41,7 +41,7 @@ struct Bench {
   }
 };
 
-TEST_CASE("A mesh is moved to the optimised pose of its first keyframe", "[robot][mapping]") {
+TEST_CASE("A mesh is moved to the optimised pose of its first keyframe") {
   Bench bench;
   bench.node.start();
   const SE3 T_odom_first = make_pose(so3_exp(Eigen::Vector3d(0.0, 0.0, 0.3)), {1.0, 2.0, 0.5});
@@ -63,7 +63,7 @@ TEST_CASE("A mesh is moved to the optimised pose of its first keyframe", "[robot
   CHECK(bench.written("mesh_optimized.ply").vertices == triangle().mesh.vertices);
 }
 
-TEST_CASE("The 2D map and the slice of the distance field are written", "[robot][mapping]") {
+TEST_CASE("The 2D map and the slice of the distance field are written") {
   Bench bench;
   bench.node.start();
   bench.maps_2d.publish(OccupancyGrid{0.5, {-1, 2}, 2, 1, {100, -1}});
@@ -76,7 +76,7 @@ TEST_CASE("The 2D map and the slice of the distance field are written", "[robot]
   CHECK(bench.written("distance_field.ply").vertices == triangle().mesh.vertices);
 }
 
-TEST_CASE("A mesh that cannot be written is named, and no end of the run", "[robot][mapping]") {
+TEST_CASE("A mesh that cannot be written is named, and no end of the run") {
   Bench bench;
   const CapturedLog log;
   const fs::path file = bench.folder.path() / "mesh.ply";

@@ -68,8 +68,7 @@ Parsed run_program(std::vector<std::string> words) {
 
 }  // namespace
 
-TEST_CASE("An invalid command line gives the exit code and a message with the option",
-          "[program]") {
+TEST_CASE("An invalid command line gives the exit code and a message with the option") {
   const std::string hint = "Options of others come after --\n";
   const auto [words, named] = GENERATE_COPY(table<std::vector<const char*>, std::string>({
       {{"a", "--number", "10"}, "--number: Value 10 not in range 0 to 9"},
@@ -85,7 +84,7 @@ TEST_CASE("An invalid command line gives the exit code and a message with the op
   CHECK_THAT(parsed.errors, Contains("NAME") || !Contains("is required"));
 }
 
-TEST_CASE("A callback can refuse its option, or end the program", "[program]") {
+TEST_CASE("A callback can refuse its option, or end the program") {
   Program program;
   program.app.add_flag_callback(
       "--refused", [] { throw CLI::ValidationError("--refused", "why"); }, "");
@@ -101,7 +100,7 @@ TEST_CASE("A callback can refuse its option, or end the program", "[program]") {
   CHECK(done.errors.empty());
 }
 
-TEST_CASE("A subcommand runs once and its failure is the program's", "[program]") {
+TEST_CASE("A subcommand runs once and its failure is the program's") {
   commands_run = 0;
   CHECK(run_program({"count"}).exit_code == 0);
   CHECK(commands_run == 1);
@@ -110,7 +109,7 @@ TEST_CASE("A subcommand runs once and its failure is the program's", "[program]"
   CHECK(failed.errors == "program: no file\n");
 }
 
-TEST_CASE("Without a subcommand the program lists them", "[program]") {
+TEST_CASE("Without a subcommand the program lists them") {
   const std::vector<std::string> words =
       GENERATE(std::vector<std::string>{}, std::vector<std::string>{"cont"});
   const Parsed parsed = run_program(words);
@@ -119,8 +118,7 @@ TEST_CASE("Without a subcommand the program lists them", "[program]") {
                                      "  count  Counts\n  fail  Fails\n"));
 }
 
-TEST_CASE("An unknown option gives the exit code of bad command lines in every program",
-          "[program]") {
+TEST_CASE("An unknown option gives the exit code of bad command lines in every program") {
   for (const std::string& name : words_of(KM_PROGRAMS)) {
     CAPTURE(name);
     CHECK(run_command(KM_BIN_DIR "/" + name + " --nosuch").exit_code == kBadCommandLine);
@@ -128,7 +126,7 @@ TEST_CASE("An unknown option gives the exit code of bad command lines in every p
 }
 
 // The exit code of the doctor is the severity of its findings.
-TEST_CASE("An input that is missing or unreadable gives the exit code of bad input", "[program]") {
+TEST_CASE("An input that is missing or unreadable gives the exit code of bad input") {
   const EurocFolder recording;
   const TemporaryFolder folder;
   std::map<std::string, std::string> values = {
@@ -191,7 +189,7 @@ constexpr const char* kCommitPattern = "(unknown|[0-9a-f]{10,40}(-dirty)?)";
 
 }  // namespace
 
-TEST_CASE("Every program prints its version, its commit and its build settings", "[version]") {
+TEST_CASE("Every program prints its version, its commit and its build settings") {
   std::istringstream programs(KM_PROGRAMS);  // all of this build
   int count = 0;
   for (std::string name; programs >> name; ++count) {
@@ -237,7 +235,7 @@ struct Sources {
 
 }  // namespace
 
-TEST_CASE("The build knows the commit of its sources, and whether they differ", "[version]") {
+TEST_CASE("The build knows the commit of its sources, and whether they differ") {
   const Sources sources;
   CHECK(sources.found() == "unknown");
   if (run_command("git --version").exit_code != 0) {
@@ -256,7 +254,7 @@ TEST_CASE("The build knows the commit of its sources, and whether they differ", 
   CHECK(sources.found("tree/release") == "unknown");
 }
 
-TEST_CASE("The header of an unchanged commit is not written again", "[version]") {
+TEST_CASE("The header of an unchanged commit is not written again") {
   const Sources sources;
   static_cast<void>(sources.found());
   const auto header = sources.folder.path() / "commit.hpp";

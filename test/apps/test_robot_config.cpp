@@ -36,7 +36,7 @@ struct FieldCounter : FieldVisitor<FieldCounter> {
   }
 };
 
-TEST_CASE("Every member of every section is a key, and has a text", "[robot]") {
+TEST_CASE("Every member of every section is a key, and has a text") {
   RobotConfig config;
   std::size_t sections = 0;
   config.visit_sections([&](auto& section) {
@@ -50,7 +50,7 @@ TEST_CASE("Every member of every section is a key, and has a text", "[robot]") {
   CHECK(sections == member_count<RobotConfig>() - 1);  // beside `effective`
 }
 
-TEST_CASE("config/robot.yaml shows every key with its default", "[robot]") {
+TEST_CASE("config/robot.yaml shows every key with its default") {
   std::ifstream stream("config/robot.yaml");
   const std::string shipped(std::istreambuf_iterator<char>(stream), {});
   RobotConfig defaults;
@@ -61,7 +61,7 @@ TEST_CASE("config/robot.yaml shows every key with its default", "[robot]") {
   CHECK(shipped.substr(shipped.find("\n\n") + 1) == expected);
 }
 
-TEST_CASE("The effective configuration gives the same configuration again", "[robot]") {
+TEST_CASE("The effective configuration gives the same configuration again") {
   RobotOptions options;
   options.configs = {"config/datasets/tunnels.yaml"};
   options.settings = {"vio.start_s=1", "dds.team=blue"};
@@ -72,7 +72,7 @@ TEST_CASE("The effective configuration gives the same configuration again", "[ro
   CHECK(load_robot_config(again).effective == effective);
 }
 
-TEST_CASE("Later sources have priority: profile, files, settings, options", "[robot]") {
+TEST_CASE("Later sources have priority: profile, files, settings, options") {
   RobotOptions options;
   options.link = "wifi";
   options.settings = {"dds.domain=7", "dds.lease_s=33", "dds.interface=eth9"};
@@ -90,7 +90,7 @@ TEST_CASE("Later sources have priority: profile, files, settings, options", "[ro
   CHECK(load_robot_config(options).dds.discovery == Discovery::kPeers);
 }
 
-TEST_CASE("Every shipped configuration loads", "[robot]") {
+TEST_CASE("Every shipped configuration loads") {
   std::vector<std::string> files = {"config/robot.yaml"};
   for (const auto& entry : fs::directory_iterator("config/datasets"))
     files.push_back(entry.path().string());
@@ -105,7 +105,7 @@ TEST_CASE("Every shipped configuration loads", "[robot]") {
     }
 }
 
-TEST_CASE("A link profile that does not exist is named with the places looked at", "[robot]") {
+TEST_CASE("A link profile that does not exist is named with the places looked at") {
   RobotOptions options;
   options.link = "pigeon";
   CHECK_THROWS_WITH(load_robot_config(options),
@@ -128,7 +128,7 @@ struct Recording {
   }
 };
 
-TEST_CASE("A shipped file is found by its name", "[robot]") {
+TEST_CASE("A shipped file is found by its name") {
   CHECK(find_named_file("datasets", "euroc") == "config/datasets/euroc.yaml");
   CHECK(find_named_file("rigs", "d455") == "config/rigs/realsense_d455.yaml");
   CHECK(find_named_file("rigs", "config/datasets/euroc.yaml") == "config/datasets/euroc.yaml");
@@ -137,7 +137,7 @@ TEST_CASE("A shipped file is found by its name", "[robot]") {
                     "realsense_d455, zed2");
 }
 
-TEST_CASE("Off is no plan, metric takes depth alone", "[robot][mapping]") {
+TEST_CASE("Off is no plan, metric takes depth alone") {
   const Recording recording({"cam0", "cam1", "depth0", "label0"});
   CHECK_FALSE(recording.plan({}).has_value());
   const auto plan = recording.plan({.mode = MappingMode::kMetric});
@@ -147,7 +147,7 @@ TEST_CASE("Off is no plan, metric takes depth alone", "[robot][mapping]") {
   CHECK(plan->palette.classes().empty());
 }
 
-TEST_CASE("Recorded depth and labels are preferred, others computed", "[robot][mapping]") {
+TEST_CASE("Recorded depth and labels are preferred, others computed") {
   const Recording full({"cam0", "cam1", "depth0", "label0"});
   const Recording stereo({"cam0", "cam1"});
   MappingConfig config{.mode = MappingMode::kSemantic};
@@ -170,7 +170,7 @@ TEST_CASE("Recorded depth and labels are preferred, others computed", "[robot][m
   CHECK(full.plan(config, network)->sensor.labels == LabelsFrom::kNetwork);
 }
 
-TEST_CASE("Noise of depth follows from the camera that measures it", "[robot][mapping]") {
+TEST_CASE("Noise of depth follows from the camera that measures it") {
   const StereoRig rig = rgbd_rig({.fx = 500.0, .fy = 500.0}, 0.1);
   MappingPlan plan;
   plan.sensor.depth = DepthFrom::kStereo;
@@ -181,7 +181,7 @@ TEST_CASE("Noise of depth follows from the camera that measures it", "[robot][ma
   CHECK(depth_sigma_per_m(rig, plan) == Approx(0.001));
 }
 
-TEST_CASE("A bag has the images that its rig file names", "[robot][mapping]") {
+TEST_CASE("A bag has the images that its rig file names") {
   const MappingConfig metric{.mode = MappingMode::kMetric};
   const auto plan = [&](const SensorTopicNames& topics, const MappingConfig& config) {
     return plan_mapping(config, {}, {}, image_sources(topics, "rig.yaml"));
@@ -195,7 +195,7 @@ TEST_CASE("A bag has the images that its rig file names", "[robot][mapping]") {
                     Contains("no label images in rig.yaml"));
 }
 
-TEST_CASE("A map that is not possible is refused with the missing inputs", "[robot][mapping]") {
+TEST_CASE("A map that is not possible is refused with the missing inputs") {
   const Recording stereo({"cam0", "cam1"});
   const Recording depth({"cam0", "depth0", "label0"});
   const auto refused = [](const Recording& recording, const MappingConfig& config,

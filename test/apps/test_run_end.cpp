@@ -26,7 +26,7 @@ struct Done {
   }
 };
 
-TEST_CASE("A robot alone leaves once its graph has been quiet", "[departure]") {
+TEST_CASE("A robot alone leaves once its graph has been quiet") {
   Done robot;
   CHECK(robot.departure.update(0.0, {.activity = 1}).phase == RobotPhase::kRunning);
   robot.inputs.activity = 2;
@@ -36,18 +36,18 @@ TEST_CASE("A robot alone leaves once its graph has been quiet", "[departure]") {
   CHECK(robot.leaves_at(13.0));
 }
 
-TEST_CASE("A robot serves a peer that is still running, up to the limit", "[departure]") {
+TEST_CASE("A robot serves a peer that is still running, up to the limit") {
   Done robot{.peers = {kSettled, {}}};
   for (double now_s = 5.0; now_s < 5.0 + kLimit_s; now_s += 1.0)
     CHECK_FALSE(robot.leaves_at(now_s));
   CHECK(robot.leaves_at(5.0 + kLimit_s));
 }
 
-TEST_CASE("A robot serves its peers until the last session has come", "[departure]") {
+TEST_CASE("A robot serves its peers until the last session has come") {
   CHECK(RobotOptions{}.serve_limit_s > PoseGraphConfig{}.session_wait_s);
 }
 
-TEST_CASE("A robot awaits the robots of its closures, up to the limit", "[departure]") {
+TEST_CASE("A robot awaits the robots of its closures, up to the limit") {
   Done robot;
   robot.inputs.awaits_peers = true;
   CHECK(robot.phase_at(50.0) == RobotPhase::kFinished);
@@ -55,7 +55,7 @@ TEST_CASE("A robot awaits the robots of its closures, up to the limit", "[depart
   CHECK(robot.leaves_at(50.0 + kLimit_s));
 }
 
-TEST_CASE("New work after all had settled starts the wait again", "[departure]") {
+TEST_CASE("New work after all had settled starts the wait again") {
   Done robot{.peers = {kSettled}};
   robot.phase_at(4.0);
   robot.inputs.activity = 1;  // a closure arrived
@@ -65,7 +65,7 @@ TEST_CASE("New work after all had settled starts the wait again", "[departure]")
   CHECK(robot.leaves_at(8.5));
 }
 
-TEST_CASE("A settled robot leaves as soon as a peer reports that it leaves", "[departure]") {
+TEST_CASE("A settled robot leaves as soon as a peer reports that it leaves") {
   Done robot{.peers = {kSettled, kSettled}};
   CHECK_FALSE(robot.leaves_at(9.0));
   robot.peers[1].phase = RobotPhase::kLeaving;
@@ -75,7 +75,7 @@ TEST_CASE("A settled robot leaves as soon as a peer reports that it leaves", "[d
   CHECK(robot.leaves_at(9.2));
 }
 
-TEST_CASE("A robot whose graph never settles leaves at the limit", "[departure]") {
+TEST_CASE("A robot whose graph never settles leaves at the limit") {
   Done robot;
   robot.inputs.graph_settled = false;
   CHECK(robot.phase_at(0.0) == RobotPhase::kFinished);
@@ -112,7 +112,7 @@ std::vector<double> departures(std::size_t count, std::size_t restless, double f
   return left_s;
 }
 
-TEST_CASE("In a chain every robot waits for the one at the end, and then all go", "[departure]") {
+TEST_CASE("In a chain every robot waits for the one at the end, and then all go") {
   const std::size_t restless = GENERATE(0U, 3U, 7U);
   CAPTURE(restless);
   for (const double s : departures(8, restless, 20.0)) {
@@ -127,7 +127,7 @@ RunEnd usual_end() {
   return end;
 }
 
-TEST_CASE("A run is judged by the gravest that happened to it", "[run_end]") {
+TEST_CASE("A run is judged by the gravest that happened to it") {
   CHECK(to_string(*usual_end().images) == "88 of 100 images have a pose");
   const RunResult::Failure failed{"vio", "out of memory"},
       hung{"vio", "has not finished one step for 30 s", true};
@@ -204,7 +204,7 @@ std::string text_of(const Absentees& absentees, double second_hand_s = 0.0) {
   return text;
 }
 
-TEST_CASE("A robot is missed for as long as it has been silent or in another frame", "[run_end]") {
+TEST_CASE("A robot is missed for as long as it has been silent or in another frame") {
   const std::vector<RobotId> alone{1}, with_bob{1, 2};
   Absentees absentees;
   CHECK(text_of(absentees).empty());
@@ -221,8 +221,7 @@ TEST_CASE("A robot is missed for as long as it has been silent or in another fra
   CHECK(text_of(absentees) == "bob apart 1 ");
 }
 
-TEST_CASE("A member that only others received is missed once it cannot have left in order",
-          "[run_end]") {
+TEST_CASE("A member that only others received is missed once it cannot have left in order") {
   Absentees absentees;
   absentees.update(5.0, {{2, {"bob", kReceived}}}, std::vector<RobotId>{1, 2, 7});
   absentees.update(6.0, {{2, {"bob", kReceived}}}, std::vector<RobotId>{1, 2});
@@ -238,7 +237,7 @@ TEST_CASE("A member that only others received is missed once it cannot have left
   CHECK(text_of(absentees, 5.0).empty());
 }
 
-TEST_CASE("A robot that is noticed is unmet until it is met", "[run_end]") {
+TEST_CASE("A robot that is noticed is unmet until it is met") {
   UnmetPeers unmet({"10.0.0.7"});
   Peer bob;
   bob.identity.name = "bob";

@@ -42,14 +42,13 @@ Finding the_finding_of(const RunFacts& run) {
 
 }  // namespace
 
-TEST_CASE("Runs of robots that joined have no findings", "[robot][findings]") {
+TEST_CASE("Runs of robots that joined have no findings") {
   const std::vector<RunFacts> team = {run_of(0, true, tally_of(400, 30, 10, 10)),
                                       run_of(2, true, tally_of(300, 20, 5, 5))};
   CHECK(findings_of(team).empty());
 }
 
-TEST_CASE("Why two robots did not join is one sentence with the counts of both",
-          "[robot][findings]") {
+TEST_CASE("Why two robots did not join is one sentence with the counts of both") {
   std::vector<RunFacts> team = {run_of(0, false, tally_of(400, 100, 30, 2)),
                                 run_of(2, false, tally_of(12, 5, 1, 0))};
   for (RunFacts& run : team) run.pcm.selection = ClosureSelection::kPcm;
@@ -62,8 +61,8 @@ TEST_CASE("Why two robots did not join is one sentence with the counts of both",
                     "loop_closures.csv), 2 kept: below pcm.min_inliers 3"));
 }
 
-TEST_CASE("If robots share enough closures, a lost link is named as the reason why they are apart",
-          "[robot][findings]") {
+TEST_CASE(
+    "If robots share enough closures, a lost link is named as the reason why they are apart") {
   RunFacts run = run_of(0, false, tally_of(400, 100, 30, 20));
   const auto what = [&run] {
     const auto findings = findings_of_one(run);
@@ -80,8 +79,7 @@ TEST_CASE("If robots share enough closures, a lost link is named as the reason w
              StartsWith("alice and bob did not join: ") && !Contains("one robot was not received"));
 }
 
-TEST_CASE("Two robots did not join for the first stage that stopped their closures",
-          "[robot][findings]") {
+TEST_CASE("Two robots did not join for the first stage that stopped their closures") {
   const auto why = [](const ClosureTally& tally) {
     const auto findings = findings_of_one(run_of(0, false, tally));
     REQUIRE_FALSE(findings.empty());
@@ -110,7 +108,7 @@ TEST_CASE("Two robots did not join for the first stage that stopped their closur
   CHECK_THAT(why(tally_of(9, 7, 5, 2)), Contains("2 kept, which the other closures contradict"));
 }
 
-TEST_CASE("An error of the network hides no finding on the cameras", "[robot][findings]") {
+TEST_CASE("An error of the network hides no finding on the cameras") {
   RunFacts run = run_of(0, true, tally_of(400, 30, 10, 10));
   run.summary.cameras = {.offset_s = 0.02, .offset_sigma_s = 0.001};
   REQUIRE(the_finding_of(run).id == "cameras.offset");
@@ -118,7 +116,7 @@ TEST_CASE("An error of the network hides no finding on the cameras", "[robot][fi
   CHECK(findings_of_one(run).size() == 2);
 }
 
-TEST_CASE("Robots that one place or no closure ties are reported as such", "[robot][findings]") {
+TEST_CASE("Robots that one place or no closure ties are reported as such") {
   std::vector<RunFacts> runs{run_of(0, true, tally_of(9, 7, 3, 3)), run_of(2, true, {})};
   CHECK(findings_of(runs).empty());
   runs[0].summary.pgo.tentative = {2};
@@ -134,8 +132,7 @@ TEST_CASE("Robots that one place or no closure ties are reported as such", "[rob
   CHECK_THAT(findings_of(runs)[0].what, Contains("did not join"));
 }
 
-TEST_CASE("A tally counts the stages that a closure came through, and why it stopped",
-          "[robot][findings]") {
+TEST_CASE("A tally counts the stages that a closure came through, and why it stopped") {
   ClosureTally tally;
   tally.add(ClosureStage::kCandidate, "not requested");
   tally.add(ClosureStage::kReceived, "too few inliers");
@@ -150,7 +147,7 @@ TEST_CASE("A tally counts the stages that a closure came through, and why it sto
   CHECK(tally.unmatched == std::map<std::string, std::uint64_t>{{"too few inliers", 1}});
 }
 
-TEST_CASE("A finding on a run is reported with its severity and its number", "[robot][findings]") {
+TEST_CASE("A finding on a run is reported with its severity and its number") {
   using enum Severity;
   struct Row {
     const char* id;  // null: no finding
@@ -253,7 +250,7 @@ TEST_CASE("A finding on a run is reported with its severity and its number", "[r
   }
 }
 
-TEST_CASE("The advice on pauses and holes depends on skipped frames", "[robot][findings]") {
+TEST_CASE("The advice on pauses and holes depends on skipped frames") {
   RunFacts run = run_of(0, true, tally_of(40, 30, 10, 10));
   run.summary.paused_s = 3.0;
   CHECK_THAT(the_finding_of(run).means, Contains("every image was used"));

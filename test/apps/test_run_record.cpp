@@ -27,8 +27,7 @@ PeerEvent event_of(PeerEventKind kind, RobotId robot) {
 
 }  // namespace
 
-TEST_CASE("a closure that the optimiser rejects is no inlier, until it is accepted again",
-          "[robot]") {
+TEST_CASE("a closure that the optimiser rejects is no inlier, until it is accepted again") {
   const ClosureId kept{{1, 2}, {2, 3}};
   const ClosureId doubted{{1, 4}, {2, 5}};
   const ClosureId inconsistent{{1, 6}, {2, 7}};
@@ -57,8 +56,7 @@ TEST_CASE("a closure that the optimiser rejects is no inlier, until it is accept
   CHECK(record.inlier_closures().size() == 2);
 }
 
-TEST_CASE("the keypoints of received keyframes are counted, descriptors of word points included",
-          "[robot]") {
+TEST_CASE("the keypoints of received keyframes are counted, descriptors of word points included") {
   RunRecord record(1);
   KeyframeReply whole{.number = 1, .found = true, .keyframe = {}};
   whole.keyframe.features.keypoints.resize(120);
@@ -71,7 +69,7 @@ TEST_CASE("the keypoints of received keyframes are counted, descriptors of word 
   CHECK(summary_of(record).peer_keyframes == PeerKeyframeCounts{2, 170});
 }
 
-TEST_CASE("live poses follow the last keyframe that was optimised when the image came", "[robot]") {
+TEST_CASE("live poses follow the last keyframe that was optimised when the image came") {
   const auto at = [](double x, double y = 0.0) {
     return make_pose(Eigen::Matrix3d::Identity(), {x, y, 0.0});
   };
@@ -110,7 +108,7 @@ TEST_CASE("live poses follow the last keyframe that was optimised when the image
   CHECK(record.live()[1].T.translation().isApprox(Eigen::Vector3d(3.1, 5.0, 0.0)));
 }
 
-TEST_CASE("states of a former process are not live", "[robot]") {
+TEST_CASE("states of a former process are not live") {
   RunRecord record(1);
   record.add(TeamSolution{.trajectory = {1, 0, {SE3::Identity()}}, .verdicts = {}, .peers = {}});
   record.add(OdometryState{});
@@ -118,7 +116,7 @@ TEST_CASE("states of a former process are not live", "[robot]") {
   CHECK(record.odometry().size() == 1);
 }
 
-TEST_CASE("changes of decisions, poses and cells become events, each once", "[robot]") {
+TEST_CASE("changes of decisions, poses and cells become events, each once") {
   const ClosureId kept{{1, 2}, {2, 3}}, doubted{{1, 4}, {2, 5}};
   RunRecord record(1);
   const auto judged = [&] {
@@ -169,7 +167,7 @@ TEST_CASE("changes of decisions, poses and cells become events, each once", "[ro
   CHECK(std::get<MeshCells>(events[0]).cells.size() == 2);
 }
 
-TEST_CASE("keyframes that another vocabulary keeps from being compared are counted", "[robot]") {
+TEST_CASE("keyframes that another vocabulary keeps from being compared are counted") {
   RunRecord record(1);
   for (KeyframeIndex i = 0; i < 3; ++i)
     record.add(PlaceQuery{{2, i}, PlaceQueryStatus::kOtherVocabulary});
@@ -180,7 +178,7 @@ TEST_CASE("keyframes that another vocabulary keeps from being compared are count
   CHECK(record.other_vocabulary().empty());
 }
 
-TEST_CASE("keyframes that were compared by ORB because of another network are counted", "[robot]") {
+TEST_CASE("keyframes that were compared by ORB because of another network are counted") {
   RunRecord record(1);
   KeyframeReply by_orb{.number = 1, .found = true, .keyframe = {}};
   by_orb.keyframe.odometry.id = {2, 7};
@@ -201,7 +199,7 @@ TEST_CASE("keyframes that were compared by ORB because of another network are co
   CHECK(record.other_network().empty());
 }
 
-TEST_CASE("closures to one robot are recorded up to a bound", "[robot]") {
+TEST_CASE("closures to one robot are recorded up to a bound") {
   RunRecord record(1);
   constexpr auto kMost = static_cast<KeyframeIndex>(OwnGraph::kMaxClosures);
   for (KeyframeIndex i = 0; i <= kMost; ++i) record.add(closure_between({{1, 0}, {2, i}}));
@@ -210,8 +208,7 @@ TEST_CASE("closures to one robot are recorded up to a bound", "[robot]") {
   CHECK_FALSE(record.closures().contains({{1, 0}, {2, kMost}}));
 }
 
-TEST_CASE("closures with a robot that restarts are dropped, those with a resumed one are kept",
-          "[robot]") {
+TEST_CASE("closures with a robot that restarts are dropped, those with a resumed one are kept") {
   const auto kind = GENERATE(PeerEventKind::kRestarted, PeerEventKind::kResumed);
   const ClosureId with_it{{1, 2}, {2, 3}}, doubted{{1, 4}, {2, 5}}, with_other{{1, 4}, {3, 5}};
   RunRecord record(1);
@@ -234,8 +231,7 @@ TEST_CASE("closures with a robot that restarts are dropped, those with a resumed
   CHECK(record.inlier_closures().size() == 2);
 }
 
-TEST_CASE("the optimiser's measurement of a pair of keyframes is recorded, not the other end's",
-          "[robot]") {
+TEST_CASE("the optimiser's measurement of a pair of keyframes is recorded, not the other end's") {
   const ClosureId id{{1, 4}, {2, 3}};
   Closure precise = closure_between(id), vague = closure_between(id);
   precise.T_from_to.translation().x() = 1.0;
@@ -251,7 +247,7 @@ TEST_CASE("the optimiser's measurement of a pair of keyframes is recorded, not t
   }
 }
 
-TEST_CASE("a closure that only the peer has verified is none of this robot's", "[robot]") {
+TEST_CASE("a closure that only the peer has verified is none of this robot's") {
   const ClosureId id{{1, 2}, {2, 3}};
   RunRecord record(1);
   record.add(closure_between(id));
@@ -262,7 +258,7 @@ TEST_CASE("a closure that only the peer has verified is none of this robot's", "
   CHECK(record.closure_tallies().at(2).inliers == 0);
 }
 
-TEST_CASE("a closure is the same from whichever end it was found", "[robot]") {
+TEST_CASE("a closure is the same from whichever end it was found") {
   const KeyframeId low{1, 4}, high{2, 3};
   Closure closure = closure_between({high, low});
   closure.T_from_to = make_pose(Eigen::Matrix3d::Identity(), {1.0, 2.0, 3.0});
@@ -284,7 +280,7 @@ TEST_CASE("a closure is the same from whichever end it was found", "[robot]") {
                       "0.00000000,0.00000000,0.00000000,1.00000000,1,1,1,3.74,3.32,2.45,"));
 }
 
-TEST_CASE("each optimised keyframe is written with the 36 numbers of its covariance", "[robot]") {
+TEST_CASE("each optimised keyframe is written with the 36 numbers of its covariance") {
   KeyframeOdometry keyframe;
   keyframe.id = {1, 0};
   RunRecord record(1);

@@ -50,7 +50,7 @@ RunSummary full_summary() {
 
 }  // namespace
 
-TEST_CASE("A summary with all possible values is read as it was written", "[robot][summary]") {
+TEST_CASE("A summary with all possible values is read as it was written") {
   const TemporaryFolder folder;
   const std::string full = json_text(full_summary()), least = json_text(RunSummary{});
   CHECK(json_text(read_summary(folder.write("full.json", full))) == full);
@@ -58,7 +58,7 @@ TEST_CASE("A summary with all possible values is read as it was written", "[robo
   CHECK(json_text(read_summary(folder.write("empty.json", "{}"))) == least);
 }
 
-TEST_CASE("summary.json has the keys that others read", "[robot][summary]") {
+TEST_CASE("summary.json has the keys that others read") {
   const Json json = Json(full_summary()).flatten();
   std::string keys;
   for (const auto& [key, value] : json.items()) keys += key + ' ';
@@ -115,7 +115,7 @@ TEST_CASE("summary.json has the keys that others read", "[robot][summary]") {
   CHECK_FALSE(least.contains("held_back"));
 }
 
-TEST_CASE("A cost that is no number is null, and none again", "[robot][summary]") {
+TEST_CASE("A cost that is no number is null, and none again") {
   const TemporaryFolder folder;
   RunSummary summary;
   summary.pgo.cost = std::numeric_limits<double>::quiet_NaN();
@@ -124,7 +124,7 @@ TEST_CASE("A cost that is no number is null, and none again", "[robot][summary]"
   CHECK(std::isnan(read_summary(folder.write("summary.json", text)).pgo.cost));
 }
 
-TEST_CASE("A summary that is missing or broken is named, with the key", "[robot][summary]") {
+TEST_CASE("A summary that is missing or broken is named, with the key") {
   const TemporaryFolder folder;
   CHECK_THROWS_WITH(read_summary(folder.path() / "x.json"), EndsWith("x.json: no such file"));
   for (const auto& [text, words] :
@@ -156,8 +156,7 @@ std::vector<double> every(double interval_s, int count) {
 
 }  // namespace
 
-TEST_CASE("A hole is an interval between poses that is far longer than usual",
-          "[robot][findings]") {
+TEST_CASE("A hole is an interval between poses that is far longer than usual") {
   CHECK(pose_holes({}).empty());
   CHECK(pose_holes(poses_at({7.0})).empty());
   CHECK(pose_holes(poses_at(every(0.05, 100))).empty());
@@ -170,7 +169,7 @@ TEST_CASE("A hole is an interval between poses that is far longer than usual",
   CHECK(holes[0].to == nanoseconds(8.25));
 }
 
-TEST_CASE("The summary has the holes of the live trajectory", "[robot][findings]") {
+TEST_CASE("The summary has the holes of the live trajectory") {
   RunRecord record(1);
   for (const StampedPose& pose : poses_at(every(0.05, 21))) record.add(OdometryState{pose.stamp});
   CHECK_FALSE(summary_of(record).holes.has_value());
@@ -183,8 +182,7 @@ TEST_CASE("The summary has the holes of the live trajectory", "[robot][findings]
   CHECK(holes->longest_from_s == Approx(1.0));
 }
 
-TEST_CASE("The summary compares the optimised keyframes with the uncertainty of odometry",
-          "[robot][findings]") {
+TEST_CASE("The summary compares the optimised keyframes with the uncertainty of odometry") {
   constexpr double kSigma_m = 0.1, kOff_m = 0.4;
   RunRecord record(1);
   Trajectory trajectory;
@@ -219,7 +217,7 @@ class BusyNode final : public Node {
   DurationHistogram spent;
 };
 
-TEST_CASE("Sensors that skip or corrupt frames are a warning, by kind", "[robot]") {
+TEST_CASE("Sensors that skip or corrupt frames are a warning, by kind") {
   CHECK(sensors_status(10, 0, {}).level == RosLevel::kOk);
   CHECK(sensors_status(10, 1, {}).level == RosLevel::kWarn);
   ReaderReport faults;
@@ -232,7 +230,7 @@ TEST_CASE("Sensors that skip or corrupt frames are a warning, by kind", "[robot]
   CHECK(status.values[2].value == "3, first: 0.5 s after 7");
 }
 
-TEST_CASE("An uncertain place of a robot is a warning that names the robot", "[robot]") {
+TEST_CASE("An uncertain place of a robot is a warning that names the robot") {
   OptimizerProgress progress{.anchor = 2, .members = {2, 4, 6}};
   CHECK(team_status(progress).level == RosLevel::kOk);
   progress.tentative = {4, 6};
@@ -244,7 +242,7 @@ TEST_CASE("An uncertain place of a robot is a warning that names the robot", "[r
   CHECK(team_status(progress).level == RosLevel::kWarn);
 }
 
-TEST_CASE("A module that hardly rests is a warning that names it", "[robot]") {
+TEST_CASE("A module that hardly rests is a warning that names it") {
   BusyNode node;
   ModuleLoads loads({&node});
   CHECK(loads.status().level == RosLevel::kOk);

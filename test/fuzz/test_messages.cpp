@@ -10,14 +10,14 @@ namespace {
 
 using Bytes = std::vector<std::uint8_t>;
 
-TEST_CASE("Every message between robots is decoded as it was sent", "[messages]") {
+TEST_CASE("Every message between robots is decoded as it was sent") {
   for (const MessageReader& reader : all_messages()) {
     CAPTURE(reader.name);
     for (const Bytes& sample : reader.samples) CHECK(feed(reader, sample));
   }
 }
 
-TEST_CASE("A truncated message is refused", "[messages]") {
+TEST_CASE("A truncated message is refused") {
   for (const MessageReader& reader : all_messages()) {
     CAPTURE(reader.name);
     for (Bytes sample : reader.samples)
@@ -35,7 +35,7 @@ std::size_t in_use() {
 }
 
 // KM_MESSAGES sets the number.
-TEST_CASE("Corrupted messages of all topics do no harm and leave no memory behind", "[messages]") {
+TEST_CASE("Corrupted messages of all topics do no harm and leave no memory behind") {
   const char* wanted = std::getenv("KM_MESSAGES");
   const long count = wanted == nullptr ? 100'000 : std::atol(wanted);
   const auto readers = all_messages();

@@ -5,7 +5,7 @@
 namespace km {
 namespace {
 
-TEST_CASE("Stamps are due in proportion to the rate, from the first one on", "[clock]") {
+TEST_CASE("Stamps are due in proportion to the rate, from the first one on") {
   const double rate = GENERATE(0.5, 1.0, 4.0);
   ReplayClock clock(rate);
   const auto start = ReplayClock::TimePoint{} + std::chrono::hours(1);
@@ -16,7 +16,7 @@ TEST_CASE("Stamps are due in proportion to the rate, from the first one on", "[c
   CHECK(std::chrono::duration<double>(*due - start).count() == Approx(10.0 / rate));
 }
 
-TEST_CASE("A pause makes everything due later by as much", "[clock]") {
+TEST_CASE("A pause makes everything due later by as much") {
   ReplayClock clock(2.0);
   const auto start = ReplayClock::TimePoint::clock::now();
   CHECK(clock.due(0, start) == start);
@@ -28,14 +28,14 @@ TEST_CASE("A pause makes everything due later by as much", "[clock]") {
   CHECK(clock.due_s(nanoseconds(10.0)) == Approx(since_epoch));
 }
 
-TEST_CASE("Playing as fast as possible never waits", "[clock]") {
+TEST_CASE("Playing as fast as possible never waits") {
   ReplayClock clock(std::numeric_limits<double>::infinity());
   CHECK(clock.wait_until(0));
   CHECK(clock.wait_until(nanoseconds(1e9)));
   CHECK_FALSE(clock.due_s(nanoseconds(1e9)));
 }
 
-TEST_CASE("Stopping a replay releases the source that waits", "[clock]") {
+TEST_CASE("Stopping a replay releases the source that waits") {
   ReplayClock clock(1.0);
   CHECK(clock.wait_until(0));
   auto waiting = std::async(std::launch::async, [&] { return clock.wait_until(nanoseconds(1e6)); });
@@ -44,7 +44,7 @@ TEST_CASE("Stopping a replay releases the source that waits", "[clock]") {
   CHECK_FALSE(clock.wait_until(0));
 }
 
-TEST_CASE("A periodic ticks until it is stopped, however long its period", "[periodic]") {
+TEST_CASE("A periodic ticks until it is stopped, however long its period") {
   std::promise<void> ticked;
   Periodic hourly(std::chrono::hours(1), [&] { ticked.set_value(); });
   hourly.start();

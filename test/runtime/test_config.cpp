@@ -46,7 +46,7 @@ std::string complaint(const std::string& yaml) try {
   return error.what();
 }
 
-TEST_CASE("A key without a value is an empty text, or none where that is accepted", "[config]") {
+TEST_CASE("A key without a value is an empty text, or none where that is accepted") {
   ConfigLayers file, command_line;
   file.add_text("toy:\n  limit_m:\n  name:\n", "a.yaml");
   const ToyConfig empty = loaded(file);
@@ -56,7 +56,7 @@ TEST_CASE("A key without a value is an empty text, or none where that is accepte
   CHECK(loaded(command_line).name.empty());
 }
 
-TEST_CASE("A configuration error names every problem with file and line", "[config]") {
+TEST_CASE("A configuration error names every problem with file and line") {
   const std::string text = complaint(
       "toy:\n  count: many\n  length_m: 7\n  level: 256\n  flag: perhaps\n  colour: blue\n"
       "  hosts: {a: b}\n  cuont: 1\n  length_m: .nan\nelsewhere:\n  x: 1\n");
@@ -71,7 +71,7 @@ TEST_CASE("A configuration error names every problem with file and line", "[conf
   CHECK_THAT(text, Contains("a.yaml:10: unknown section elsewhere"));
 }
 
-TEST_CASE("A bad value is refused with its place and the reason", "[config]") {
+TEST_CASE("A bad value is refused with its place and the reason") {
   for (const auto& [yaml, reason] : std::vector<std::pair<std::string, std::string>>{
            {"toy: {length_m: .nan}", "toy.length_m = .nan is outside"},
            {"toy: {count: 1.5}", "toy.count = 1.5 is not a whole number"},
@@ -87,7 +87,7 @@ TEST_CASE("A bad value is refused with its place and the reason", "[config]") {
   CHECK_THROWS_WITH(layers.finish(), Contains("no/such/file.yaml: cannot open"));
 }
 
-TEST_CASE("A corrupted configuration is refused by name or keeps the bounds", "[config]") {
+TEST_CASE("A corrupted configuration is refused by name or keeps the bounds") {
   const TemporaryFolder folder;
   check_corrupted<ConfigError>(
       "# a toy\ntoy:\n  count: 5\n  length_m: 0.75  # [m]\n  flag: true\n  colour: green\n"
@@ -101,7 +101,7 @@ TEST_CASE("A corrupted configuration is refused by name or keeps the bounds", "[
       });
 }
 
-TEST_CASE("YAML that refers to itself or grows without end is refused or ends", "[config]") {
+TEST_CASE("YAML that refers to itself or grows without end is refused or ends") {
   CHECK_THAT(complaint("toy: {count: &a [*a]}"), Contains("a.yaml:1"));
   CHECK_THAT(complaint("toy: &a\n  count: *a\n"), Contains("a.yaml"));
   CHECK_THAT(complaint("toy: {count: " + std::string(100'000, '[') + "}"), Contains("not YAML"));
@@ -112,7 +112,7 @@ TEST_CASE("YAML that refers to itself or grows without end is refused or ends", 
   CHECK_THAT(complaint(laughs + "toy: {count: *a39}\n"), Contains("toy.count"));
 }
 
-TEST_CASE("A thousand problems are reported by the first ones and a count", "[config]") {
+TEST_CASE("A thousand problems are reported by the first ones and a count") {
   std::string yaml = "toy:\n";
   for (int i = 0; i < 1000; ++i) yaml += "  key" + std::to_string(i) + ": 1\n";
   const std::string text = complaint(yaml);
@@ -120,11 +120,11 @@ TEST_CASE("A thousand problems are reported by the first ones and a count", "[co
   CHECK(text.size() < 5000);
 }
 
-TEST_CASE("A file that is no configuration is refused by name", "[config]") {
+TEST_CASE("A file that is no configuration is refused by name") {
   check_no_files<ConfigError>(".yaml", [](const auto& place) { (void)load_yaml(place); });
 }
 
-TEST_CASE("Later layers win key by key, the command line last", "[config]") {
+TEST_CASE("Later layers win key by key, the command line last") {
   ConfigLayers layers;
   layers.add_text("toy:\n  count: 2\n  length_m: 0.5\n  name: first\n", "default.yaml");
   layers.add_text("toy:\n  length_m: 0.6\n  name: second\n", "robot.yaml");
@@ -137,7 +137,7 @@ TEST_CASE("Later layers win key by key, the command line last", "[config]") {
   CHECK(config.hosts == std::vector<std::string>{"10.0.0.1", "10.0.0.2"});
 }
 
-TEST_CASE("A bad value is blamed on the layer it came from", "[config]") {
+TEST_CASE("A bad value is blamed on the layer it came from") {
   ConfigLayers layers;
   layers.add_text("toy:\n  count: 99\n  length_m: 9\n", "default.yaml");
   layers.add_text("\ntoy:\n\n  count: 98\n", "robot.yaml");
@@ -150,7 +150,7 @@ TEST_CASE("A bad value is blamed on the layer it came from", "[config]") {
                         !Contains("default.yaml"));
 }
 
-TEST_CASE("The effective configuration reads back to itself", "[config]") {
+TEST_CASE("The effective configuration reads back to itself") {
   ConfigLayers layers;
   layers.add_text("toy: {length_m: 0.30000000000000004, name: 'x: #y', hosts: ['1', 'b, c']}", "a");
   const ToyConfig config = loaded(layers);

@@ -10,7 +10,7 @@
 namespace km {
 namespace {
 
-TEST_CASE("A rate limit passes one message per interval and counts the others", "[log]") {
+TEST_CASE("A rate limit passes one message per interval and counts the others") {
   RateLimit limit(5.0);
   CHECK(limit.ask("a", 0.0).pass);
   CHECK_FALSE(limit.ask("a", 1.0).pass);
@@ -22,7 +22,7 @@ TEST_CASE("A rate limit passes one message per interval and counts the others", 
   CHECK(limit.ask("a", 10.0).held_back == 0);
 }
 
-TEST_CASE("A listener of the log receives the written lines until another replaces it", "[log]") {
+TEST_CASE("A listener of the log receives the written lines until another replaces it") {
   CapturedLog log;
   std::vector<log::Entry> received;
   log::set_listener([&received](const log::Entry& entry) { received.push_back(entry); });
@@ -37,7 +37,7 @@ TEST_CASE("A listener of the log receives the written lines until another replac
   CHECK(log.lines().size() == 2);
 }
 
-TEST_CASE("Lines of several threads are never mixed", "[log]") {
+TEST_CASE("Lines of several threads are never mixed") {
   const CapturedLog captured;
   std::vector<std::thread> threads;
   for (int t = 0; t < 4; ++t)
@@ -51,7 +51,7 @@ TEST_CASE("Lines of several threads are never mixed", "[log]") {
   for (const std::string& line : lines) CHECK(std::regex_match(line, whole));
 }
 
-TEST_CASE("On a terminal the status line is redrawn below the log lines", "[log]") {
+TEST_CASE("On a terminal the status line is redrawn below the log lines") {
   CapturedLog captured;
   {
     StatusLine status(captured.stream(), true);
@@ -66,7 +66,7 @@ TEST_CASE("On a terminal the status line is redrawn below the log lines", "[log]
         erase + "state 1" + erase + "info test: news\n" + erase + "state 1" + erase + "state 2\n");
 }
 
-TEST_CASE("Without a terminal the status is printed as plain lines, the last one always", "[log]") {
+TEST_CASE("Without a terminal the status is printed as plain lines, the last one always") {
   std::ostringstream output;
   {
     StatusLine status(output, false, 1000.0);
@@ -124,7 +124,7 @@ class TwoStreams {
   pid_t child_ = -1;
 };
 
-TEST_CASE("The end of a program writes all text of both streams in order", "[output]") {
+TEST_CASE("The end of a program writes all text of both streams in order") {
   TwoStreams program;
   program.start(1000);
   std::vector<std::string> expected;
@@ -134,8 +134,7 @@ TEST_CASE("The end of a program writes all text of both streams in order", "[out
   CHECK(program.ends_well());
 }
 
-TEST_CASE("A reader that has stopped does not stop the program, and lost lines are counted",
-          "[output]") {
+TEST_CASE("A reader that has stopped does not stop the program, and lost lines are counted") {
   constexpr int kLines = 20000;
   TwoStreams program;
   program.fill();

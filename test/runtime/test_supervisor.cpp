@@ -41,7 +41,7 @@ struct Run {
   Supervisor supervisor{signals};
 };
 
-TEST_CASE("Nodes are started sources last and stopped sources first", "[supervisor]") {
+TEST_CASE("Nodes are started sources last and stopped sources first") {
   Run run;
   auto& [log, diary, signals, supervisor] = run;
   supervisor.emplace<ToyNode>("camera", diary);
@@ -79,8 +79,7 @@ class ThreadsNode final : public WorkerNode<Tick> {
   GuardedThread receiver_;
 };
 
-TEST_CASE("An exception in any thread of a node ends the run with the name of the node",
-          "[supervisor]") {
+TEST_CASE("An exception in any thread of a node ends the run with the name of the node") {
   using Failing = ThreadsNode::Failing;
   const Failing failing = GENERATE(Failing::kThread, Failing::kWorker);
   Run run;
@@ -92,7 +91,7 @@ TEST_CASE("An exception in any thread of a node ends the run with the name of th
   CHECK_THAT(run.log.text(), Contains("threads failed: the reason"));
 }
 
-TEST_CASE("A node that fails while it finishes its work is still reported", "[supervisor]") {
+TEST_CASE("A node that fails while it finishes its work is still reported") {
   Run run;
   auto& [log, diary, signals, supervisor] = run;
   ToyNode& node = supervisor.emplace<ToyNode>("odometry", diary);
@@ -135,7 +134,7 @@ class FeedingNode final : public WorkerNode<int> {
   HangingNode& next_;
 };
 
-TEST_CASE("A node that hangs is abandoned and keeps no other from ending", "[supervisor]") {
+TEST_CASE("A node that hangs is abandoned and keeps no other from ending") {
   Run run;
   auto& [log, diary, signals, supervisor] = run;
   auto next = std::make_unique<HangingNode>();
@@ -154,7 +153,7 @@ TEST_CASE("A node that hangs is abandoned and keeps no other from ending", "[sup
   hanging.release();  // else the supervisor would wait for it
 }
 
-TEST_CASE("A node that hangs does not keep a signal from ending the run", "[supervisor]") {
+TEST_CASE("A node that hangs does not keep a signal from ending the run") {
   Run run;
   auto& [log, diary, signals, supervisor] = run;
   HangingNode& hanging = supervisor.emplace<HangingNode>();
@@ -169,7 +168,7 @@ TEST_CASE("A node that hangs does not keep a signal from ending the run", "[supe
   hanging.release();
 }
 
-TEST_CASE("Nodes are stopped during the run without waiting for them", "[supervisor]") {
+TEST_CASE("Nodes are stopped during the run without waiting for them") {
   Run run;
   auto& [log, diary, signals, supervisor] = run;
   constexpr double kNoLimit_s = 1e3;  // a busy computer may not release it within half a second
@@ -194,7 +193,7 @@ TEST_CASE("Nodes are stopped during the run without waiting for them", "[supervi
         std::vector<std::string>{"start other", "start after", "stop after", "stop other"});
 }
 
-TEST_CASE("The first signal ends the run in order", "[supervisor]") {
+TEST_CASE("The first signal ends the run in order") {
   const int signal = GENERATE(SIGINT, SIGTERM, SIGHUP);
   const auto before = std::signal(SIGHUP, SIG_DFL);  // the tests may run under nohup
   Run run;
@@ -211,8 +210,7 @@ TEST_CASE("The first signal ends the run in order", "[supervisor]") {
   CHECK(camera.holds_at_stop(signal));  // the thread that stops it may outlive the supervisor
 }
 
-TEST_CASE("A hang-up is not waited for where it was ignored before, as under nohup",
-          "[supervisor]") {
+TEST_CASE("A hang-up is not waited for where it was ignored before, as under nohup") {
   const auto before = std::signal(SIGHUP, SIG_IGN);
   {
     SignalWatch signals;
@@ -252,7 +250,7 @@ TEST_CASE("A hang-up is not waited for where it was ignored before, as under noh
   _exit(0);
 }
 
-TEST_CASE("A second signal ends the process at once", "[supervisor]") {
+TEST_CASE("A second signal ends the process at once") {
   int ends[2];
   REQUIRE(pipe(ends) == 0);
   const pid_t child = fork();

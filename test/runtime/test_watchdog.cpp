@@ -31,8 +31,7 @@ struct Bench {
   }
 };
 
-TEST_CASE("A step that does not end is named within 5 s and given up after its limit",
-          "[watchdog]") {
+TEST_CASE("A step that does not end is named within 5 s and given up after its limit") {
   Bench bench;
   const Heartbeat::Step step(bench.node.heartbeat);
   bench.pass(3.0);
@@ -51,7 +50,7 @@ TEST_CASE("A step that does not end is named within 5 s and given up after its l
   CHECK(bench.log.lines().size() == 1);  // named once
 }
 
-TEST_CASE("A long step that ends is no fault, and many steps are none", "[watchdog]") {
+TEST_CASE("A long step that ends is no fault, and many steps are none") {
   Bench bench;
   for (int i = 0; i < 10; ++i) {
     const Heartbeat::Step step(bench.node.heartbeat);
@@ -61,7 +60,7 @@ TEST_CASE("A long step that ends is no fault, and many steps are none", "[watchd
   CHECK_FALSE(bench.watchdog.given_up().has_value());
 }
 
-TEST_CASE("A node that waits for another is not blamed until it continues", "[watchdog]") {
+TEST_CASE("A node that waits for another is not blamed until it continues") {
   Bench bench;
   const Heartbeat::Step step(bench.node.heartbeat);
   {
@@ -74,7 +73,7 @@ TEST_CASE("A node that waits for another is not blamed until it continues", "[wa
   CHECK(bench.watchdog.given_up().has_value());
 }
 
-TEST_CASE("A node that is to end and makes no steps is given up", "[watchdog]") {
+TEST_CASE("A node that is to end and makes no steps is given up") {
   Bench bench;
   bench.pass(100.0);
   bench.watchdog.expect_end(bench.node);
@@ -88,7 +87,7 @@ TEST_CASE("A node that is to end and makes no steps is given up", "[watchdog]") 
   CHECK(bench.watchdog.given_up()->why == "has not ended for 20 s");
 }
 
-TEST_CASE("A node that has ended is not blamed any more", "[watchdog]") {
+TEST_CASE("A node that has ended is not blamed any more") {
   Bench bench;
   bench.watchdog.expect_end(bench.node);
   bench.watchdog.has_ended(bench.node);
@@ -96,7 +95,7 @@ TEST_CASE("A node that has ended is not blamed any more", "[watchdog]") {
   CHECK_FALSE(bench.watchdog.given_up().has_value());
 }
 
-TEST_CASE("Patience multiplies the limits", "[watchdog]") {
+TEST_CASE("Patience multiplies the limits") {
   const CapturedLog log;
   WatchedNode node;
   Watchdog watchdog({&node}, 2.0);

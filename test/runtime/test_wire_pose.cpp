@@ -9,7 +9,7 @@ constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kRounding = 1e-12;  // a rotation matrix to a quaternion and back
 
-TEST_CASE("an odometry pose crosses the wire in single precision", "[wire_pose]") {
+TEST_CASE("an odometry pose crosses the wire in single precision") {
   const auto seed = GENERATE(1U, 2U, 3U, 4U, 5U);
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -27,7 +27,7 @@ TEST_CASE("an odometry pose crosses the wire in single precision", "[wire_pose]"
   CHECK(is_covariance(received->covariance));
 }
 
-TEST_CASE("a pose from the wire is a rotation even if its quaternion was rounded", "[wire_pose]") {
+TEST_CASE("a pose from the wire is a rotation even if its quaternion was rounded") {
   km_wire_Pose wire = to_wire(SE3::Identity());
   wire.q[0] = 5e-4;
   wire.q[3] = 1.0005;
@@ -36,7 +36,7 @@ TEST_CASE("a pose from the wire is a rotation even if its quaternion was rounded
   CHECK((pose->linear().transpose() * pose->linear()).isIdentity(kRounding));
 }
 
-TEST_CASE("poses and matrices that have no meaning are refused", "[wire_pose]") {
+TEST_CASE("poses and matrices that have no meaning are refused") {
   for (const double bad : {kNan, kInfinity, -kInfinity, 1e300, 0.0, 0.99, 1.01, -2.0})
     for (const int slot : {3, 0, 1, 2, 4, 5, 6}) {
       if (slot != 3 && std::abs(bad) < 3.0) continue;
@@ -55,7 +55,7 @@ TEST_CASE("poses and matrices that have no meaning are refused", "[wire_pose]") 
   }
 }
 
-TEST_CASE("an odometry pose with one bad part is refused", "[wire_pose]") {
+TEST_CASE("an odometry pose with one bad part is refused") {
   using Change = void (*)(km_wire_OdometryPose&);
   km_wire_OdometryPose wire = to_wire(OdometryPose{});
   REQUIRE(from_wire(wire));

@@ -10,7 +10,7 @@
 namespace km {
 namespace {
 
-TEST_CASE("A worker handles everything posted, in order, before stop returns", "[worker]") {
+TEST_CASE("A worker handles everything posted, in order, before stop returns") {
   std::vector<int> handled;
   Worker<int> worker(2, Overflow::kBlock, [&](int i) { handled.push_back(i); });
   worker.start();
@@ -49,8 +49,7 @@ class ToyWorkerNode final : public WorkerNode<Tick> {
   std::atomic<int> handled_ = 0;
 };
 
-TEST_CASE("A node ends its sources, then its clock and its worker, and concludes once",
-          "[worker]") {
+TEST_CASE("A node ends its sources, then its clock and its worker, and concludes once") {
   const bool fails = GENERATE(false, true);
   std::vector<std::string> diary;
   {
@@ -73,8 +72,7 @@ TEST_CASE("A node ends its sources, then its clock and its worker, and concludes
   CHECK(diary == expected);
 }
 
-TEST_CASE("A worker that throws keeps the exception and releases the threads that wait for it",
-          "[worker]") {
+TEST_CASE("A worker that throws keeps the exception and releases the threads that wait for it") {
   Worker<int> worker(1, Overflow::kBlock, [](int) { throw std::runtime_error("no"); });
   worker.start();
   while (worker.post(0)) {
@@ -88,7 +86,7 @@ TEST_CASE("A worker that throws keeps the exception and releases the threads tha
 static_assert(!std::is_convertible_v<In<int>, Out<int>>);
 static_assert(!std::is_convertible_v<Out<int>, In<int>>);
 
-TEST_CASE("A full queue that drops keeps the newest and counts the others", "[queue]") {
+TEST_CASE("A full queue that drops keeps the newest and counts the others") {
   BoundedQueue<int> queue(2, Overflow::kDropOldest);
   for (int i = 0; i < 5; ++i) queue.push(i);
   CHECK(queue.load().size == 2);
@@ -98,8 +96,7 @@ TEST_CASE("A full queue that drops keeps the newest and counts the others", "[qu
   CHECK(queue.load().size == 0);
 }
 
-TEST_CASE("A taker sees increasingly newer values while others are put, and the last one once",
-          "[runtime]") {
+TEST_CASE("A taker sees increasingly newer values while others are put, and the last one once") {
   constexpr int kLast = 10000;
   Latest<int> latest;
   std::thread putter([&] {
@@ -125,8 +122,7 @@ int niceness() {
   return getpriority(PRIO_PROCESS, static_cast<id_t>(gettid()));
 }
 
-TEST_CASE("Urgent work lowers the priority of a thread in the background, never raises it",
-          "[runtime]") {
+TEST_CASE("Urgent work lowers the priority of a thread in the background, never raises it") {
   const bool is_urgent = GENERATE(true, false), is_low_already = GENERATE(true, false);
   CAPTURE(is_urgent, is_low_already);
   constexpr int kLowest = 19;

@@ -72,7 +72,7 @@ std::vector<Fault> faults() {
 
 }  // namespace
 
-TEST_CASE("A robot skips broken parts of its recording, reports them, and continues", "[system]") {
+TEST_CASE("A robot skips broken parts of its recording, reports them, and continues") {
   const auto recording = shared_data("euroc/MH_01_easy");
   if (!recording) return;
   for (const Fault& fault : faults()) {
@@ -93,7 +93,7 @@ TEST_CASE("A robot skips broken parts of its recording, reports them, and contin
   }
 }
 
-TEST_CASE("Bad input and configuration end a robot with one clear message", "[system]") {
+TEST_CASE("Bad input and configuration end a robot with one clear message") {
   const TemporaryFolder folder;
   const std::string robot =
       KM_BIN_DIR "/kimera_multi_robot --robot 1 --output " + (folder.path() / "out").string();
@@ -118,7 +118,7 @@ TEST_CASE("Bad input and configuration end a robot with one clear message", "[sy
   CHECK_FALSE(fs::exists(folder.path() / "out" / "odometry.tum"));
 }
 
-TEST_CASE("A folder that results cannot go to is refused before any other output", "[system]") {
+TEST_CASE("A folder that results cannot go to is refused before any other output") {
   const auto recording = shared_data("euroc/MH_01_easy");
   if (!recording) return;
   const TemporaryFolder folder;

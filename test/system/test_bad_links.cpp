@@ -54,7 +54,7 @@ SplitGraph pair_of_robots() {
 
 }  // namespace
 
-TEST_CASE("A team that loses a fifth of all frames loses nothing else", "[system][namespaces]") {
+TEST_CASE("A team that loses a fifth of all frames loses nothing else", "[namespaces]") {
   const SplitGraph graph = pair_of_robots();
   std::optional<PairRun> good;  // beside the other one, because robots mostly wait
   std::jthread runner([&] { good.emplace(graph, ""); });
@@ -89,7 +89,7 @@ TEST_CASE("A team that loses a fifth of all frames loses nothing else", "[system
 }
 
 TEST_CASE("A team in two parts ends in two frames and its table of links gives the reason",
-          "[system][namespaces]") {
+          "[namespaces]") {
   // Each waits for the other one up to the limit.
   const PairRun run(pair_of_robots(), "partitions:\n  - {groups: [[robot0], [robot1]]}\n",
                     "--serve-limit 20");
@@ -111,7 +111,7 @@ TEST_CASE("A team in two parts ends in two frames and its table of links gives t
 
 TEST_CASE(
     "Robots with keys that never receive each other find closures through one that receives both",
-    "[system][namespaces]") {
+    "[namespaces]") {
   const auto dataset = shared_data("euroc/MH_01_easy");
   if (!dataset) return;
   const TemporaryFolder folder;

@@ -19,8 +19,7 @@ std::vector<std::string> robot_on_walk(const fs::path& walk, const fs::path& out
                   " --output " + output.string() + " --domain " + std::to_string(random_domain()));
 }
 
-TEST_CASE("A robot without a reader of its output ends on a signal with its results",
-          "[system][endings]") {
+TEST_CASE("A robot without a reader of its output ends on a signal with its results", "[endings]") {
   const bool is_closed = GENERATE(false, true);  // a pipe that is full, or has no other end
   CAPTURE(is_closed);
   const TemporaryFolder folder;
@@ -99,7 +98,7 @@ struct RobotOnSmallDisk {
 };
 
 TEST_CASE("On a full or read-only disk a robot continues, names lost results, and ends with 4",
-          "[system][endings]") {
+          "[endings]") {
   const bool full = GENERATE(true, false);
   CAPTURE(full);
   RobotOnSmallDisk run;
@@ -126,7 +125,7 @@ TEST_CASE("On a full or read-only disk a robot continues, names lost results, an
   }
 }
 
-TEST_CASE("A robot whose results folder is read-only does not start", "[system][endings]") {
+TEST_CASE("A robot whose results folder is read-only does not start", "[endings]") {
   RobotOnSmallDisk run;
   if (!run.disk.mounted()) return;
   fs::create_directory(run.output);
@@ -138,7 +137,7 @@ TEST_CASE("A robot whose results folder is read-only does not start", "[system][
 
 TEST_CASE(
     "A results folder that is moved during the run is continued when it is back, or made again",
-    "[system][endings]") {
+    "[endings]") {
   const bool is_back = GENERATE(true, false);
   CAPTURE(is_back);
   const TemporaryFolder folder;
@@ -173,7 +172,7 @@ std::vector<std::string> team_on_walks(const TemporaryFolder& folder) {
 }
 
 TEST_CASE("A team without a reader of its output ends on a signal with the results of all",
-          "[system][endings]") {
+          "[endings]") {
   const TemporaryFolder folder;
   const FullPipe blocked;
   Process team(team_on_walks(folder), 0, blocked.writer());
@@ -185,7 +184,7 @@ TEST_CASE("A team without a reader of its output ends on a signal with the resul
     CHECK(read_summary(folder.path() / robot / "summary.json").exit_reason == "interrupted");
 }
 
-TEST_CASE("Robots whose team is killed end in order with their results", "[system][endings]") {
+TEST_CASE("Robots whose team is killed end in order with their results", "[endings]") {
   const TemporaryFolder folder;
   const int quiet = open("/dev/null", O_WRONLY | O_CLOEXEC);
   {

@@ -70,8 +70,7 @@ void check_faults(const std::vector<std::string>& modules, const fs::path& input
   for (const std::string& module : modules) check_end(*robot++, module, "hang");
 }
 
-TEST_CASE("A module that throws or hangs is named, and what was recorded is written",
-          "[system][faults]") {
+TEST_CASE("A module that throws or hangs is named, and what was recorded is written", "[faults]") {
   const auto dataset = shared_data("euroc/MH_01_easy");
   if (!dataset) return;
   check_faults({"sensors", "vio", "keyframe_features", "place_recognition", "loop_closure", "pcm",
@@ -80,14 +79,14 @@ TEST_CASE("A module that throws or hangs is named, and what was recorded is writ
 }
 
 TEST_CASE("A module of the map that throws or hangs is named, and recorded results are written",
-          "[system][faults][slow]") {
+          "[faults]") {
   const auto dataset = shared_data("euroc/MH_01_easy");
   if (!dataset) return;
   check_faults({"dense_sensing", "semantic_mapping", "mesh_deformation"}, *dataset,
                "mapping.mode=metric");
 }
 
-TEST_CASE("A disk that stands still under the map leaves the other results", "[system][faults]") {
+TEST_CASE("A disk that stands still under the map leaves the other results", "[faults]") {
   const auto dataset = shared_data("euroc/MH_01_easy");
   if (!dataset) return;
   FaultyRobot robot;

@@ -117,7 +117,7 @@ double apart_m(const std::vector<StampedPose>& one, const std::vector<StampedPos
 }
 
 TEST_CASE("two robots with fixes are in one frame with and without closures between them",
-          "[system][fixes]") {
+          "[fixes]") {
   const auto dataset = shared_data("euroc/MH_01_easy");
   if (!dataset) return;
   const TemporaryFolder folder;
@@ -182,7 +182,7 @@ bool has_lost_messages(const RunSummary& summary) {
 
 constexpr double kNearTheEnd_s = 11.0;
 
-TEST_CASE("fixes on live topics place a run in their frame", "[system][fixes][live]") {
+TEST_CASE("fixes on live topics place a run in their frame", "[fixes]") {
   const auto dataset = shared_data("euroc/MH_01_easy");
   if (!dataset) return;
   const TemporaryFolder folder;
@@ -224,7 +224,7 @@ bool is_located(const std::string& line) {
 
 // The datum is the first fix that arrives, whichever it is. It is that of the second process, too,
 // which receives none, or later ones: with another datum its fixes would contradict the first ones.
-TEST_CASE("a killed and resumed robot remains located by its live fixes", "[system][fixes][live]") {
+TEST_CASE("a killed and resumed robot remains located by its live fixes", "[fixes]") {
   const auto dataset = shared_data("euroc/MH_01_easy");
   if (!dataset) return;
   const TemporaryFolder folder;

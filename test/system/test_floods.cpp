@@ -338,15 +338,14 @@ void check(const Flood& flood, const std::optional<fs::path>& images = {}) {
   CHECK(scene.interrupt() == 0);
 }
 
-TEST_CASE("A flood from one robot costs a robot little, and the others next to nothing",
-          "[floods]") {
+TEST_CASE("A flood from one robot costs a robot little, and the others next to nothing") {
   log::set_level(log::Level::kError);
   for (const Flood& flood : all_floods()) DYNAMIC_SECTION(flood.name) {
       check(flood);
     }
 }
 
-TEST_CASE("A flood of places costs little, too", "[floods]") {
+TEST_CASE("A flood of places costs little, too") {
   const auto images = shared_data("euroc/MH_01_easy");
   if (!images) return;
   log::set_level(log::Level::kError);

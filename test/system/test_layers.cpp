@@ -102,7 +102,7 @@ std::string violation(const fs::path& file, const std::string& header) {
   return allowed != kModuleUses.end() && allowed->second.contains(used) ? "" : "another module";
 }
 
-TEST_CASE("Every include obeys the layers", "[layers]") {
+TEST_CASE("Every include obeys the layers") {
   std::size_t files = 0;
   for (const char* root : {"modules", "runtime", "apps/lab/simulation"})
     for (const auto& entry : fs::recursive_directory_iterator(root)) {
@@ -116,7 +116,7 @@ TEST_CASE("Every include obeys the layers", "[layers]") {
   CHECK(files > 20);  // run from the root of the repository
 }
 
-TEST_CASE("Only tests and the laboratory include headers of the laboratory", "[layers]") {
+TEST_CASE("Only tests and the laboratory include headers of the laboratory") {
   std::size_t files = 0;
   for (const auto& entry : fs::recursive_directory_iterator("apps")) {
     if (!is_source(entry.path()) || is_lab(entry.path().generic_string())) continue;
@@ -129,7 +129,7 @@ TEST_CASE("Only tests and the laboratory include headers of the laboratory", "[l
   CHECK(files > 20);
 }
 
-TEST_CASE("The record of a run does not depend on the messages of ROS", "[layers]") {
+TEST_CASE("The record of a run does not depend on the messages of ROS") {
   for (const std::string& header : includes_of("apps/robot/run_record.hpp"))
     CHECK_FALSE(header.starts_with("modules/ros_dds/"));
 }
@@ -153,7 +153,7 @@ std::set<std::string> internal_targets(const std::string& lab_text) {
   return names;
 }
 
-TEST_CASE("The laboratory links only libraries that are installed", "[layers]") {
+TEST_CASE("The laboratory links only libraries that are installed") {
   std::string text;
   for (const auto& entry : fs::recursive_directory_iterator("apps/lab"))
     if (entry.path().filename() == "CMakeLists.txt") {
@@ -168,7 +168,7 @@ TEST_CASE("The laboratory links only libraries that are installed", "[layers]") 
 }
 
 // An exception in a std::thread ends the process without a report; GuardedThread reports it.
-TEST_CASE("Nodes and the runtime start threads only as GuardedThread", "[layers]") {
+TEST_CASE("Nodes and the runtime start threads only as GuardedThread") {
   const std::set<std::string> own_threads = {"runtime/guarded_thread.hpp", "runtime/thread.hpp",
                                              "runtime/unblocked_output.hpp"};
   for (const char* root : {"modules", "runtime"})
@@ -182,7 +182,7 @@ TEST_CASE("Nodes and the runtime start threads only as GuardedThread", "[layers]
     }
 }
 
-TEST_CASE("No header of the programs includes all of JSON", "[layers]") {
+TEST_CASE("No header of the programs includes all of JSON") {
   for (const char* root : {"modules", "runtime", "apps"})
     for (const auto& entry : fs::recursive_directory_iterator(root)) {
       if (entry.path().extension() != ".hpp") continue;
@@ -192,7 +192,7 @@ TEST_CASE("No header of the programs includes all of JSON", "[layers]") {
     }
 }
 
-TEST_CASE("The layer rules refuse what they are for", "[layers]") {
+TEST_CASE("The layer rules refuse what they are for") {
   CHECK_FALSE(violation("modules/vio/vio.cpp", "runtime/node.hpp").empty());
   CHECK_FALSE(violation("modules/vio/vio.cpp", "thread").empty());
   CHECK_FALSE(violation("modules/vio/vio_node.cpp", "runtime/node.hpp").empty());

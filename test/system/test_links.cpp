@@ -141,7 +141,7 @@ std::ostream& operator<<(std::ostream& out, const Solved& solved) {
 constexpr double kSame = 1e-9;  // relative difference of costs
 
 TEST_CASE("A chain of five robots reaches the cost of five that all receive each other",
-          "[system][namespaces]") {
+          "[namespaces]") {
   if (!VirtualNetwork::available()) return;
   const Links chain{{0, 1}, {1, 2}, {2, 3}, {3, 4}};
   const SplitGraph graph = random_team(20, {0, 1, 2, 3, 4}, 40, {{0, 1}, {1, 2}, {2, 3}, {3, 4}});
@@ -155,7 +155,7 @@ TEST_CASE("A chain of five robots reaches the cost of five that all receive each
 }
 
 TEST_CASE("A robot that some robots do not receive joins, with rbcd as the solver, too",
-          "[system][namespaces]") {
+          "[namespaces]") {
   if (!VirtualNetwork::available()) return;
   const SplitGraph graph = random_team(21, {0, 1, 2}, 40, {{0, 1}, {1, 2}});
   const Solved cut = Solution(graph, {{0, 1}, {1, 2}}, "rbcd").get();
@@ -164,7 +164,7 @@ TEST_CASE("A robot that some robots do not receive joins, with rbcd as the solve
   CHECK(cut.cost == Approx(cut.one).epsilon(1e-4));  // rbcd stops when it has become slow
 }
 
-TEST_CASE("Robots with a budget come to one frame and send no more than that", "[system]") {
+TEST_CASE("Robots with a budget come to one frame and send no more than that") {
   const SplitGraph graph = random_team(22, {0, 1}, 40, {{0, 1}});
   const TemporaryFolder folder;
   constexpr double kRate = 3000.0;
@@ -188,7 +188,7 @@ TEST_CASE("Robots with a budget come to one frame and send no more than that", "
   }
 }
 
-TEST_CASE("Robots whose addresses have gone end on a signal", "[system][namespaces]") {
+TEST_CASE("Robots whose addresses have gone end on a signal", "[namespaces]") {
   if (!VirtualNetwork::available()) return;
   const SplitGraph graph = random_team(24, {0, 1}, 40, {{0, 1}});
   const TemporaryFolder folder;
@@ -203,7 +203,7 @@ TEST_CASE("Robots whose addresses have gone end on a signal", "[system][namespac
 }
 
 TEST_CASE("A team that splits in two ends, and both sides report the robots they waited for",
-          "[system][namespaces]") {
+          "[namespaces]") {
   if (!VirtualNetwork::available()) return;
   const SplitGraph graph = random_team(21, {0, 1, 2}, 40, {{0, 1}, {1, 2}});
   const TemporaryFolder folder;
@@ -228,7 +228,7 @@ TEST_CASE("A team that splits in two ends, and both sides report the robots they
 }
 
 TEST_CASE("A path that drops large packets is a finding of the run with their size",
-          "[system][namespaces]") {
+          "[namespaces]") {
   if (!VirtualNetwork::available()) return;
   // 1000 closures: the messages on them are large.
   const SplitGraph graph =
@@ -256,8 +256,7 @@ double bytes_on_the_wire(pid_t host) {
 }
 
 // On a host of their own, whose network carries only their bytes.
-TEST_CASE("Five processes over DDS reach the cost that one process reaches",
-          "[system][namespaces]") {
+TEST_CASE("Five processes over DDS reach the cost that one process reaches", "[namespaces]") {
   if (!VirtualNetwork::available()) return;
   const SplitGraph graph =
       random_team(20, {0, 1, 2, 3, 4}, 40, {{0, 1}, {1, 2}, {2, 3}, {3, 4}, {0, 4}, {1, 3}});
@@ -325,8 +324,7 @@ double largest_distance_m(const std::vector<StampedPose>& one,
   return largest_m;
 }
 
-TEST_CASE("Eight processes over DDS end with the poses of `kimera_multi_pgo solve`",
-          "[system][slow]") {
+TEST_CASE("Eight processes over DDS end with the poses of `kimera_multi_pgo solve`") {
   const auto dataset = shared_data("multi_robot/tunnels_8robots");
   if (!dataset) return;
   constexpr int kRobots = 8;

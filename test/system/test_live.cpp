@@ -62,8 +62,7 @@ std::optional<std::string> live_poses(const fs::path& dataset, double rate) {
 
 }  // namespace
 
-TEST_CASE("On live topics of ROS 2 odometry is that of the recording they are played from",
-          "[system][live]") {
+TEST_CASE("On live topics of ROS 2 odometry is that of the recording they are played from") {
   const auto dataset = shared_data("euroc/MH_01_easy");
   if (!dataset) return;
   const TemporaryFolder folder;
@@ -83,7 +82,7 @@ TEST_CASE("On live topics of ROS 2 odometry is that of the recording they are pl
   CHECK(*poses == expected);
 }
 
-TEST_CASE("Messages that a live robot has lost are counted in its summary", "[system][live]") {
+TEST_CASE("Messages that a live robot has lost are counted in its summary") {
   const auto dataset = shared_data("euroc/MH_01_easy");
   if (!dataset) return;
   const TemporaryFolder folder;
@@ -120,7 +119,7 @@ bool waits_for_calibration(const std::string& line) {
 
 }  // namespace
 
-TEST_CASE("A robot that waits for its calibration ends at once on a signal", "[system][live]") {
+TEST_CASE("A robot that waits for its calibration ends at once on a signal") {
   const TemporaryFolder folder;
   Process robot(logged(live_command(folder, kUnplaced, random_domain())));
   REQUIRE(robot.wait_until(waits_for_calibration));
@@ -128,8 +127,7 @@ TEST_CASE("A robot that waits for its calibration ends at once on a signal", "[s
   CHECK(robot.wait() == 0);  // 1 once its patience is over
 }
 
-TEST_CASE("A robot reads all topics of its sensors while it waits for its calibration",
-          "[system][live]") {
+TEST_CASE("A robot reads all topics of its sensors while it waits for its calibration") {
   const EurocFolder recording;
   const TemporaryFolder folder;
   const int domain = random_domain();
@@ -152,8 +150,7 @@ TEST_CASE("A robot reads all topics of its sensors while it waits for its calibr
   CHECK(exit_code == (has_poses ? 0 : 1));
 }
 
-TEST_CASE("A live robot refuses depth that its driver has not aligned with colour",
-          "[system][live]") {
+TEST_CASE("A live robot refuses depth that its driver has not aligned with colour") {
   const EurocFolder recording;  // only its calibration is used
   const TemporaryFolder folder;
   const int domain = random_domain();
@@ -189,8 +186,7 @@ TEST_CASE("A live robot refuses depth that its driver has not aligned with colou
   CHECK(robot.wait_until(names_remedy));
 }
 
-TEST_CASE("A live robot whose topics are silent reports where it listens, and ends as failed",
-          "[system][live]") {
+TEST_CASE("A live robot whose topics are silent reports where it listens, and ends as failed") {
   const auto dataset = shared_data("euroc/MH_01_easy");  // only its calibration is used
   if (!dataset) return;
   const TemporaryFolder folder;
@@ -218,7 +214,7 @@ TEST_CASE("A live robot whose topics are silent reports where it listens, and en
   CHECK(std::ranges::count(summary.findings, "frames.none", &Finding::id) == 1);
 }
 
-TEST_CASE("A rig file is proposed from the topics that drivers publish now", "[system][live]") {
+TEST_CASE("A rig file is proposed from the topics that drivers publish now") {
   const auto dataset = shared_data("euroc/MH_01_easy");
   if (!dataset) return;
   const TemporaryFolder folder;

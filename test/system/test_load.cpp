@@ -17,7 +17,7 @@ CommandResult run_alone(const fs::path& dataset, const fs::path& output,
 
 }  // namespace
 
-TEST_CASE("A robot keeps the memory of a frame for the next one", "[load]") {
+TEST_CASE("A robot keeps the memory of a frame for the next one") {
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
   std::cout << "SKIPPED: sanitizers have an allocator of their own\n";
 #else
@@ -35,8 +35,7 @@ TEST_CASE("A robot keeps the memory of a frame for the next one", "[load]") {
 #endif
 }
 
-TEST_CASE("On an overloaded computer the map skips frames first, then images are skipped evenly",
-          "[load]") {
+TEST_CASE("On an overloaded computer the map skips frames first, then images are skipped evenly") {
   const auto dataset = shared_data("euroc/MH_01_easy");
   if (!dataset) return;
   const TemporaryFolder folder;

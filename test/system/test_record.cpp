@@ -61,8 +61,7 @@ void check_equal(const RosPath& path, const std::vector<StampedPose>& poses) {
 
 }  // namespace
 
-TEST_CASE("A robot's record has the poses of its results, also for readers that are not ours",
-          "[system]") {
+TEST_CASE("A robot's record has the poses of its results, also for readers that are not ours") {
   const auto dataset = shared_data("euroc/MH_01_easy");
   if (!dataset) return;
   const TemporaryFolder folder;
@@ -112,8 +111,7 @@ TEST_CASE("A robot's record has the poses of its results, also for readers that 
 
 TEST_CASE(
     "The record of a robot that is killed has all earlier messages, and the resumed run writes "
-    "another",
-    "[system]") {
+    "another") {
   const auto dataset = shared_data("euroc/MH_01_easy");
   if (!dataset) return;
   const TemporaryFolder folder;
@@ -144,8 +142,8 @@ TEST_CASE(
               read_trajectory(folder.path() / "optimized.tum"));
 }
 
-TEST_CASE("Two robots on the halves of a recording localise together, and their records become one",
-          "[system]") {
+TEST_CASE(
+    "Two robots on the halves of a recording localise together, and their records become one") {
   const auto dataset = shared_data("euroc/MH_01_easy");
   if (!dataset) return;
   const TemporaryFolder folder;

@@ -80,7 +80,7 @@ double error_m(const fs::path& dataset, const std::vector<fs::path>& estimates,
   return read_json(folder.path() / "error.json")["joint"]["position_m"]["rmse"].get<double>();
 }
 
-TEST_CASE("A robot that is killed again and again loses no image", "[system][resume]") {
+TEST_CASE("A robot that is killed again and again loses no image", "[resume]") {
   const auto dataset = shared_data("euroc/MH_01_easy");
   if (!dataset) return;
   const TemporaryFolder folder;
@@ -115,8 +115,7 @@ TEST_CASE("A robot that is killed again and again loses no image", "[system][res
   }
 }
 
-TEST_CASE("A run localises itself in a finished map, and another one extends it",
-          "[system][resume]") {
+TEST_CASE("A run localises itself in a finished map, and another one extends it", "[resume]") {
   const auto dataset = shared_data("euroc/MH_01_easy");
   if (!dataset) return;
   const TemporaryFolder folder;
@@ -143,7 +142,7 @@ TEST_CASE("A run localises itself in a finished map, and another one extends it"
   CHECK(error_m(*dataset, {extended / "optimized.tum"}, folder) < kLargest_m);
 }
 
-TEST_CASE("A robot that is killed keeps its map, and continues it", "[system][resume]") {
+TEST_CASE("A robot that is killed keeps its map, and continues it", "[resume]") {
   const auto dataset = shared_data("euroc/MH_01_easy");
   if (!dataset) return;
   const TemporaryFolder folder;
@@ -263,8 +262,7 @@ void check_grows(const fs::path& file) {
   CHECK(headers == 1);
 }
 
-TEST_CASE("A robot with keys that is killed and taken up is in its team as before",
-          "[system][resume]") {
+TEST_CASE("A robot with keys that is killed and taken up is in its team as before", "[resume]") {
   const SealedTeam team;
   const RobotId killed = GENERATE(RobotId{0}, RobotId{1});
   const RobotId other = 1 - killed;
@@ -310,7 +308,7 @@ bool has_optimised(Process& robot) {
 }
 
 TEST_CASE("A robot that is killed and resumed without its team keeps what the team had found",
-          "[system][resume]") {
+          "[resume]") {
   const SealedTeam team;
   {
     const auto other = team.start(0, "--output");
@@ -330,8 +328,7 @@ TEST_CASE("A robot that is killed and resumed without its team keeps what the te
   team.check_meetings(0.01);  // the bound of StatedPoses
 }
 
-TEST_CASE("A journal with flipped bytes is continued or replaced, and a copy is kept",
-          "[system][resume]") {
+TEST_CASE("A journal with flipped bytes is continued or replaced, and a copy is kept", "[resume]") {
   const bool is_session = GENERATE(false, true);
   CAPTURE(is_session);
   const TemporaryFolder folder;
@@ -356,7 +353,7 @@ TEST_CASE("A journal with flipped bytes is continued or replaced, and a copy is 
 }
 
 TEST_CASE("A finished run is joined by another robot, and continued by its own robot only",
-          "[system][resume]") {
+          "[resume]") {
   const auto dataset = shared_data("euroc/MH_01_easy");
   if (!dataset) return;
   const TemporaryFolder folder;

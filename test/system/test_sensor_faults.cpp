@@ -217,7 +217,7 @@ TEST_CASE("A run names the unit and the sign that made its odometry fail", "[fau
   CHECK_THAT(found->what, Contains("its sign is inverted"));
 }
 
-TEST_CASE("A driver that restarts does not end a live robot", "[faults][live]") {
+TEST_CASE("A driver that restarts does not end a live robot", "[faults]") {
   const auto recording = shared_data("euroc/MH_01_easy");
   if (!recording) return;
   const TemporaryFolder folder;

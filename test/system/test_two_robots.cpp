@@ -12,7 +12,7 @@
 namespace km {
 namespace {
 
-TEST_CASE("Two robots end with the same map of their team", "[system]") {
+TEST_CASE("Two robots end with the same map of their team") {
   const auto dataset = shared_data("euroc/MH_01_easy");
   if (!dataset) return;
   const TemporaryFolder folder;
@@ -50,8 +50,8 @@ TEST_CASE("Two robots end with the same map of their team", "[system]") {
   CHECK(fused_m2 > 0.9 * std::ranges::max(areas_m2));  // copies within one map go as well
 }
 
-TEST_CASE("A robot whose id is taken reports it and ends, and the first owner of the id continues",
-          "[system]") {
+TEST_CASE(
+    "A robot whose id is taken reports it and ends, and the first owner of the id continues") {
   const auto dataset = shared_data("euroc/MH_01_easy");
   if (!dataset) return;
   const TemporaryFolder folder;
@@ -83,8 +83,7 @@ TEST_CASE("A robot whose id is taken reports it and ends, and the first owner of
 
 // Robots and a viewer, over the network.
 
-TEST_CASE("A viewer receives nothing without --view, and nothing from a team with keys",
-          "[system][view]") {
+TEST_CASE("A viewer receives nothing without --view, and nothing from a team with keys", "[view]") {
   const bool has_keys = GENERATE(false, true);
   CAPTURE(has_keys);
   const TemporaryFolder folder;
@@ -113,8 +112,7 @@ bool has_keyframes(const std::string& status, std::uint32_t least) {
 }
 
 TEST_CASE(
-    "A robot that is killed and restarted joins its team again, with its new incarnation only",
-    "[system]") {
+    "A robot that is killed and restarted joins its team again, with its new incarnation only") {
   const RobotId killed = GENERATE(RobotId{0}, RobotId{1});
   const bool is_elsewhere = killed == 0;  // the new incarnation begins at another place
   const std::uint32_t killed_at = is_elsewhere ? 62 : 54;

@@ -39,7 +39,7 @@ std::string ids_of(const EurocCopy& recording, int expected_exit_code) {
 
 }  // namespace
 
-TEST_CASE("The doctor finds a recording sound, or names its fault", "[doctor]") {
+TEST_CASE("The doctor finds a recording sound, or names its fault") {
   const auto data = shared_data("euroc/MH_01_easy");
   if (!data) return;
   EurocCopy hall(*data);
@@ -57,7 +57,7 @@ TEST_CASE("The doctor finds a recording sound, or names its fault", "[doctor]") 
   }
 }
 
-TEST_CASE("The doctor gives the reason why no robot can play a file", "[doctor]") {
+TEST_CASE("The doctor gives the reason why no robot can play a file") {
   const TemporaryFolder folder;
   const auto output_of = [&](const std::string& file) {
     const CommandResult run = run_command(kDoctor + ' ' + (folder.path() / file).string());
@@ -72,8 +72,7 @@ TEST_CASE("The doctor gives the reason why no robot can play a file", "[doctor]"
   CHECK_THAT(output_of("record.mcap"), Contains("no topic of it has images"));
 }
 
-TEST_CASE("The doctor's exit code is 2 for unusable input, with a line that gives the reason",
-          "[doctor]") {
+TEST_CASE("The doctor's exit code is 2 for unusable input, with a line that gives the reason") {
   const TemporaryFolder folder;
   const CommandResult empty = run_command(kDoctor + ' ' + folder.path().string());
   CHECK(empty.exit_code == 2);
@@ -89,8 +88,7 @@ TEST_CASE("The doctor's exit code is 2 for unusable input, with a line that give
   CHECK_THAT(domain.output, Contains("--set ros.domain=N"));
 }
 
-TEST_CASE("The doctor listens to the topics of a rig file, and examines their messages",
-          "[doctor]") {
+TEST_CASE("The doctor listens to the topics of a rig file, and examines their messages") {
   const auto data = shared_data("euroc/MH_01_easy");
   if (!data) return;
   const TemporaryFolder folder;
@@ -159,7 +157,7 @@ class Look {
 
 }  // namespace
 
-TEST_CASE("The doctor finds that multicast does not pass", "[doctor]") {
+TEST_CASE("The doctor finds that multicast does not pass") {
   if (!VirtualNetwork::available()) return;
   const VirtualNetwork network(1);
   const Look sound(network, {});
@@ -171,7 +169,7 @@ TEST_CASE("The doctor finds that multicast does not pass", "[doctor]") {
   CHECK(look.ids() == "network.multicast ");
 }
 
-TEST_CASE("The doctor finds that a peer is out of reach, or that no robot runs there", "[doctor]") {
+TEST_CASE("The doctor finds that a peer is out of reach, or that no robot runs there") {
   if (!VirtualNetwork::available()) return;
   VirtualNetwork network(2);
   const std::string peer = VirtualNetwork::address(2);
@@ -184,7 +182,7 @@ TEST_CASE("The doctor finds that a peer is out of reach, or that no robot runs t
   CHECK_THAT(lost.ids(), Contains("network.unreachable"));
 }
 
-TEST_CASE("The doctor states the largest packet that a peer answers", "[doctor]") {
+TEST_CASE("The doctor states the largest packet that a peer answers") {
   if (!VirtualNetwork::available()) return;
   VirtualNetwork network(2);
   network.set_path_mtu(2, 1280);

@@ -21,7 +21,7 @@ Finding the_finding(const Examination& result) {
 
 }  // namespace
 
-TEST_CASE("Live topics that are received are sound", "[doctor]") {
+TEST_CASE("Live topics that are received are sound") {
   const std::vector<TopicPublisher> publishers = {{"/left", kImage}, {"/imu", kImu}};
   const auto result =
       examine_topics({{"/left", kImage, 60}, {"/imu", kImu, 600}}, publishers, 3.0, 0);
@@ -29,7 +29,7 @@ TEST_CASE("Live topics that are received are sound", "[doctor]") {
   CHECK_THAT(to_text(result.figures), Contains("60 messages of sensor_msgs/msg/Image in 3.0"));
 }
 
-TEST_CASE("The reason why a live topic is silent follows from the publishers", "[doctor]") {
+TEST_CASE("The reason why a live topic is silent follows from the publishers") {
   const std::vector<ListenedTopic> wanted = {{"/left", kImage, 0}};
   const auto why = [&](const std::vector<TopicPublisher>& publishers) {
     return the_finding(examine_topics(wanted, publishers, 3.0, 0));
@@ -50,8 +50,7 @@ TEST_CASE("The reason why a live topic is silent follows from the publishers", "
   CHECK_THAT(the_finding(result).what, Contains("but one publishes /other1 "));
 }
 
-TEST_CASE("If there is no publisher at all, one finding reports it, whatever topics are missing",
-          "[doctor]") {
+TEST_CASE("If there is no publisher at all, one finding reports it, whatever topics are missing") {
   const auto result = examine_topics({{"/left", kImage, 0}, {"/imu", kImu, 0}}, {}, 3.0, 7);
   REQUIRE(result.findings.size() == 1);
   CHECK(result.figures.size() == 2);
@@ -92,7 +91,7 @@ const char* const kMeasured = "verified,60,39,1,2,3,0,0,0,1,1,1,1,1,1,1,";
 
 }  // namespace
 
-TEST_CASE("The doctor gives the reason why robots did not join, from all files", "[doctor]") {
+TEST_CASE("The doctor gives the reason why robots did not join, from all files") {
   const Results results;
   results.folder.write(
       "alice/loop_closures.csv",
@@ -112,7 +111,7 @@ TEST_CASE("The doctor gives the reason why robots did not join, from all files",
   CHECK(exit_code_of(result.findings) == 1);
 }
 
-TEST_CASE("The findings on a single robot are those of its end", "[doctor]") {
+TEST_CASE("The findings on a single robot are those of its end") {
   const Results results;
   RunSummary summary = read_summary(results.folder.path() / "alice/summary.json");
   summary.findings = {failed_run("vio: no memory"), {.id = "team.not_joined", .what = "x"}};
@@ -123,8 +122,7 @@ TEST_CASE("The findings on a single robot are those of its end", "[doctor]") {
   CHECK(exit_code_of(result.findings) == 2);
 }
 
-TEST_CASE("The folder of a robot that was killed is no recording, and the message names --resume",
-          "[doctor]") {
+TEST_CASE("The folder of a robot that was killed is no recording, and the message names --resume") {
   const Results results;
   const auto bob = results.folder.path() / "bob";
   fs::remove(bob / "summary.json");
@@ -140,8 +138,7 @@ TEST_CASE("The folder of a robot that was killed is no recording, and the messag
   }
 }
 
-TEST_CASE("Results with files that are missing or broken are examined as far as possible",
-          "[doctor]") {
+TEST_CASE("Results with files that are missing or broken are examined as far as possible") {
   const Results results;
   fs::remove(results.folder.path() / "alice/config.yaml");
   results.folder.write("bob/loop_closures.csv", std::string(kHeader) + "0,1\n");
@@ -185,7 +182,7 @@ std::string ids_of(const NetworkFacts& facts) {
 
 }  // namespace
 
-TEST_CASE("A sound network has no findings", "[doctor]") {
+TEST_CASE("A sound network has no findings") {
   NetworkFacts facts = sound();
   CHECK(ids_of(facts).empty());
   facts.elsewhere = {{{0, "eth0"}, {"10.0.0.9"}}};  // ROS 2, or another team
@@ -195,7 +192,7 @@ TEST_CASE("A sound network has no findings", "[doctor]") {
   CHECK(ids_of(facts).empty());
 }
 
-TEST_CASE("The reason that keeps robots apart on a network is named", "[doctor]") {
+TEST_CASE("The reason that keeps robots apart on a network is named") {
   struct Case {
     std::string ids;
     std::function<void(NetworkFacts&)> change;
@@ -287,8 +284,7 @@ TEST_CASE("The reason that keeps robots apart on a network is named", "[doctor]"
   CHECK(ids_of(facts) == c.ids);
 }
 
-TEST_CASE("On loopback alone the finding depends on whether the host has another interface",
-          "[doctor]") {
+TEST_CASE("On loopback alone the finding depends on whether the host has another interface") {
   NetworkFacts facts = sound();
   facts.chosen = NetworkInterface{"lo", "127.0.0.1", true, true};
   facts.config.interface = "lo";
@@ -297,7 +293,7 @@ TEST_CASE("On loopback alone the finding depends on whether the host has another
   CHECK_THAT(examine_network(facts).findings.at(0).what, Equals("only loopback is up"));
 }
 
-TEST_CASE("The doctor finds a robot on its domain, and its address on another one", "[doctor]") {
+TEST_CASE("The doctor finds a robot on its domain, and its address on another one") {
   std::random_device device;
   DdsConfig config{.domain = static_cast<int>(device() % 90),
                    .team = "test-" + std::to_string(device()),

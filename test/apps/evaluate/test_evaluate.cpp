@@ -29,7 +29,7 @@ struct Files {
 
 }  // namespace
 
-TEST_CASE("trajectory prints a table and writes JSON and a plot", "[evaluate]") {
+TEST_CASE("trajectory prints a table and writes JSON and a plot") {
   const Files files;
   const std::string json = (files.folder.path() / "out.json").string();
   const std::string plot = (files.folder.path() / "out.html").string();
@@ -45,7 +45,7 @@ TEST_CASE("trajectory prints a table and writes JSON and a plot", "[evaluate]") 
   CHECK(plots[0]["series"].size() == 3);
 }
 
-TEST_CASE("Several truths belong to the estimates one by one", "[evaluate]") {
+TEST_CASE("Several truths belong to the estimates one by one") {
   const Files files;
   const std::string two = kTool + "trajectory --truth " + files.a + " --truth " + files.b;
   const auto result = run_command(two + " --estimate " + files.a + ' ' + files.b);
@@ -53,7 +53,7 @@ TEST_CASE("Several truths belong to the estimates one by one", "[evaluate]") {
   CHECK_THAT(result.output, Contains(" 0.0000"));
 }
 
-TEST_CASE("closures judges the folders of a run", "[evaluate]") {
+TEST_CASE("closures judges the folders of a run") {
   const EurocFolder recording;
   const Files files;
   const auto robot = [&](const std::string& id, const std::string& closures) {
@@ -85,7 +85,7 @@ TEST_CASE("closures judges the folders of a run", "[evaluate]") {
                  !Contains("at the same times"));
 }
 
-TEST_CASE("Bad input is refused and named", "[evaluate]") {
+TEST_CASE("Bad input is refused and named") {
   const Files files;
   const std::string bad = files.folder.write("bad.tum", "1.0 0 0 0 0 0 0 1\nhello\n").string();
   const std::string rest = " --estimate " + files.a;

@@ -54,7 +54,7 @@ std::string poses_at(int x_m) {
 
 }  // namespace
 
-TEST_CASE("mesh judges each robot and all together", "[evaluate]") {
+TEST_CASE("mesh judges each robot and all together") {
   const Meshes run;
   const std::string command =
       "mesh --samples-per-m2 100 --truth world.ply --estimate a/mesh.ply b/mesh.ply --json "
@@ -68,7 +68,7 @@ TEST_CASE("mesh judges each robot and all together", "[evaluate]") {
   CHECK(run(command).output == result.output);
 }
 
-TEST_CASE("mesh starts registration at the transform of the trajectories", "[evaluate]") {
+TEST_CASE("mesh starts registration at the transform of the trajectories") {
   const Meshes run;
   run.write("a/mesh.ply", room(), make_pose(Eigen::Matrix3d::Identity(), {50, 0, 0}));
   run.folder.write("truth.tum", poses_at(0));
@@ -85,7 +85,7 @@ TEST_CASE("mesh starts registration at the transform of the trajectories", "[eva
              Contains("give one --trajectory-truth for all --trajectory"));
 }
 
-TEST_CASE("render draws one picture per view", "[evaluate]") {
+TEST_CASE("render draws one picture per view") {
   const Meshes run;
   run.folder.write("path.tum", "1 1 1 1 0 0 0 1\n2 3 2 1 0 0 0 1\n");
   const auto result = succeeded(
@@ -101,7 +101,7 @@ TEST_CASE("render draws one picture per view", "[evaluate]") {
   CHECK(run.picture("out_2.png").cols == 320);
 }
 
-TEST_CASE("render stands a map upright by a reference trajectory", "[evaluate]") {
+TEST_CASE("render stands a map upright by a reference trajectory") {
   const Meshes run;
   run.write("a/mesh.ply", room(),
             make_pose(Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitY()).matrix(), {0, 0, 0}));
@@ -121,7 +121,7 @@ TEST_CASE("render stands a map upright by a reference trajectory", "[evaluate]")
         0.5);  // average grey level, out of 255
 }
 
-TEST_CASE("mesh and render refuse input by name", "[evaluate]") {
+TEST_CASE("mesh and render refuse input by name") {
   const Meshes run;
   LabelledMesh cloud = room();
   cloud.faces.clear();
@@ -150,7 +150,7 @@ TEST_CASE("mesh and render refuse input by name", "[evaluate]") {
   }
 }
 
-TEST_CASE("objects compares objects in the frame of the truth", "[evaluate]") {
+TEST_CASE("objects compares objects in the frame of the truth") {
   const Meshes run;
   run.folder.write("true.json", objects_at(1.0));
   run.folder.write("objects.json", objects_at(51.0));

@@ -29,7 +29,7 @@ std::vector<T> values_of(const tinygltf::Model& model, int accessor, std::size_t
   return values;
 }
 
-TEST_CASE("A mesh is read back from glTF with its classes as materials", "[exports]") {
+TEST_CASE("A mesh is read back from glTF with its classes as materials") {
   const TemporaryFolder folder;
   const auto file = folder.path() / "room.glb";
   LabelledMesh mesh = room();
@@ -76,7 +76,7 @@ TEST_CASE("A mesh is read back from glTF with its classes as materials", "[expor
         std::vector{1.0, 1.0, 1.0, 1.0});
 }
 
-TEST_CASE("A mesh without labels has one material and the colours of its vertices", "[exports]") {
+TEST_CASE("A mesh without labels has one material and the colours of its vertices") {
   const TemporaryFolder folder;
   const auto file = folder.path() / "room.glb";
   LabelledMesh mesh = room();

@@ -27,7 +27,7 @@ int hue(const cv::Vec3b& bgr) {
 const std::vector<LabelledMesh> kHalves = {rectangle({0, 0, 0}, {2, 0, 0}, {0, 4, 0}, 4, 1),
                                            rectangle({2, 0, 0}, {2, 0, 0}, {0, 4, 0}, 4, 2)};
 
-TEST_CASE("Surfaces have the colours of their labels", "[mesh_picture]") {
+TEST_CASE("Surfaces have the colours of their labels") {
   const cv::Mat3b picture = draw(kHalves, PictureColor::kLabel);
   CHECK(picture.cols == 200);
   CHECK(picture.rows > 200);  // the legend
@@ -39,7 +39,7 @@ TEST_CASE("Surfaces have the colours of their labels", "[mesh_picture]") {
   CHECK(unknown[0] > 60);
 }
 
-TEST_CASE("Other colours are none, those of the vertices, and one per mesh", "[mesh_picture]") {
+TEST_CASE("Other colours are none, those of the vertices, and one per mesh") {
   CHECK(hue(draw(kHalves, PictureColor::kShade)(100, 50)) == -1);
   auto own = kHalves;
   for (auto& mesh : own) mesh.colors.assign(mesh.vertices.size(), {0, 0, 230});
@@ -48,7 +48,7 @@ TEST_CASE("Other colours are none, those of the vertices, and one per mesh", "[m
   CHECK(hue(robots(100, 50)) != hue(robots(100, 150)));
 }
 
-TEST_CASE("Corners are darker than open ground and steps have lines", "[mesh_picture]") {
+TEST_CASE("Corners are darker than open ground and steps have lines") {
   std::vector<LabelledMesh> meshes = {square(4.0F, 0.0F)};
   const auto green = [](const cv::Vec3b& pixel) { return static_cast<int>(pixel[1]); };
   const int open = green(draw(meshes, PictureColor::kShade)(100, 100));
@@ -63,7 +63,7 @@ TEST_CASE("Corners are darker than open ground and steps have lines", "[mesh_pic
   CHECK(darkest < open / 2 + 20);
 }
 
-TEST_CASE("Trajectories are drawn on top from a ring to a disc", "[mesh_picture]") {
+TEST_CASE("Trajectories are drawn on top from a ring to a disc") {
   const std::vector<LabelledMesh> meshes = {square(4.0F, 0.0F, 4, 2)};
   const PictureLine line = {"robot0", {{1, 2, -5}, {3, 2, -5}}};  // below the surface
   const cv::Mat3b picture = draw(meshes, PictureColor::kLabel, {line});
@@ -74,8 +74,7 @@ TEST_CASE("Trajectories are drawn on top from a ring to a disc", "[mesh_picture]
   CHECK(hue(picture(90, column(2.0))) == 1);
 }
 
-TEST_CASE("The scale bar has the length it names, and the legend as many rows as necessary",
-          "[mesh_picture]") {
+TEST_CASE("The scale bar has the length it names, and the legend as many rows as necessary") {
   PictureView view{.width = 400, .height = 100};
   view.scale = 30.0;  // a fifth of the width is 2.7 m: the bar is 2 m, 60 px
   const cv::Mat3b strip = draw_legend({}, view);
@@ -93,7 +92,7 @@ TEST_CASE("The scale bar has the length it names, and the legend as many rows as
   CHECK(draw_legend(many, view).rows > 2 * strip.rows);
 }
 
-TEST_CASE("Pictures without faces and missing colours are refused", "[mesh_picture]") {
+TEST_CASE("Pictures without faces and missing colours are refused") {
   CHECK_THROWS_WITH(draw({}, PictureColor::kShade), "no mesh to draw has a face");
   CHECK_THROWS_WITH(draw(kHalves, PictureColor::kOwn), "mesh 0: its vertices have no colours");
   auto bare = kHalves;
@@ -115,7 +114,7 @@ LabelledMesh triangle(float z) {
   return mesh;
 }
 
-TEST_CASE("Faces that are seen from behind are not drawn", "[mesh_picture]") {
+TEST_CASE("Faces that are seen from behind are not drawn") {
   LabelledMesh ceiling = triangle(5.0F);
   std::swap(ceiling.faces[0][1], ceiling.faces[0][2]);  // visible from below
   LabelledMesh mesh = triangle(2.0F);
@@ -124,7 +123,7 @@ TEST_CASE("Faces that are seen from behind are not drawn", "[mesh_picture]") {
   CHECK(image.faces[image.at(65, 25)] == 0);
 }
 
-TEST_CASE("Perspective shows depth along z and clips surface behind the viewer", "[mesh_picture]") {
+TEST_CASE("Perspective shows depth along z and clips surface behind the viewer") {
   PictureView view;
   view.width = view.height = 100;
   view.perspective = true;
@@ -141,7 +140,7 @@ TEST_CASE("Perspective shows depth along z and clips surface behind the viewer",
   CHECK(image.faces[image.at(50, 50)] == SurfaceImage::kNone);  // beyond 90 m
 }
 
-TEST_CASE("Neighbouring faces have no gap between them", "[mesh_picture]") {
+TEST_CASE("Neighbouring faces have no gap between them") {
   const LabelledMesh mesh = rectangle({-3.07F, -2.91F, 0}, {6.1F, 0, 0}, {0, 5.9F, 0}, 37);
   const SurfaceImage image = rasterise(mesh, from_above());
   for (int row = 12; row < 68; ++row)
@@ -151,7 +150,7 @@ TEST_CASE("Neighbouring faces have no gap between them", "[mesh_picture]") {
 
 const Eigen::AlignedBox3d kBox(Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(10, 5, 2));
 
-TEST_CASE("From above y is up and from the front z, and x is to the right", "[mesh_picture]") {
+TEST_CASE("From above y is up and from the front z, and x is to the right") {
   const PictureView view = parse_view("top", kBox, 520, 400);
   CHECK(view.scale == Approx(50.0));  // 10 m and 4 % in 520 px
   CHECK(view.project({5, 2.5, 0}).head<2>().isApprox(Eigen::Vector2d(260, 200)));
@@ -164,7 +163,7 @@ TEST_CASE("From above y is up and from the front z, and x is to the right", "[me
   CHECK(front.project({5, 4, 1}).z() - front.project({5, 1, 1}).z() == Approx(3.0));
 }
 
-TEST_CASE("A view from a position has the direction of yaw and pitch", "[mesh_picture]") {
+TEST_CASE("A view from a position has the direction of yaw and pitch") {
   const PictureView view = parse_view("1,2,3,90,0", kBox, 200, 100);
   CHECK(view.project({1, 7, 3}).isApprox(Eigen::Vector3d(100, 50, 5)));
   CHECK(view.project({2, 7, 3}).x() > 100.0);  // looking along y, x is to the right
@@ -175,7 +174,7 @@ TEST_CASE("A view from a position has the direction of yaw and pitch", "[mesh_pi
   CHECK(down.project({1, 3, 0}).x() < 100.0);
 }
 
-TEST_CASE("Other views are refused with their text", "[mesh_picture]") {
+TEST_CASE("Other views are refused with their text") {
   for (const char* text :
        {"", "up", "1,2,3", "1,2,3,4,x", "1,2,3,4,5,6", "1,,3,4,5", "nan,0,0,0,0"}) {
     CAPTURE(text);
@@ -184,7 +183,7 @@ TEST_CASE("Other views are refused with their text", "[mesh_picture]") {
   }
 }
 
-TEST_CASE("A few stray vertices do not affect the extent", "[mesh_picture]") {
+TEST_CASE("A few stray vertices do not affect the extent") {
   LabelledMesh mesh = square(10.0F, 0.0F, 99);  // 10,000 vertices
   mesh.vertices.emplace_back(500.0F, -300.0F, 80.0F);
   const Eigen::AlignedBox3d box = extent_of(mesh);

@@ -14,7 +14,7 @@ struct Shell {
   TemporaryFolder folder;
 };
 
-TEST_CASE("kimera_multi_keys makes a team whose robots' folders can be used", "[keys]") {
+TEST_CASE("kimera_multi_keys makes a team whose robots' folders can be used") {
   const Shell keys;
   const auto made = succeeded(keys("make survey --robots alpha:0,beta:12"));
   CHECK_THAT(made.output, Contains("survey/beta  for robot 12, valid 365 days") &&
@@ -25,7 +25,7 @@ TEST_CASE("kimera_multi_keys makes a team whose robots' folders can be used", "[
   CHECK(why_refused(beta.certificate, beta.authority, beta.revocations, now_s) == nullptr);
 }
 
-TEST_CASE("kimera_multi_keys names a number of robots as other programs do", "[keys]") {
+TEST_CASE("kimera_multi_keys names a number of robots as other programs do") {
   const Shell keys;
   REQUIRE(keys("make survey --robots 3 --days 30").exit_code == 0);
   for (const char* name : {"robot0", "robot1", "robot2"})
@@ -33,7 +33,7 @@ TEST_CASE("kimera_multi_keys names a number of robots as other programs do", "[k
   CHECK_FALSE(fs::exists(keys.folder.path() / "survey" / "robot3"));
 }
 
-TEST_CASE("kimera_multi_keys adds, revokes and shows robots", "[keys]") {
+TEST_CASE("kimera_multi_keys adds, revokes and shows robots") {
   const Shell keys;
   REQUIRE(keys("make survey --robots alpha:0,beta:1").exit_code == 0);
   REQUIRE(keys("add survey --robots gamma:2").exit_code == 0);
@@ -50,7 +50,7 @@ TEST_CASE("kimera_multi_keys adds, revokes and shows robots", "[keys]") {
              Contains("holds") && Contains("revoked: beta (id 1)"));
 }
 
-TEST_CASE("kimera_multi_keys shows what is wrong with a robot's folder", "[keys]") {
+TEST_CASE("kimera_multi_keys shows what is wrong with a robot's folder") {
   const Shell keys;
   REQUIRE(keys("make survey --robots alpha:0").exit_code == 0);
   fs::permissions(keys.folder.path() / "survey/alpha/secret_key.txt", fs::perms::others_read,
@@ -61,7 +61,7 @@ TEST_CASE("kimera_multi_keys shows what is wrong with a robot's folder", "[keys]
   CHECK(keys("show survey/alpha").exit_code == 1);
 }
 
-TEST_CASE("kimera_multi_keys ends with 1 and the reason if it fails", "[keys]") {
+TEST_CASE("kimera_multi_keys ends with 1 and the reason if it fails") {
   const Shell keys;
   REQUIRE(keys("make survey --robots alpha:0").exit_code == 0);
   const auto [arguments, reason] = GENERATE(table<std::string, std::string>({
@@ -83,7 +83,7 @@ TEST_CASE("kimera_multi_keys ends with 1 and the reason if it fails", "[keys]") 
   CHECK_FALSE(fs::exists(keys.folder.path() / "other"));
 }
 
-TEST_CASE("Every subcommand of kimera_multi_keys has a help with an example", "[keys]") {
+TEST_CASE("Every subcommand of kimera_multi_keys has a help with an example") {
   const Shell keys;
   CHECK(keys("--help").exit_code == 0);
   for (const std::string command : {"make", "add", "revoke", "show"}) {

@@ -47,7 +47,7 @@ std::vector<Stamp> played(std::unique_ptr<BagReader> bag, const std::string& top
   return stamps;
 }
 
-TEST_CASE("A recording is played in its order and pace", "[publish]") {
+TEST_CASE("A recording is played in its order and pace") {
   PlayedTopic topic;
   const auto begin = std::chrono::steady_clock::now();
   const auto stamps = played(samples("/a"), "/a", {.rate = 2.0}, topic);
@@ -59,7 +59,7 @@ TEST_CASE("A recording is played in its order and pace", "[publish]") {
   CHECK(std::ranges::is_sorted(stamps));
 }
 
-TEST_CASE("A part of a recording is played without waiting for its start", "[publish]") {
+TEST_CASE("A part of a recording is played without waiting for its start") {
   constexpr Stamp kMinute = 60'000'000'000;
   PlayedTopic topic;
   const auto begin = std::chrono::steady_clock::now();
@@ -70,7 +70,7 @@ TEST_CASE("A part of a recording is played without waiting for its start", "[pub
   CHECK(stamps.front() == kFirst + 150 * kMinute);
 }
 
-TEST_CASE("A bad driver loses and delays messages, the same ones for a seed", "[publish]") {
+TEST_CASE("A bad driver loses and delays messages, the same ones for a seed") {
   const PlayOptions bad{.rate = 10.0, .jitter_s = 0.002, .drop_share = 0.3, .seed = 7};
   PlayedTopic topic;
   const auto stamps = played(samples("/b"), "/b", bad, topic);
@@ -82,7 +82,7 @@ TEST_CASE("A bad driver loses and delays messages, the same ones for a seed", "[
   CHECK(played(samples("/b"), "/b", bad, topic) == stamps);
 }
 
-TEST_CASE("Unknown topics are left out and broken messages are counted", "[publish]") {
+TEST_CASE("Unknown topics are left out and broken messages are counted") {
   auto bag = samples("/c");
   bag->add_bytes("/scan", "sensor_msgs/LaserScan", kFirst, {0, 1, 0, 0});
   bag->add_bytes("/c", RosImu::kType, kFirst, {0, 0, 0, 0, 1});  // big-endian, and cut
@@ -97,7 +97,7 @@ TEST_CASE("Unknown topics are left out and broken messages are counted", "[publi
                     "the recording has no topic /e");
 }
 
-TEST_CASE("Playing waits for readers of images and inertial samples alone", "[publish]") {
+TEST_CASE("Playing waits for readers of images and inertial samples alone") {
   auto bag = samples("/f");
   for (const auto& [topic, type] : {std::pair("/left", RosCompressedImage::kType),
                                     std::pair("/left_info", RosCameraInfo::kType),
@@ -109,7 +109,7 @@ TEST_CASE("Playing waits for readers of images and inertial samples alone", "[pu
   CHECK(player.topics_short_of(0).empty());
 }
 
-TEST_CASE("Waiting for readers ends with the topics that have too few", "[publish]") {
+TEST_CASE("Waiting for readers ends with the topics that have too few") {
   const EurocFolder folder;
   const CommandResult result =
       run_command(KM_BIN_DIR "/kimera_multi_publish " + folder.root().string() +
@@ -120,7 +120,7 @@ TEST_CASE("Waiting for readers ends with the topics that have too few", "[publis
                                 Contains("of /imu0, /cam0/image_raw, /cam1/image_raw: 1"));
 }
 
-TEST_CASE("A folder that cannot be played is refused with its layout", "[publish]") {
+TEST_CASE("A folder that cannot be played is refused with its layout") {
   const TemporaryFolder folder;
   folder.write("camera-intrinsics.txt", "");
   const CommandResult result =
@@ -129,7 +129,7 @@ TEST_CASE("A folder that cannot be played is refused with its layout", "[publish
   CHECK_THAT(result.output, Contains("7-Scenes") && Contains("only bags and folders"));
 }
 
-TEST_CASE("Fixes are played in the order of time with the messages of the recording", "[publish]") {
+TEST_CASE("Fixes are played in the order of time with the messages of the recording") {
   constexpr Stamp kLast = kFirst + (kMessages - 1) * kPeriod;
   const auto [type, gnss] =
       GENERATE(std::pair(kGnssType, true), std::pair(kMotionCaptureType, false));
@@ -163,7 +163,7 @@ TEST_CASE("Fixes are played in the order of time with the messages of the record
   CHECK_THROWS_WITH(with_fixes(samples("/i"), {}, "/i", type), Contains("--fix-topic"));
 }
 
-TEST_CASE("A EuRoC folder becomes the messages of its drivers", "[publish]") {
+TEST_CASE("A EuRoC folder becomes the messages of its drivers") {
   const EurocFolder folder;
   const auto messages = euroc_messages(std::make_unique<FolderReader>(open_folder(folder.root())));
   std::map<std::string, int> counts;

@@ -35,7 +35,7 @@ double grey_of(const std::string& jpeg, int width) {
   return cv::mean(image)[0];
 }
 
-TEST_CASE("Closures that were verified are shown, others not", "[closure_images]") {
+TEST_CASE("Closures that were verified are shown, others not") {
   constexpr double kJpeg = 1.5;  // tolerance in grey levels
   const EurocFolder recording;
   std::vector<RobotResult> robots{robot_on(recording.root(), 0), robot_on(recording.root(), 4)};
@@ -49,8 +49,7 @@ TEST_CASE("Closures that were verified are shown, others not", "[closure_images]
     CHECK(grey_of(images.jpegs.at(id), 16) == Approx(10.0 * (id.index + 1)).margin(kJpeg));
 }
 
-TEST_CASE("If there are too many closures, the rejected ones come first, and a note reports it",
-          "[closure_images]") {
+TEST_CASE("If there are too many closures, the rejected ones come first, and a note reports it") {
   const EurocFolder recording;
   std::vector<RobotResult> robots{robot_on(recording.root(), 0), robot_on(recording.root(), 1)};
   robots[0].closures = {closure({0, 0}, {0, 1}, ClosureStage::kInlier),
@@ -66,7 +65,7 @@ TEST_CASE("If there are too many closures, the rejected ones come first, and a n
   CHECK(images.notes[0] == "images are shown of 2 of 3 closures that were verified");
 }
 
-TEST_CASE("A recording that is gone is a note, a pose graph none", "[closure_images]") {
+TEST_CASE("A recording that is gone is a note, a pose graph none") {
   const EurocFolder recording;
   std::vector<RobotResult> robots{robot_on(recording.root(), 0), robot_on("/no/such/place", 1),
                                   robot_on("", 2)};
@@ -79,7 +78,7 @@ TEST_CASE("A recording that is gone is a note, a pose graph none", "[closure_ima
              StartsWith("r1: no images of its closures: ") && Contains("/no/such/place"));
 }
 
-TEST_CASE("A corrected camera clock is the clock of the keyframes", "[closure_images]") {
+TEST_CASE("A corrected camera clock is the clock of the keyframes") {
   const EurocFolder recording;
   const TemporaryFolder folder;
   const auto rig = folder.write("rig.yaml", "camera_time_offset_s: 0.05\n").string();
@@ -113,7 +112,7 @@ std::string bag_of_lefts() {
   return {bytes.begin(), bytes.end()};
 }
 
-TEST_CASE("Images of a bag are those of the rig's left camera", "[closure_images]") {
+TEST_CASE("Images of a bag are those of the rig's left camera") {
   const EurocFolder calibration;
   const TemporaryFolder folder;
   const auto bag = folder.write("run.mcap", bag_of_lefts());

@@ -41,7 +41,7 @@ std::pair<double, double> trace(const LinkPlan& link, double time_s) {
 
 }  // namespace
 
-TEST_CASE("Keys of a pair override keys of all links", "[links]") {
+TEST_CASE("Keys of a pair override keys of all links") {
   LinkScript script = LinkedTeam().script(
       "seed: 7\nloss: 0.1\ndelay_s: 0.02\njitter_s: 0.01\nrate_bytes_per_s: 1000\n"
       "queue_bytes: 5000\noutages:\n  - {from_s: 1, to_s: 2}\n"
@@ -63,7 +63,7 @@ TEST_CASE("Keys of a pair override keys of all links", "[links]") {
   CHECK(script.link(2, 0).outages.size() == 1);
 }
 
-TEST_CASE("A trace takes the place of rate and delay, and they of it", "[links]") {
+TEST_CASE("A trace takes the place of rate and delay, and they of it") {
   const LinkedTeam team;
   team.folder.write("radio.csv", "0,100,0.5\n10,300,0.7\n");
   LinkScript script = team.script(
@@ -74,8 +74,7 @@ TEST_CASE("A trace takes the place of rate and delay, and they of it", "[links]"
   CHECK_THAT(team.problems("trace: radio.csv\n"), Contains("radio.csv:2: 2 fields"));
 }
 
-TEST_CASE("A recording takes the place of the rate, and the rate of a pair takes its place",
-          "[links]") {
+TEST_CASE("A recording takes the place of the rate, and the rate of a pair takes its place") {
   const LinkedTeam team;
   const fs::path up = team.folder.write("radio.up", "10\n20\n");
   LinkScript script = team.script(
@@ -94,7 +93,7 @@ TEST_CASE("A recording takes the place of the rate, and the rate of a pair takes
   }
 }
 
-TEST_CASE("Robots that no group of a partition names are a group", "[links]") {
+TEST_CASE("Robots that no group of a partition names are a group") {
   const LinkScript script = LinkedTeam().script(
       "partitions:\n  - {from_s: 3, to_s: 4, groups: [[b]]}\n  - {from_s: 9, groups: [[a, c], "
       "[b]]}\n");
@@ -109,7 +108,7 @@ TEST_CASE("Robots that no group of a partition names are a group", "[links]") {
   CHECK(script.partitions[1].group_of[0] != script.partitions[1].group_of[1]);
 }
 
-TEST_CASE("Range follows the true poses at the time of the recordings", "[links]") {
+TEST_CASE("Range follows the true poses at the time of the recordings") {
   LinkedTeam team;
   for (RobotPlan& robot : team.plan.robots)
     robot.truth = team.folder.write(robot.name + ".tum", "100 0 0 0 0 0 0 1\n110 8 0 0 0 0 0 1\n");
@@ -133,7 +132,7 @@ TEST_CASE("Range follows the true poses at the time of the recordings", "[links]
              Contains("links.yaml: range_m needs the true poses of c"));
 }
 
-TEST_CASE("Every problem of a file of links is reported with its line", "[links]") {
+TEST_CASE("Every problem of a file of links is reported with its line") {
   const std::string problems = LinkedTeam().problems(
       "loss: 1.5\n"
       "latency: 3\n"
@@ -160,7 +159,7 @@ TEST_CASE("Every problem of a file of links is reported with its line", "[links]
   }
 }
 
-TEST_CASE("A corrupted file of links is refused by name, or makes a script", "[links]") {
+TEST_CASE("A corrupted file of links is refused by name, or makes a script") {
   const LinkedTeam team;
   check_corrupted<ConfigError>(
       "seed: 3\nloss: 0.1\nrate_bytes_per_s: 1000\nqueue_bytes: 5000\noutages:\n"
@@ -172,7 +171,7 @@ TEST_CASE("A corrupted file of links is refused by name, or makes a script", "[l
       });
 }
 
-TEST_CASE("The files of links that are shipped can be read", "[links]") {
+TEST_CASE("The files of links that are shipped can be read") {
   LinkedTeam team;
   for (RobotPlan& robot : team.plan.robots)
     robot.truth = team.folder.write("truth.tum", "0 0 0 0 0 0 0 1\n");

@@ -50,7 +50,7 @@ struct ReportedRun {
 
 }  // namespace
 
-TEST_CASE("The report has the numbers that the robots left", "[report_page]") {
+TEST_CASE("The report has the numbers that the robots left") {
   const Json data = ReportedRun().data();
   REQUIRE(data["robots"].size() == 2);
   const Json& robot = data["robots"][0];
@@ -74,7 +74,7 @@ TEST_CASE("The report has the numbers that the robots left", "[report_page]") {
   CHECK_THAT(data["map"].get<std::string>(), StartsWith("data:image/jpeg;base64,"));
 }
 
-TEST_CASE("If there is a truth, the report has it and the error over time", "[report_page]") {
+TEST_CASE("If there is a truth, the report has it and the error over time") {
   constexpr double kRounded_m = 2e-3, kExact_m = 1e-6;
   ReportedRun reported;
   reported.know_truth();
@@ -95,7 +95,7 @@ TEST_CASE("If there is a truth, the report has it and the error over time", "[re
   }
 }
 
-TEST_CASE("Lines are interrupted at missing poses, not between rare keyframes", "[report_page]") {
+TEST_CASE("Lines are interrupted at missing poses, not between rare keyframes") {
   ReportedRun reported;
   reported.know_truth();
   const auto write = [&](const char* file, const std::vector<double>& times_s) {
@@ -123,7 +123,7 @@ TEST_CASE("Lines are interrupted at missing poses, not between rare keyframes", 
   CHECK(breaks("truth").empty());
 }
 
-TEST_CASE("Long series are thinned, with both ends", "[report_page]") {
+TEST_CASE("Long series are thinned, with both ends") {
   const ReportedRun reported;
   std::string rounds = "seconds,round,members,cost,gradient_norm\n";
   for (int i = 1; i <= 10000; ++i) rounds += "0," + std::to_string(i) + ",2,3,0.1\n";
@@ -135,8 +135,7 @@ TEST_CASE("Long series are thinned, with both ends", "[report_page]") {
   CHECK(points.back()[0] == 10000);
 }
 
-TEST_CASE("A table that cannot be used is a note of the report, a missing one none",
-          "[report_page]") {
+TEST_CASE("A table that cannot be used is a note of the report, a missing one none") {
   const ReportedRun reported;
   reported.run.folder.write("r1/traffic.csv", "time_s\nsoon,out\n");
   fs::remove(reported.plan.output / "r1/optimizer.csv");
@@ -147,14 +146,13 @@ TEST_CASE("A table that cannot be used is a note of the report, a missing one no
   CHECK_THAT(data["notes"][0].get<std::string>(), Contains("r1/traffic.csv line 2"));
 }
 
-TEST_CASE("The report needs no other file and no network, and shows text as it is",
-          "[report_page]") {
+TEST_CASE("The report needs no other file and no network, and shows text as it is") {
   const std::string page = report_page(ReportedRun().data());
   CHECK(references_of_page(page) == 0);
   CHECK(data_of_page(page, "run")["team"]["robots"][0]["exit_reason"] == kHostileText);
 }
 
-TEST_CASE("The report opens in a browser and shows its charts", "[report_page][slow]") {
+TEST_CASE("The report opens in a browser and shows its charts", "[slow]") {
   if (const std::string why = missing_page_program(); !why.empty()) {
     std::cout << "SKIPPED: " << why << '\n';
     return;

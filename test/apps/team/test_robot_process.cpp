@@ -36,20 +36,20 @@ struct Script {
 
 }  // namespace
 
-TEST_CASE("Its standard input is empty and its process group its own", "[team]") {
+TEST_CASE("Its standard input is empty and its process group its own") {
   Script script("read x || echo empty; [ $(ps -o pgid= -p $$) = $$ ] && echo leader");
   script.wait();
   CHECK(script.lines == std::vector<std::string>{"empty", "leader"});
 }
 
-TEST_CASE("A process that a signal ended names the signal", "[team]") {
+TEST_CASE("A process that a signal ended names the signal") {
   Script script("kill -9 $$");
   script.wait();
   CHECK_FALSE(script.process.exit()->ok());
   CHECK_THAT(to_string(*script.process.exit()), Contains("signal 9"));
 }
 
-TEST_CASE("A program that cannot be started fails with a reason", "[team]") {
+TEST_CASE("A program that cannot be started fails with a reason") {
   const TemporaryFolder folder;
   RobotProcess process({folder.path() / "missing"}, Script::no_signals(), folder.path() / "log");
   while (!process.exit()) process.read();
@@ -58,7 +58,7 @@ TEST_CASE("A program that cannot be started fails with a reason", "[team]") {
   CHECK_THAT(process.last_log_lines().back(), StartsWith("cannot be started: No such file"));
 }
 
-TEST_CASE("A process does not outlive its owner", "[team]") {
+TEST_CASE("A process does not outlive its owner") {
   pid_t child = 0;
   {
     Script script("echo $$; sleep 60");
@@ -69,7 +69,7 @@ TEST_CASE("A process does not outlive its owner", "[team]") {
   CHECK(kill(child, 0) != 0);
 }
 
-TEST_CASE("A process that was asked to end is not asked again", "[team]") {
+TEST_CASE("A process that was asked to end is not asked again") {
   const TemporaryFolder folder;
   {
     Script script(
@@ -82,7 +82,7 @@ TEST_CASE("A process that was asked to end is not asked again", "[team]") {
   CHECK(folder.read("diary") == "asked\nended\n");
 }
 
-TEST_CASE("The display redraws a terminal and prefixes lines elsewhere", "[team]") {
+TEST_CASE("The display redraws a terminal and prefixes lines elsewhere") {
   std::ostringstream plain;
   TeamDisplay log({"a", "long"}, plain, false, 0);
   log.update(0, "hello");

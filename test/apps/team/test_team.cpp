@@ -54,13 +54,13 @@ struct ScriptedTeam {
 
 }  // namespace
 
-TEST_CASE("The time of the recording is read from the status line of a robot", "[team]") {
+TEST_CASE("The time of the recording is read from the status line of a robot") {
   CHECK(recorded_s_of("7.4 s, 148 images, 21 keyframes | peers: none yet") == 7.4);
   for (const char* other : {"", "started", "pause of 7.4 s, done", " s, 3", "7.4 m, 2 s, 3"})
     CHECK_FALSE(recorded_s_of(other));
 }
 
-TEST_CASE("A team runs its robots, shows their lines and prints the table", "[team]") {
+TEST_CASE("A team runs its robots, shows their lines and prints the table") {
   const ScriptedTeam team("exit 0");
   const std::string json = (team.folder.path() / "out/team.json").string();
   const auto result = succeeded(
@@ -74,7 +74,7 @@ TEST_CASE("A team runs its robots, shows their lines and prints the table", "[te
   CHECK_THAT(team.folder.read("out/bob/robot.log"), Contains("status of bob"));
 }
 
-TEST_CASE("A robot that fails fails the team, with its last words", "[team]") {
+TEST_CASE("A robot that fails fails the team, with its last words") {
   const ScriptedTeam team(
       "[ $name = bob ] && { echo 'out of luck'; echo '  or of fuel'; } >&2 && exit 9; exit 0");
   const auto result = run_command(team.command);
@@ -85,7 +85,7 @@ TEST_CASE("A robot that fails fails the team, with its last words", "[team]") {
                                 Contains("  out of luck"));
 }
 
-TEST_CASE("A program that is no robot fails the team", "[team]") {
+TEST_CASE("A program that is no robot fails the team") {
   const ScriptedTeam team("exit 0");
   const std::string before = team.command.substr(0, team.command.find(" --robot-binary"));
   const auto result = run_command(before + " --robot-binary /bin/true --output " +
@@ -95,7 +95,7 @@ TEST_CASE("A program that is no robot fails the team", "[team]") {
   CHECK_THAT(result.output, Contains("is /bin/true kimera_multi_robot?"));
 }
 
-TEST_CASE("Results of an earlier run are not shown for a robot that fails", "[team]") {
+TEST_CASE("Results of an earlier run are not shown for a robot that fails") {
   const ScriptedTeam team("[ $name = bob ] && { rm \"$out/summary.json\"; exit 1; }; exit 0");
   for (const char* file : {"summary.json", "optimized.tum", "exit_code"})
     team.folder.write(std::string("out/bob/") + file, "{\"frames\": 4711}");
@@ -113,7 +113,7 @@ TEST_CASE("Results of an earlier run are not shown for a robot that fails", "[te
   CHECK(fs::exists(team.folder.path() / "out/bob/notes.txt"));
 }
 
-TEST_CASE("The domain is drawn once for the whole team", "[team]") {
+TEST_CASE("The domain is drawn once for the whole team") {
   const ScriptedTeam team("exit 0");
   const std::string output = run_command(team.command).output;
   CAPTURE(output);
@@ -126,7 +126,7 @@ TEST_CASE("The domain is drawn once for the whole team", "[team]") {
   CHECK(domain_after(output.find("status of alice")) == domain_after(output.find("status of bob")));
 }
 
-TEST_CASE("An interrupt is passed on once and the table still printed", "[team]") {
+TEST_CASE("An interrupt is passed on once and the table still printed") {
   const ScriptedTeam team(
       "trap 'echo \"$name interrupted\"; exit 0' INT\n"
       "touch \"$out/ready\"\n"
@@ -138,7 +138,7 @@ TEST_CASE("An interrupt is passed on once and the table still printed", "[team]"
   CHECK_THAT(result.output, Contains("team, one frame"));
 }
 
-TEST_CASE("With bad links each robot is in a network of its own", "[team][namespaces]") {
+TEST_CASE("With bad links each robot is in a network of its own") {
   const ScriptedTeam team(
       "echo $name has $(grep -o '10[.]77[.]0[.][1-9]' /proc/net/fib_trie | sort -u) on "
       "$(grep : /proc/net/dev | cut -d: -f1)");
@@ -154,7 +154,7 @@ TEST_CASE("With bad links each robot is in a network of its own", "[team][namesp
                         Contains("\nbob,alice,"));
 }
 
-TEST_CASE("A robot whose interface is down loses frames and nothing else", "[team][namespaces]") {
+TEST_CASE("A robot whose interface is down loses frames and nothing else") {
   const ScriptedTeam team(
       "cd \"$out/..\"\n"
       "if [ $name = alice ]; then\n"
@@ -172,7 +172,7 @@ TEST_CASE("A robot whose interface is down loses frames and nothing else", "[tea
   CHECK_THAT(table, Contains("\nbob,alice,") && !Contains("\nbob,alice,0,"));
 }
 
-TEST_CASE("Networks of robots vanish with their team, however it ends", "[team][namespaces]") {
+TEST_CASE("Networks of robots vanish with their team, however it ends") {
   const int signal = GENERATE(0, SIGINT, SIGKILL);
   CAPTURE(signal);
   const ScriptedTeam team(
@@ -203,7 +203,7 @@ TEST_CASE("Networks of robots vanish with their team, however it ends", "[team][
   CHECK(fs::exists(team.folder.path() / "out/links.csv") == (signal != SIGKILL));
 }
 
-TEST_CASE("If networks are not allowed, a team with bad links does not start", "[team]") {
+TEST_CASE("If networks are not allowed, a team with bad links does not start") {
   const ScriptedTeam team("echo started");
   const std::string links = team.folder.write("links.yaml", "").string();
   const std::string forbid =
@@ -223,7 +223,7 @@ TEST_CASE("If networks are not allowed, a team with bad links does not start", "
   CHECK_THAT(result.output, !Contains("started"));
 }
 
-TEST_CASE("How a robot ended elsewhere is read from its folder", "[team]") {
+TEST_CASE("How a robot ended elsewhere is read from its folder") {
   const TemporaryFolder folder;
   const std::string summary = json_text(finished_summary());
   folder.write("done/summary.json", summary);
@@ -250,7 +250,7 @@ TEST_CASE("How a robot ended elsewhere is read from its folder", "[team]") {
   CHECK(runs[3].exit.code == 1);
 }
 
-TEST_CASE("A report starts no robot and fails if one of the run did", "[team]") {
+TEST_CASE("A report starts no robot and fails if one of the run did") {
   const ScriptedTeam team("exit 0");
   const std::string command = team.command + " --report";
   team.folder.write("out/alice/summary.json", json_text(finished_summary()));
@@ -265,7 +265,7 @@ TEST_CASE("A report starts no robot and fails if one of the run did", "[team]") 
              Contains("finished") && !Contains("DDS domain") && !Contains("status of"));
 }
 
-TEST_CASE("Input that cannot be run is refused", "[team]") {
+TEST_CASE("Input that cannot be run is refused") {
   const ScriptedTeam team("exit 0");
   const std::string tool = KM_BIN_DIR "/kimera_multi_team";
   const std::string elsewhere = team.command.substr(0, team.command.find(" --output"));

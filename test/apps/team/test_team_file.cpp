@@ -32,7 +32,7 @@ std::string problems_of(const fs::path& file, const fs::path& dataset) {
 
 }  // namespace
 
-TEST_CASE("A corrupted team file is refused by name, or plans robots", "[team]") {
+TEST_CASE("A corrupted team file is refused by name, or plans robots") {
   const Inputs inputs;
   check_corrupted<ConfigError>(
       "config: common.yaml\ntruth: truth.csv\nrate: max\ndomain: 7\nrobots:\n"
@@ -45,7 +45,7 @@ TEST_CASE("A corrupted team file is refused by name, or plans robots", "[team]")
       });
 }
 
-TEST_CASE("A team file gives the robots their inputs", "[team]") {
+TEST_CASE("A team file gives the robots their inputs") {
   const Inputs inputs;
   const fs::path file = inputs.team(
       "config: common.yaml\n"
@@ -82,7 +82,7 @@ TEST_CASE("A team file gives the robots their inputs", "[team]") {
   CHECK(b.arguments == std::vector<std::string>{"--link", "wifi", "--verbose"});
 }
 
-TEST_CASE("A truth may be a folder, and one that is missing is a note", "[team]") {
+TEST_CASE("A truth may be a folder, and one that is missing is a note") {
   const Inputs inputs;
   inputs.folder.write("truth/groundtruth_tum.txt", "");
   const fs::path file = inputs.team(
@@ -100,7 +100,7 @@ TEST_CASE("A truth may be a folder, and one that is missing is a note", "[team]"
   CHECK(read_team_file(file, {}).robots[1].truth == inputs.folder.path() / "truth/data.csv");
 }
 
-TEST_CASE("The command line of a robot has the options of its plan", "[team]") {
+TEST_CASE("The command line of a robot has the options of its plan") {
   TeamPlan plan;
   plan.configs = {"/c.yaml", "/d.yaml"};
   plan.domain = 9;
@@ -120,7 +120,7 @@ TEST_CASE("The command line of a robot has the options of its plan", "[team]") {
                                  "--set",      "a.b=1"});
 }
 
-TEST_CASE("Every problem of a team file is reported with its line", "[team]") {
+TEST_CASE("Every problem of a team file is reported with its line") {
   const Inputs inputs;
   fs::create_symlink("loop", inputs.folder.path() / "loop");
   const std::string robots = "robots:\n  - {id: 1, graph: recording/g.csv}\n";
@@ -157,7 +157,7 @@ TEST_CASE("Every problem of a team file is reported with its line", "[team]") {
   CHECK_THAT(problems_of("/no/team.yaml", {}), Contains("no such file"));
 }
 
-TEST_CASE("Arguments name inputs relative to the team file, and ${DATASET}", "[team]") {
+TEST_CASE("Arguments name inputs relative to the team file, and ${DATASET}") {
   const Inputs inputs;
   const fs::path file = inputs.team(
       "arguments: [--config, common.yaml, --link, wifi]\n"
@@ -178,7 +178,7 @@ TEST_CASE("Arguments name inputs relative to the team file, and ${DATASET}", "[t
                            Contains("team.yaml:7: arguments: --set=x.y=${DATASET} needs"));
 }
 
-TEST_CASE("The team files that are shipped lack only recordings", "[team]") {
+TEST_CASE("The team files that are shipped lack only recordings") {
   const TemporaryFolder dataset;
   std::size_t files = 0;
   for (const auto& entry : fs::directory_iterator("config/teams")) {

@@ -109,7 +109,7 @@ struct HalfTeam : Team {
 
 }  // namespace
 
-TEST_CASE("A robot without results leaves a note, the others are judged", "[team]") {
+TEST_CASE("A robot without results leaves a note, the others are judged") {
   const TeamResult team = HalfTeam().collect();
   REQUIRE(team.robots.size() == 2);
   CHECK(team.robots[0].notes.empty());
@@ -124,8 +124,7 @@ TEST_CASE("A robot without results leaves a note, the others are judged", "[team
 }
 
 TEST_CASE(
-    "Damaged live poses are noted, and those of a robot that joined at the end are not missed",
-    "[team]") {
+    "Damaged live poses are noted, and those of a robot that joined at the end are not missed") {
   const HalfTeam half;
   half.folder.write("a/live.tum", "1.0 0 0 0 0 0 0\n");
   const TeamResult damaged = half.collect();
@@ -139,7 +138,7 @@ TEST_CASE(
   CHECK(late.optimized);
 }
 
-TEST_CASE("The tables show results, failures and last words, in 120 columns", "[team]") {
+TEST_CASE("The tables show results, failures and last words, in 120 columns") {
   const std::string text = to_table(HalfTeam().collect());
   for (const char* expected :
        {"team, one frame", "live, one frame", "100.0%", "FAILED, exit code 3",
@@ -155,7 +154,7 @@ TEST_CASE("The tables show results, failures and last words, in 120 columns", "[
   }
 }
 
-TEST_CASE("A robot without results is reported by its last words only", "[team]") {
+TEST_CASE("A robot without results is reported by its last words only") {
   TeamResult team = HalfTeam().collect();
   CHECK_THAT(to_table(team), !Contains("no such file"));
   team.robots[0].summary.reset();
@@ -163,7 +162,7 @@ TEST_CASE("A robot without results is reported by its last words only", "[team]"
   CHECK(to_table(team) == "a, b failed, exit code 1; their last words:\n  no such key\n");
 }
 
-TEST_CASE("The bytes of robots are compared with a server that receives all keyframes", "[team]") {
+TEST_CASE("The bytes of robots are compared with a server that receives all keyframes") {
   TeamResult team = HalfTeam().collect();
   team.robots[0].summary->keyframes = 1000;  // each has 40 kB, and the robot has sent 3 MB
   CHECK_THAT(to_table(team), Contains("would receive\n40.0 MB, of which the robots send 7.5 %.\n"));
@@ -175,8 +174,7 @@ TEST_CASE("The bytes of robots are compared with a server that receives all keyf
   CHECK_THAT(to_table(team), !Contains("A server"));
 }
 
-TEST_CASE("Errors and frames left out are stated with their remedy, other findings are not",
-          "[team]") {
+TEST_CASE("Errors and frames left out are stated with their remedy, other findings are not") {
   TeamResult team = HalfTeam().collect();
   team.robots[0].summary->findings = {
       {.id = "vocabulary.other",
@@ -193,7 +191,7 @@ TEST_CASE("Errors and frames left out are stated with their remedy, other findin
                  !Contains("memory grows"));
 }
 
-TEST_CASE("The JSON of a run holds every robot, with all of its summary", "[team]") {
+TEST_CASE("The JSON of a run holds every robot, with all of its summary") {
   const HalfTeam half;
   const Json json = half.collect(), summary = half.summary;
   for (const auto& [key, value] : summary.items()) {
@@ -207,8 +205,7 @@ TEST_CASE("The JSON of a run holds every robot, with all of its summary", "[team
   CHECK_FALSE(json.contains("closures"));
 }
 
-TEST_CASE("One half of a divided team is in the team's frame, and the other half is noted",
-          "[team]") {
+TEST_CASE("One half of a divided team is in the team's frame, and the other half is noted") {
   std::vector<RobotResult> robots(5);
   for (const RobotId id : {RobotId{0}, RobotId{1}, RobotId{2}, RobotId{3}}) {
     const RobotId first = id < 2 ? RobotId{0} : RobotId{2};
@@ -223,7 +220,7 @@ TEST_CASE("One half of a divided team is in the team's frame, and the other half
   CHECK(robots[4].in_team_frame);  // the frame is unknown without a summary
 }
 
-TEST_CASE("A robot that never joined is not judged in the team's frame", "[team]") {
+TEST_CASE("A robot that never joined is not judged in the team's frame") {
   const Team three(3);
   three.leave("a", summary_with(1, {1, 2}));
   three.leave("b", summary_with(1, {1, 2}));
@@ -236,7 +233,7 @@ TEST_CASE("A robot that never joined is not judged in the team's frame", "[team]
   CHECK_THAT(to_table(team), Contains("note: c: never joined the others"));
 }
 
-TEST_CASE("Closures are judged in the robots' common world", "[team]") {
+TEST_CASE("Closures are judged in the robots' common world") {
   const EurocFolder recording;  // for its camera
   Team two;
   const std::string closures =
@@ -273,7 +270,7 @@ TEST_CASE("Closures are judged in the robots' common world", "[team]") {
   CHECK_THAT(part.notes[0], StartsWith("b: closures are not judged: "));
 }
 
-TEST_CASE("Meshes are compared with the true one, before and after their correction", "[team]") {
+TEST_CASE("Meshes are compared with the true one, before and after their correction") {
   Team team;
   team.plan.truth_mesh = team.folder.path() / "world.ply";
   write_mesh(team.plan.truth_mesh, corner());
@@ -317,7 +314,7 @@ TEST_CASE("Meshes are compared with the true one, before and after their correct
         0.97);
 }
 
-TEST_CASE("Meshes without a true one are merged, and broken ones named", "[team]") {
+TEST_CASE("Meshes without a true one are merged, and broken ones named") {
   Team team;
   team.leave("a", "mesh_optimized.ply", corner());
   team.folder.write("b/mesh_optimized.ply", "ply, or not");

@@ -26,17 +26,16 @@ void check_page_of_run(const std::string& script) {
   CHECK(result.exit_code == 0);
 }
 
-TEST_CASE("The page has the content of the files of a run, at any time of the run",
-          "[page][slow]") {
+TEST_CASE("The page has the content of the files of a run, at any time of the run", "[slow]") {
   check_page_of_run("page_of_run.mjs");
 }
 
-TEST_CASE("The page opens and turns while another host attacks the viewer", "[page][slow]") {
+TEST_CASE("The page opens and turns while another host attacks the viewer", "[slow]") {
   check_page_of_run("page_under_attack.mjs");
 }
 
 TEST_CASE("The page follows a team that runs, shows its past, and knows how it ended",
-          "[page][demo_world]") {
+          "[demo_world]") {
   std::string why = missing_page_program();
   if (!fs::exists(KM_BIN_DIR "/kimera_multi_simulate")) why = "no simulator (Embree)";
   if (!why.empty()) {
@@ -53,7 +52,7 @@ TEST_CASE("The page follows a team that runs, shows its past, and knows how it e
   CHECK(result.exit_code == 0);
 }
 
-TEST_CASE("The page's model keeps all messages by their time", "[page]") {
+TEST_CASE("The page's model keeps all messages by their time") {
   if (run_command("node --version").exit_code != 0) {
     std::cout << "SKIPPED: no node (apt-get install nodejs)\n";
     return;
@@ -63,7 +62,7 @@ TEST_CASE("The page's model keeps all messages by their time", "[page]") {
   CHECK(result.exit_code == 0);
 }
 
-TEST_CASE("The viewer refuses unusable input", "[viewer]") {
+TEST_CASE("The viewer refuses unusable input") {
   const TemporaryFolder empty;
   const auto result = run_command(kViewer + ' ' + empty.path().string());
   CHECK(result.exit_code == 1);
@@ -80,7 +79,7 @@ DdsConfig loopback(int domain) {
   return config;
 }
 
-TEST_CASE("Messages of the robots of a domain are shown in the page", "[viewer]") {
+TEST_CASE("Messages of the robots of a domain are shown in the page") {
   const int domain = random_domain();
   Process viewer({"sh", "-c",
                   "exec " KM_BIN_DIR "/kimera_multi_viewer --interface lo --port 0 --domain " +

@@ -24,7 +24,7 @@ std::pair<json, std::string> parts_of(const PageMessage& message) {
   return {json::parse(message.bytes.substr(4, length)), message.bytes.substr(4 + length)};
 }
 
-TEST_CASE("A state is sent with its members' names", "[page_message]") {
+TEST_CASE("A state is sent with its members' names") {
   RobotSample state;
   state.name =
       "ro\xff"
@@ -49,7 +49,7 @@ TEST_CASE("A state is sent with its members' names", "[page_message]") {
   CHECK(message["sent_bytes"] == json::parse(R"({"pgo": 1234.0})"));
 }
 
-TEST_CASE("A mesh is sent as its arrays, one after the other", "[page_message]") {
+TEST_CASE("A mesh is sent as its arrays, one after the other") {
   MeshChunk chunk{.key = {3, {-1, 0, 7}, 2}, .anchor = 1};
   chunk.offsets = {{1, 2, 3}, {4, 5, 6}, {7, 8, 65535}};
   chunk.labels = {9, 8, 7};
@@ -71,8 +71,7 @@ TEST_CASE("A mesh is sent as its arrays, one after the other", "[page_message]")
 }
 
 // The page shows every member of an update.
-TEST_CASE("Updates of every kind are the same for the page after encoding and decoding",
-          "[page_message]") {
+TEST_CASE("Updates of every kind are the same for the page after encoding and decoding") {
   for (const ViewContent& content : updates_of_all_kinds()) {
     const PageMessage sent = page_message({0, 1, 0, content}, 1);
     CAPTURE(sent.bytes);
@@ -82,7 +81,7 @@ TEST_CASE("Updates of every kind are the same for the page after encoding and de
   }
 }
 
-TEST_CASE("Poses, closures and objects are lists of numbers", "[page_message]") {
+TEST_CASE("Poses, closures and objects are lists of numbers") {
   const Eigen::Quaterniond turn(0.8, 0.0, 0.0, 0.6);
   const json poses = text_of(
       {0, 1, 0, ViewKeyframes{true, 2, 9, {make_pose(turn.toRotationMatrix(), {1.00004, 2, -3})}}});
@@ -100,7 +99,7 @@ TEST_CASE("Poses, closures and objects are lists of numbers", "[page_message]") 
   CHECK(message["objects"] == json::parse("[[7, [1, -2, 0.5], 0.25, [2, 1, 1.5], [0, 3]]]"));
 }
 
-TEST_CASE("A raster is sent as its runs, an image after its features", "[page_message]") {
+TEST_CASE("A raster is sent as its runs, an image after its features") {
   const ViewRaster raster{
       .kind = RasterKind::kDistances, .origin = {1, 2, 3}, .width = 5, .runs = {5, 31}};
   const auto [object, data] = parts_of(page_message({0, 1, 0, raster}, 1));

@@ -56,7 +56,7 @@ PageServerOptions any_port() {
   return options;
 }
 
-TEST_CASE("The page and all its parts are served from the program", "[page_server]") {
+TEST_CASE("The page and all its parts are served from the program") {
   ViewStore store(1'000'000);
   const PageServer server(store, any_port());
   const int port = port_of(server);
@@ -69,7 +69,7 @@ TEST_CASE("The page and all its parts are served from the program", "[page_serve
   CHECK(get(port, "/../apps/viewer/main.cpp").status >= 400);
 }
 
-TEST_CASE("Pages of other sites are refused", "[page_server]") {
+TEST_CASE("Pages of other sites are refused") {
   ViewStore store(1'000'000);
   const PageServer server(store, any_port());
   const int port = port_of(server);
@@ -110,7 +110,7 @@ class IdleConnection {
   int socket_;
 };
 
-TEST_CASE("A page does not wait until idle connections are closed", "[page_server]") {
+TEST_CASE("A page does not wait until idle connections are closed") {
   ViewStore store(1'000'000);
   const PageServer server(store, any_port());
   const int port = port_of(server);
@@ -120,7 +120,7 @@ TEST_CASE("A page does not wait until idle connections are closed", "[page_serve
   CHECK(std::ranges::all_of(idle, [](const auto& connection) { return connection->is_open(); }));
 }
 
-TEST_CASE("Pages beyond the limit are refused, and files are served still", "[page_server]") {
+TEST_CASE("Pages beyond the limit are refused, and files are served still") {
   ViewStore store(1'000'000);
   const PageServer server(store, any_port());
   const int port = port_of(server);
@@ -137,7 +137,7 @@ TEST_CASE("Pages beyond the limit are refused, and files are served still", "[pa
   CHECK(pages[0]->is_closed());
 }
 
-TEST_CASE("Other hosts need the token", "[page_server]") {
+TEST_CASE("Other hosts need the token") {
   ViewStore store(1'000'000);
   PageServerOptions options = any_port();
   options.address = "0.0.0.0";
@@ -156,7 +156,7 @@ ViewUpdate state_of(const std::string& name) {
   return {3, 1, 0, RobotSample{.name = name}};
 }
 
-TEST_CASE("A page receives the hello message, all past messages, and new ones", "[page_server]") {
+TEST_CASE("A page receives the hello message, all past messages, and new ones") {
   ViewStore store(1'000'000);
   store.add(state_of("early"));
   const PageServer server(store, any_port());
@@ -168,7 +168,7 @@ TEST_CASE("A page receives the hello message, all past messages, and new ones", 
   CHECK(page.receives(R"("name":"later")"));
 }
 
-TEST_CASE("A robot is asked for images as long as any page requests them", "[page_server]") {
+TEST_CASE("A robot is asked for images as long as any page requests them") {
   ViewStore store(1'000'000);
   std::mutex mutex;
   std::condition_variable changed;
@@ -203,7 +203,7 @@ TEST_CASE("A robot is asked for images as long as any page requests them", "[pag
   CHECK(asked == std::vector<std::set<RobotId>>{{3}, {3, 4}, {3}, {}});
 }
 
-TEST_CASE("A port that is taken is named", "[page_server]") {
+TEST_CASE("A port that is taken is named") {
   ViewStore store(1000);
   PageServerOptions options = any_port();
   const PageServer server(store, options);

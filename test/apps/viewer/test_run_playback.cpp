@@ -21,7 +21,7 @@ std::vector<std::pair<double, T>> updates_of(const RunPlayback& run, RobotId rob
   return found;
 }
 
-TEST_CASE("Poses are shown from the time at which they were known", "[run_playback]") {
+TEST_CASE("Poses are shown from the time at which they were known") {
   const SmallRun files;
   const RunPlayback run = read_run(files.folder.path(), kBegin);
   std::size_t odometry = 0, optimized = 0;
@@ -41,7 +41,7 @@ TEST_CASE("Poses are shown from the time at which they were known", "[run_playba
   CHECK(updates_of<ViewPose>(run, 1).size() >= 20);  // two a second at least, in 10 s
 }
 
-TEST_CASE("A mesh chunk is shown in the frame and from the time of its cell", "[run_playback]") {
+TEST_CASE("A mesh chunk is shown in the frame and from the time of its cell") {
   const SmallRun files;
   const auto chunks = updates_of<MeshChunk>(read_run(files.folder.path(), kBegin), 1);
   REQUIRE(chunks.size() == 4);
@@ -55,8 +55,7 @@ TEST_CASE("A mesh chunk is shown in the frame and from the time of its cell", "[
   CHECK(chunks[3].first == Approx(12.0));  // no event names it
 }
 
-TEST_CASE("Objects, maps and the fused mesh of the team are shown at the end of the run",
-          "[run_playback]") {
+TEST_CASE("Objects, maps and the fused mesh of the team are shown at the end of the run") {
   const SmallRun files;
   const RunPlayback run = read_run(files.folder.path(), kBegin);
   const auto objects = updates_of<ViewObjects>(run, 0);
@@ -81,7 +80,7 @@ TEST_CASE("Objects, maps and the fused mesh of the team are shown at the end of 
   CHECK(updates_of<ViewObjects>(run, 1).empty());
 }
 
-TEST_CASE("Damaged layers are noted with their file and left out", "[run_playback]") {
+TEST_CASE("Damaged layers are noted with their file and left out") {
   const SmallRun files;
   const auto [name, bytes] = GENERATE(
       std::pair{"objects.json", R"({"anchor": 0, "objects": [{"label": 1}]})"},
@@ -105,7 +104,7 @@ TEST_CASE("Damaged layers are noted with their file and left out", "[run_playbac
   CHECK(run.updates.size() < all);
 }
 
-TEST_CASE("A closure is shown with each of its stages", "[run_playback]") {
+TEST_CASE("A closure is shown with each of its stages") {
   const SmallRun files;
   std::vector<std::pair<double, ViewClosure>> closures;
   for (const auto& [time_s, update] :
@@ -125,7 +124,7 @@ TEST_CASE("A closure is shown with each of its stages", "[run_playback]") {
   CHECK(closures[4].second.reason == "no pose");
 }
 
-TEST_CASE("A resumed process shows what it has restored, under its own boot id", "[run_playback]") {
+TEST_CASE("A resumed process shows what it has restored, under its own boot id") {
   const SmallRun files;
   JournalFile journal(files.of(0) / kJournal,
                       read_journal(files.of(0) / kJournal, [](const auto&) {}));
@@ -148,8 +147,7 @@ TEST_CASE("A resumed process shows what it has restored, under its own boot id",
   CHECK(verified == 1);
 }
 
-TEST_CASE("Damaged and missing files are noted, and a folder without a run is refused",
-          "[run_playback]") {
+TEST_CASE("Damaged and missing files are noted, and a folder without a run is refused") {
   const SmallRun files;
   std::string journal = files.folder.read("r0/run.journal");
   journal[2000] ^= 1;
@@ -169,8 +167,7 @@ TEST_CASE("Damaged and missing files are noted, and a folder without a run is re
                     Contains("a file, not the folder of a run"));
 }
 
-TEST_CASE("A robot that was killed is shown up to its end, and noted with the remedy",
-          "[run_playback]") {
+TEST_CASE("A robot that was killed is shown up to its end, and noted with the remedy") {
   const SmallRun files;
   fs::remove(files.of(1) / kSummary);
   const RunPlayback run = read_run(files.folder.path(), kBegin);
@@ -231,8 +228,7 @@ void check_knowledge(const Watcher& known, const fs::path& results) {
   CHECK(known.states.back().keyframes == graph.vertices.size());
 }
 
-TEST_CASE("A viewer of a running team and the playback of its run show its results",
-          "[viewer][slow]") {
+TEST_CASE("A viewer of a running team and the playback of its run show its results", "[slow]") {
   const TemporaryFolder folder;
   const int domain = random_domain();
   Audience audience(domain);

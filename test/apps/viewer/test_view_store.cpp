@@ -33,7 +33,7 @@ std::vector<std::uint64_t> numbers(const ViewStore::Batch& batch) {
 
 using Numbers = std::vector<std::uint64_t>;
 
-TEST_CASE("A page receives everything in order, whenever it opens", "[view_store]") {
+TEST_CASE("A page receives everything in order, whenever it opens") {
   ViewStore store(1'000'000);
   for (RobotId robot = 0; robot < 5; ++robot) store.add(pose(robot));
   ViewStore::Cursor early, late;
@@ -45,7 +45,7 @@ TEST_CASE("A page receives everything in order, whenever it opens", "[view_store
   CHECK(numbers(store.take(late, 1'000'000, 0.0)) == Numbers{0, 1, 2, 3, 4, 5});
 }
 
-TEST_CASE("The size of a batch of messages for a page is bounded", "[view_store]") {
+TEST_CASE("The size of a batch of messages for a page is bounded") {
   ViewStore store(1'000'000);
   for (int i = 0; i < 4; ++i) store.add(image(0, 1000));
   ViewStore::Cursor cursor;
@@ -55,7 +55,7 @@ TEST_CASE("The size of a batch of messages for a page is bounded", "[view_store]
   CHECK(numbers(store.take(cursor, 1500, 0.0)) == Numbers{2, 3});
 }
 
-TEST_CASE("Beyond the limit images of the past go first, then replaced meshes", "[view_store]") {
+TEST_CASE("Beyond the limit images of the past go first, then replaced meshes") {
   ViewStore store(10'000);
   ViewStore::Cursor page;
   store.add(chunk(0, 200));   // 0: replaced by 2
@@ -76,7 +76,7 @@ TEST_CASE("Beyond the limit images of the past go first, then replaced meshes", 
   CHECK(all.forgotten.empty());  // it never had those
 }
 
-TEST_CASE("Present states are kept, and new messages without room are refused", "[view_store]") {
+TEST_CASE("Present states are kept, and new messages without room are refused") {
   ViewStore store(5000);
   store.add(chunk(0, 300));
   store.add(chunk(1, 300));  // replaces nothing
@@ -88,7 +88,7 @@ TEST_CASE("Present states are kept, and new messages without room are refused", 
   CHECK(numbers(store.take(page, 1'000'000, 0.0)) == Numbers{0, 1, 3});
 }
 
-TEST_CASE("Messages of an ended process of a robot no longer count", "[view_store]") {
+TEST_CASE("Messages of an ended process of a robot no longer count") {
   ViewStore store(5000);
   store.add(chunk(0, 300));
   store.add(chunk(1, 300));
@@ -97,7 +97,7 @@ TEST_CASE("Messages of an ended process of a robot no longer count", "[view_stor
   CHECK(store.size().forgotten == 1);
 }
 
-TEST_CASE("A message that is repeated without a change reaches pages once", "[view_store]") {
+TEST_CASE("A message that is repeated without a change reaches pages once") {
   ViewStore store(1'000'000);
   const auto closures = [](ClosureStatus first, ClosureStatus second) {
     return ViewUpdate{
@@ -129,8 +129,7 @@ TEST_CASE("A message that is repeated without a change reaches pages once", "[vi
   CHECK(all.messages[7]->bytes.find("rejected") != std::string::npos);
 }
 
-TEST_CASE("A raster replaces the former one of its kind, and a repetition is ignored",
-          "[view_store]") {
+TEST_CASE("A raster replaces the former one of its kind, and a repetition is ignored") {
   ViewStore store(4000);
   const auto raster = [](RasterKind kind, std::size_t bytes) {
     return ViewUpdate{0, 1, 0, ViewRaster{.kind = kind, .runs = std::vector<std::uint8_t>(bytes)}};

@@ -38,7 +38,7 @@ std::optional<TimedPosition> read(FixReader& reader, const Message& message) {
 }
 
 // The numbers are those of the tests of pymap3d (github.com/geospace-code/pymap3d).
-TEST_CASE("positions in WGS 84 become east, north, up about the datum", "[absolute_fixes]") {
+TEST_CASE("positions in WGS 84 become east, north, up about the datum") {
   constexpr double kRounding_m = 1e-4;
   CHECK((ecef_of(kDatum) - Eigen::Vector3d(660675.2518247, -4700948.68316, 4245737.66222)).norm() <
         kRounding_m);
@@ -50,7 +50,7 @@ TEST_CASE("positions in WGS 84 become east, north, up about the datum", "[absolu
     CHECK(std::abs(std::abs(ecef_of({latitude, 15.0, 0.0}).z()) - 6356752.3142) < kRounding_m);
 }
 
-TEST_CASE("unusable fixes are counted by reason", "[absolute_fixes]") {
+TEST_CASE("unusable fixes are counted by reason") {
   FixReader reader(gnss_config());
   const auto good = read(reader, nav_sat_fix(100));
   REQUIRE(good);
@@ -88,7 +88,7 @@ TEST_CASE("unusable fixes are counted by reason", "[absolute_fixes]") {
   CHECK(counts.far_from_datum == 1);
 }
 
-TEST_CASE("without a configured datum the first fix is the datum", "[absolute_fixes]") {
+TEST_CASE("without a configured datum the first fix is the datum") {
   AbsoluteFixesConfig config = gnss_config();
   FixReader configured(config);
   config.datum.clear();
@@ -99,7 +99,7 @@ TEST_CASE("without a configured datum the first fix is the datum", "[absolute_fi
   CHECK(first.datum_id() != configured.datum_id());
 }
 
-TEST_CASE("a configuration that names no source of fixes or two is refused", "[absolute_fixes]") {
+TEST_CASE("a configuration that names no source of fixes or two is refused") {
   AbsoluteFixesConfig config = gnss_config();
   config.file = "fixes.csv";
   CHECK_THROWS_WITH(FixReader(config), Contains("either topic or file"));
@@ -108,8 +108,7 @@ TEST_CASE("a configuration that names no source of fixes or two is refused", "[a
   CHECK_THROWS_WITH(FixReader(config), Contains("latitude, longitude and altitude"));
 }
 
-TEST_CASE("files of motion captures have stamps in s, or in ns in a .csv file",
-          "[absolute_fixes]") {
+TEST_CASE("files of motion captures have stamps in s, or in ns in a .csv file") {
   const TemporaryFolder folder;
   AbsoluteFixesConfig config;
   config.source = FixSource::kMotionCapture;
@@ -158,7 +157,7 @@ RosPoseStamped pose_stamped(Stamp stamp) {
   return pose;
 }
 
-TEST_CASE("fixes are read from one topic of a recording", "[absolute_fixes]") {
+TEST_CASE("fixes are read from one topic of a recording") {
   TwoTopics bag({pose_stamped(1), pose_stamped(2)});
   FixReader reader(motion_capture_config("/pose"));
   CHECK(reader.read(bag).size() == 2);
@@ -167,7 +166,7 @@ TEST_CASE("fixes are read from one topic of a recording", "[absolute_fixes]") {
   CHECK_THROWS_WITH(missing.read(again), Contains("/none"));
 }
 
-TEST_CASE("the node publishes live fixes", "[absolute_fixes]") {
+TEST_CASE("the node publishes live fixes") {
   constexpr Stamp kSecond_ns = 1'000'000'000;
   Topic<OdometryState> states, restored;
   Topic<KeyframeOdometry> keyframes;
@@ -202,7 +201,7 @@ TEST_CASE("the node publishes live fixes", "[absolute_fixes]") {
 
 // A body that turns and moves at constant velocity, with images every 50 ms and a keyframe every
 // 0.5 s.
-TEST_CASE("a fix between images measures the nearest keyframe", "[absolute_fixes]") {
+TEST_CASE("a fix between images measures the nearest keyframe") {
   constexpr Stamp kImage_ns = 50'000'000, kFix_ns = 130'000'000, kFirstFix_ns = 7'000'000;
   const Vector6 velocity{0.3, -0.2, 0.5, 1.0, 0.4, -0.1};
   const Eigen::Vector3d antenna(0.3, -0.2, 0.5);
@@ -239,7 +238,7 @@ TEST_CASE("a fix between images measures the nearest keyframe", "[absolute_fixes
   CHECK(association.unused() > 2 * taken.size());
 }
 
-TEST_CASE("a robot that rests for an hour stores a minute", "[absolute_fixes]") {
+TEST_CASE("a robot that rests for an hour stores a minute") {
   constexpr Stamp kSecond_ns = 1'000'000'000, kHour_ns = 3600 * kSecond_ns;
   FixAssociation association(Eigen::Vector3d::Zero());
   KeyframeOdometry keyframe;
@@ -277,7 +276,7 @@ TEST_CASE("a robot that rests for an hour stores a minute", "[absolute_fixes]") 
   CHECK(taken.back().p_datum.x() == Approx(3599.8));
 }
 
-TEST_CASE("fixes without odometry are stored in a bounded number", "[absolute_fixes]") {
+TEST_CASE("fixes without odometry are stored in a bounded number") {
   FixAssociation association(Eigen::Vector3d::Zero());
   for (std::size_t i = 0; i < FixAssociation::kMaxAhead + 10; ++i)
     association.add(TimedPosition{static_cast<Stamp>(i), Eigen::Vector3d::Zero(), 0.1});

@@ -17,7 +17,7 @@ Json points_of(const Plot& plot) {
   return Json(plot)["series"][0]["points"];
 }
 
-TEST_CASE("A plot is written to JSON with all its properties", "[charts]") {
+TEST_CASE("A plot is written to JSON with all its properties") {
   const Plot plot{
       .title = "t",
       .x_label = "x",
@@ -37,12 +37,12 @@ TEST_CASE("A plot is written to JSON with all its properties", "[charts]") {
       {"name": "d", "colour": 0, "style": "line", "width": 1.6, "points": []}]})"));
 }
 
-TEST_CASE("Numbers have six digits and a number that is not finite is null", "[charts]") {
+TEST_CASE("Numbers have six digits and a number that is not finite is null") {
   const Plot plot{.series = {{.points = {{1.0 / 3.0, 123456789.0}, {kNan, 1e-7}, {2, INFINITY}}}}};
   CHECK(points_of(plot).dump() == "[[0.333333,123457000.0],[null,1e-07],[2.0,null]]");
 }
 
-TEST_CASE("Points too close for a screen are dropped in maps but not in lines", "[charts]") {
+TEST_CASE("Points too close for a screen are dropped in maps but not in lines") {
   Plot plot{.series = {{.points = {}}}};
   for (int i = 0; i <= 100000; ++i) plot.series[0].points.push_back({1e-3 * i, 0.0});
   CHECK(points_of(plot).size() == 100001);
@@ -54,7 +54,7 @@ TEST_CASE("Points too close for a screen are dropped in maps but not in lines", 
     CHECK(kept[i][0].get<double>() - kept[i - 1][0].get<double>() > 0.024);  // a 4000th of 100 m
 }
 
-TEST_CASE("No text of a plot can leave its place in the page", "[charts]") {
+TEST_CASE("No text of a plot can leave its place in the page") {
   const std::string page = chart_page(
       kHostileText,
       {{.title = kHostileText, .series = {{.name = kHostileText}, {.name = "no UTF-8: \xff"}}}});
@@ -97,7 +97,7 @@ std::vector<Plot> plots_to_look_at() {
       {.title = "one point", .series = {{.points = {{0, -3}}, .style = Style::kMarkedLine}}}};
 }
 
-TEST_CASE("Charts in a browser show the content of their plots", "[charts]") {
+TEST_CASE("Charts in a browser show the content of their plots") {
   if (const std::string why = missing_page_program(); !why.empty()) {
     std::cout << "SKIPPED: " << why << '\n';
     return;

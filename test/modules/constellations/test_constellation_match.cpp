@@ -32,8 +32,7 @@ double squared_error(const UncertainPose& estimate, const SE3& truth) {
 }  // namespace
 
 TEST_CASE(
-    "The relative pose is found or refused, never wrong, with any yaw, missing and extra objects",
-    "[constellations]") {
+    "The relative pose is found or refused, never wrong, with any yaw, missing and extra objects") {
   const bool is_street = GENERATE(false, true);
   CAPTURE(is_street);
   constexpr int kScenes = 60;
@@ -52,7 +51,7 @@ TEST_CASE(
   CHECK(found >= (is_street ? 40 : 50));
 }
 
-TEST_CASE("Maps of two streets have no match", "[constellations]") {
+TEST_CASE("Maps of two streets have no match") {
   std::mt19937 rng(11);
   for (int n = 0; n < 200; ++n) {
     CAPTURE(n);
@@ -62,7 +61,7 @@ TEST_CASE("Maps of two streets have no match", "[constellations]") {
   }
 }
 
-TEST_CASE("A symmetric constellation is ambiguous", "[constellations]") {
+TEST_CASE("A symmetric constellation is ambiguous") {
   // Equal objects on a circle at irregular angles, and again half a turn later.
   std::mt19937 rng(7);
   std::vector<TrueObject> scene;
@@ -78,7 +77,7 @@ TEST_CASE("A symmetric constellation is ambiguous", "[constellations]") {
   CHECK(match.second_pairs >= 14);
 }
 
-TEST_CASE("A corridor of equal objects is refused, also if some are missing", "[constellations]") {
+TEST_CASE("A corridor of equal objects is refused, also if some are missing") {
   const auto seed = GENERATE(range(0U, 20U));
   const auto found = GENERATE(1.0, 0.9, 0.75);
   CAPTURE(seed, found);
@@ -91,8 +90,7 @@ TEST_CASE("A corridor of equal objects is refused, also if some are missing", "[
   CHECK(match_constellations(maps.a, maps.b).status != ConstellationStatus::kMatched);
 }
 
-TEST_CASE("The covariance is honest for independent errors and for shifts that a map shares",
-          "[constellations]") {
+TEST_CASE("The covariance is honest for independent errors and for shifts that a map shares") {
   constexpr int kCases = 500;
   const bool is_shifted = GENERATE(false, true);
   CAPTURE(is_shifted);
@@ -118,14 +116,13 @@ TEST_CASE("The covariance is honest for independent errors and for shifts that a
   CHECK(mean > (is_shifted ? 0.3 : 0.05));
 }
 
-TEST_CASE("Constellations without objects, and of one place only, are refused",
-          "[constellations]") {
+TEST_CASE("Constellations without objects, and of one place only, are refused") {
   CHECK(match_constellations({}, {}).status == ConstellationStatus::kTooFew);
   const std::vector<Landmark> heap(20, Landmark{.label = 3, .size_m = {4, 2, 2}});
   CHECK(match_constellations(heap, heap).status == ConstellationStatus::kTooFew);
 }
 
-TEST_CASE("Landmarks that are not finite are refused with their label", "[constellations]") {
+TEST_CASE("Landmarks that are not finite are refused with their label") {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   const std::vector<Landmark> good = {{.label = 7}};

@@ -73,8 +73,7 @@ SE3 pose_in(const RobotObjects& message, const KeyframeId& id) {
   return SE3::Identity();
 }
 
-TEST_CASE("Robots that meet in opposite directions get one closure with the true relative pose",
-          "[constellations]") {
+TEST_CASE("Robots that meet in opposite directions get one closure with the true relative pose") {
   const auto seed = GENERATE(range(0U, 10U));
   CAPTURE(seed);
   const Meeting meeting(seed);
@@ -94,7 +93,7 @@ TEST_CASE("Robots that meet in opposite directions get one closure with the true
   CHECK(error.tail<3>().norm() < 1.0);
 }
 
-TEST_CASE("A closure nearby excludes another one, and one far away does not", "[constellations]") {
+TEST_CASE("A closure nearby excludes another one, and one far away does not") {
   const Meeting meeting(3);
   ConstellationSearch search(kSelf);
   search.add(meeting.own, 0.0);
@@ -112,8 +111,7 @@ TEST_CASE("A closure nearby excludes another one, and one far away does not", "[
   CHECK(all_of(search).size() == expected);
 }
 
-TEST_CASE("Only the robot with the lower id searches, and no robot matches itself",
-          "[constellations]") {
+TEST_CASE("Only the robot with the lower id searches, and no robot matches itself") {
   const Meeting meeting(4);
   ConstellationSearch higher(kOther);
   higher.add(meeting.own, 0.0);
@@ -125,8 +123,7 @@ TEST_CASE("Only the robot with the lower id searches, and no robot matches itsel
   CHECK(alone.is_done());
 }
 
-TEST_CASE("Objects that still change wait, and unchanged ones are matched once",
-          "[constellations]") {
+TEST_CASE("Objects that still change wait, and unchanged ones are matched once") {
   const Meeting meeting(5);
   ConstellationSearch search(kSelf);
   search.add(meeting.own, 0.0);
@@ -141,7 +138,7 @@ TEST_CASE("Objects that still change wait, and unchanged ones are matched once",
   CHECK(search.counts() == counts);
 }
 
-TEST_CASE("A restarted robot is searched again", "[constellations]") {
+TEST_CASE("A restarted robot is searched again") {
   const Meeting meeting(6);
   ConstellationSearch search(kSelf);
   search.add(meeting.own, 0.0);
@@ -153,7 +150,7 @@ TEST_CASE("A restarted robot is searched again", "[constellations]") {
   CHECK(all_of(search, 210.0).size() == 1);
 }
 
-TEST_CASE("A stretch has the nearest landmarks of one visit", "[constellations]") {
+TEST_CASE("A stretch has the nearest landmarks of one visit") {
   std::mt19937 rng(7);
   const RobotObjects one = message_of(kSelf, square(5, rng), SE3::Identity(), 1.0, 0.0, rng);
   CHECK(stretches_of(one, 1).size() == 2);  // the third is too near
@@ -176,7 +173,7 @@ TEST_CASE("A stretch has the nearest landmarks of one visit", "[constellations]"
   }
 }
 
-TEST_CASE("A flood of equal objects ends the search without a closure", "[constellations]") {
+TEST_CASE("A flood of equal objects ends the search without a closure") {
   Meeting meeting(8);
   ConstellationSearch search(kSelf);
   for (RobotObjects* message : {&meeting.own, &meeting.peer}) {
@@ -208,7 +205,7 @@ struct NodeChannels {
   Inbox<ClosureOutcome> reported{outcomes};
 };
 
-TEST_CASE("The started node finds the place, and is then done", "[node]") {
+TEST_CASE("The started node finds the place, and is then done") {
   std::mt19937 rng(2);
   const auto scene = square(24, rng);
   NodeChannels channels;

@@ -6,8 +6,7 @@ namespace {
 
 using Bytes = std::vector<std::uint8_t>;
 
-TEST_CASE("Bytes: hashing eight at a time gives FNV-1a with the last ones padded by zeros",
-          "[core]") {
+TEST_CASE("Bytes: hashing eight at a time gives FNV-1a with the last ones padded by zeros") {
   const auto hash_of = [](const Bytes& bytes) {
     std::uint64_t hash = kFnv1aBasis;
     mix_fnv1a(hash, bytes);
@@ -23,7 +22,7 @@ TEST_CASE("Bytes: hashing eight at a time gives FNV-1a with the last ones padded
   CHECK(hash_of(filled) == hash_of(odd));
 }
 
-TEST_CASE("Bytes: every number is read back unchanged", "[core]") {
+TEST_CASE("Bytes: every number is read back unchanged") {
   ByteWriter out;
   out.u8(0xAB);
   out.u16(0xBEEF);
@@ -51,14 +50,14 @@ TEST_CASE("Bytes: every number is read back unchanged", "[core]") {
   CHECK(in.done());
 }
 
-TEST_CASE("Bytes: the least significant byte comes first", "[core]") {
+TEST_CASE("Bytes: the least significant byte comes first") {
   ByteWriter out;
   out.u32(0x01020304);
   out.f32(1.0F);
   CHECK(out.release() == Bytes{4, 3, 2, 1, 0, 0, 0x80, 0x3F});
 }
 
-TEST_CASE("Bytes: a varint has as many bytes as necessary and one form only", "[core]") {
+TEST_CASE("Bytes: a varint has as many bytes as necessary and one form only") {
   const auto [value, size] = GENERATE(
       table<std::uint64_t, std::size_t>({{0, 1},
                                          {127, 1},
@@ -84,7 +83,7 @@ TEST_CASE("Bytes: a varint has as many bytes as necessary and one form only", "[
   CHECK(padded.failed());
 }
 
-TEST_CASE("Bytes: a varint above 64 bits or its type fails", "[core]") {
+TEST_CASE("Bytes: a varint above 64 bits or its type fails") {
   const Bytes too_long(11, 0xFF);
   Bytes too_large(10, 0xFF);
   too_large.back() = 2;
@@ -96,7 +95,7 @@ TEST_CASE("Bytes: a varint above 64 bits or its type fails", "[core]") {
   CHECK(in.failed());
 }
 
-TEST_CASE("Bytes: counts that exceed the remaining bytes are refused", "[core]") {
+TEST_CASE("Bytes: counts that exceed the remaining bytes are refused") {
   ByteWriter out;
   out.varint(3);
   for (int k = 0; k < 11; ++k) out.u8(0);
@@ -123,7 +122,7 @@ std::uint64_t read_all(const Bytes& bytes) {
   return in.done() ? sum : 0;
 }
 
-TEST_CASE("Bytes: truncated or changed input is read to its end and no further", "[core]") {
+TEST_CASE("Bytes: truncated or changed input is read to its end and no further") {
   ByteWriter out;
   out.varint(20);
   for (std::uint16_t k = 0; k < 20; ++k) out.u16(k);

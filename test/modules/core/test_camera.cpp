@@ -19,7 +19,7 @@ Camera euroc_left() {
                        {-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05})};
 }
 
-TEST_CASE("Unprojecting inverts projecting over the whole image", "[core]") {
+TEST_CASE("Unprojecting inverts projecting over the whole image") {
   const Camera camera = euroc_left();
   for (double u = 0; u <= 752; u += 47)
     for (double v = 0; v <= 480; v += 48) {
@@ -29,12 +29,12 @@ TEST_CASE("Unprojecting inverts projecting over the whole image", "[core]") {
     }
 }
 
-TEST_CASE("A pixel without a bearing has none", "[core]") {
+TEST_CASE("A pixel without a bearing has none") {
   CHECK_FALSE(euroc_left().unproject({1e6, 1e6}).has_value());
   CHECK_FALSE(euroc_left().unproject({std::nan(""), 100.0}).has_value());
 }
 
-TEST_CASE("A ray that does not point forward has no pixel", "[core]") {
+TEST_CASE("A ray that does not point forward has no pixel") {
   const Camera camera = euroc_left();
   CHECK(camera.project_ray({0.2, -0.1, 2.0}) == camera.project({0.1, -0.05}));
   CHECK_FALSE(camera.project_ray({0.1, -0.05, 0.0}).has_value());
@@ -48,7 +48,7 @@ CameraCalibration some_calibration(std::mt19937& rng) {
   return calibration;
 }
 
-TEST_CASE("local_coordinates_to() is the inverse of retracted()", "[calibration]") {
+TEST_CASE("local_coordinates_to() is the inverse of retracted()") {
   std::mt19937 rng(1);
   const CameraCalibration calibration = some_calibration(rng);
   const CalibrationVector delta = 0.1 * random_vector<kCalibrationSize>(rng);
@@ -56,7 +56,7 @@ TEST_CASE("local_coordinates_to() is the inverse of retracted()", "[calibration]
   CHECK(calibration.local_coordinates_to(calibration).norm() < 1e-12);
 }
 
-TEST_CASE("A calibration on top of a correction moves cameras like both in turn", "[calibration]") {
+TEST_CASE("A calibration on top of a correction moves cameras like both in turn") {
   std::mt19937 rng(2);
   const CameraCalibration correction = some_calibration(rng), found = some_calibration(rng);
   StereoRig in_turn, at_once;
@@ -78,7 +78,7 @@ TEST_CASE("A calibration on top of a correction moves cameras like both in turn"
       1e-12);
 }
 
-TEST_CASE("PNG and JPEG files contain their size", "[core]") {
+TEST_CASE("PNG and JPEG files contain their size") {
   const std::string png("\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\2\xF0\0\0\1\xE0", 24);
   CHECK(stated_image_size(png) == ImageSize{752, 480});
   CHECK_FALSE(stated_image_size(png.substr(0, 23)));
@@ -88,7 +88,7 @@ TEST_CASE("PNG and JPEG files contain their size", "[core]") {
   CHECK_FALSE(stated_image_size(jpeg.substr(0, 16)));
 }
 
-TEST_CASE("A file without a size in its header has no size", "[core]") {
+TEST_CASE("A file without a size in its header has no size") {
   CHECK_FALSE(stated_image_size(""));
   CHECK_FALSE(stated_image_size("BM"));
   CHECK_FALSE(stated_image_size("\xFF\xD8"));

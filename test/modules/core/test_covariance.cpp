@@ -11,7 +11,7 @@
 namespace km {
 namespace {
 
-TEST_CASE("The composed covariance is that of sampled products", "[core]") {
+TEST_CASE("The composed covariance is that of sampled products") {
   std::mt19937 rng(5);
   const double sigma = 0.01;  // small, so that first-order propagation is exact to a few per cent
   const UncertainPose a{random_pose(rng, 2.0), random_covariance(rng, sigma)};
@@ -30,8 +30,7 @@ TEST_CASE("The composed covariance is that of sampled products", "[core]") {
   CHECK((sampled - ab.Sigma).norm() < 0.05 * ab.Sigma.norm());
 }
 
-TEST_CASE("The covariance between two poses of a chain is the one composed between them",
-          "[core]") {
+TEST_CASE("The covariance between two poses of a chain is the one composed between them") {
   std::mt19937 rng(7);
   const UncertainPose a_b{random_pose(rng), random_covariance(rng, 0.1)};
   const UncertainPose b_c{random_pose(rng), random_covariance(rng, 0.2)};
@@ -40,7 +39,7 @@ TEST_CASE("The covariance between two poses of a chain is the one composed betwe
   CHECK((found.T.matrix() - b_c.T.matrix()).norm() < 1e-12);
 }
 
-TEST_CASE("A wrong scale moves positions along their own direction", "[core]") {
+TEST_CASE("A wrong scale moves positions along their own direction") {
   std::mt19937 rng(11);
   const UncertainPose a{random_pose(rng), random_covariance(rng, 0.1)};
   const UncertainPose scaled = with_scale_error(a, 0.02);
@@ -51,7 +50,7 @@ TEST_CASE("A wrong scale moves positions along their own direction", "[core]") {
   CHECK((along_fixed_axes(scaled) - expected).norm() < 1e-12);
 }
 
-TEST_CASE("Matrices that are no covariance are refused", "[core]") {
+TEST_CASE("Matrices that are no covariance are refused") {
   CHECK(is_covariance(Matrix6::Identity()));
   CHECK(is_covariance(Matrix6::Zero()));
   Matrix6 bad = Matrix6::Identity();
@@ -63,7 +62,7 @@ TEST_CASE("Matrices that are no covariance are refused", "[core]") {
   CHECK_FALSE(is_covariance(bad));
 }
 
-TEST_CASE("Covariances of states are usable within bounds and if invertible", "[core]") {
+TEST_CASE("Covariances of states are usable within bounds and if invertible") {
   for (const double variance : {1e-16, 1.0, 1e6})
     CHECK(is_usable(variance * StateCovariance::Identity()));
   for (const double variance : {-1.0, 0.0, 1e-17, 1e7, std::nan(""), HUGE_VAL})
@@ -77,7 +76,7 @@ TEST_CASE("Covariances of states are usable within bounds and if invertible", "[
   CHECK_FALSE(is_usable(covariance));  // fully correlated
 }
 
-TEST_CASE("A covariance with lever arms keeps its smallest variances", "[covariance_root]") {
+TEST_CASE("A covariance with lever arms keeps its smallest variances") {
   // 10 km from the origin, 1 mrad makes 10 m; the step itself is certain to 1 mm and 0.1 mrad.
   const SE3 T_b_c = make_pose(Eigen::Matrix3d::Identity(), {10000.0, 2000.0, 0.0});
   UncertainPose T_a_b{.Sigma = 1e-6 * Matrix6::Identity()};
@@ -99,7 +98,7 @@ TEST_CASE("A covariance with lever arms keeps its smallest variances", "[covaria
   CHECK(std::abs(symmetric_eigen(wrong).values.minCoeff() - 1.0) > 1e-3);
 }
 
-TEST_CASE("Directions without variance stay without", "[covariance_root]") {
+TEST_CASE("Directions without variance stay without") {
   CHECK(covariance_of(covariance_root(Matrix6::Zero())) == Matrix6(Matrix6::Zero()));
   Vector6 direction;
   direction << 0.0, 2.0, 0.0, 1.0, -1.0, 3.0;
@@ -109,14 +108,14 @@ TEST_CASE("Directions without variance stay without", "[covariance_root]") {
   CHECK(received->isApprox(Sigma, 1e-6));
 }
 
-TEST_CASE("A root that is not finite is refused", "[covariance_root]") {
+TEST_CASE("A root that is not finite is refused") {
   CovarianceRoot root{};
   root[GENERATE(0U, 9U, 20U)] =
       GENERATE(std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity());
   CHECK_FALSE(covariance_of(root));
 }
 
-TEST_CASE("Weights are equal after conversion to a covariance and back", "[precision]") {
+TEST_CASE("Weights are equal after conversion to a covariance and back") {
   const Precision there{10000.0, 100.0};
   const Matrix6 covariance = covariance_of(there);
   CHECK(covariance(0, 0) == Approx(5e-5));  // [rad^2]
@@ -127,7 +126,7 @@ TEST_CASE("Weights are equal after conversion to a covariance and back", "[preci
   CHECK(back.tau == Approx(there.tau));
 }
 
-TEST_CASE("Weights are those of the blocks of the information matrix", "[precision]") {
+TEST_CASE("Weights are those of the blocks of the information matrix") {
   // Each axis of rotation moves one axis of translation by a lever arm of 40 m.
   const double sigma_rad = 0.01, sigma_m = 0.1, arm_m = 40.0;
   const double variance_m2 = sigma_m * sigma_m + arm_m * arm_m * sigma_rad * sigma_rad;
@@ -144,14 +143,14 @@ TEST_CASE("Weights are those of the blocks of the information matrix", "[precisi
   CHECK(upper.tau == weights.tau);
 }
 
-TEST_CASE("A singular covariance has the weights of its own blocks", "[precision]") {
+TEST_CASE("A singular covariance has the weights of its own blocks") {
   Matrix6 covariance = Matrix6::Zero();
   covariance.diagonal() << 0.0, 0.0, 3e-4, 0.01, 0.02, 0.0;  // moves in a plane
   CHECK(precision_of(covariance).kappa == Approx(5000.0));
   CHECK(precision_of(covariance).tau == Approx(100.0));
 }
 
-TEST_CASE("Weights that are not positive and finite are refused", "[precision]") {
+TEST_CASE("Weights that are not positive and finite are refused") {
   const double infinite = std::numeric_limits<double>::infinity();
   CHECK_THROWS_AS(precision_of(Matrix6::Zero()), std::invalid_argument);
   CHECK_THROWS_AS(precision_of(Matrix6::Constant(std::nan(""))), std::invalid_argument);
@@ -159,7 +158,7 @@ TEST_CASE("Weights that are not positive and finite are refused", "[precision]")
   CHECK_THROWS_AS(covariance_of({1.0, infinite}), std::invalid_argument);
 }
 
-TEST_CASE("Eigenvalues ascend and belong to orthonormal eigenvectors", "[core]") {
+TEST_CASE("Eigenvalues ascend and belong to orthonormal eigenvectors") {
   Eigen::MatrixXd A(2, 2);
   A << 2.0, 1.0, 1.0, 2.0;
   const SymmetricEigen known = symmetric_eigen(A);

@@ -23,7 +23,7 @@ DepthImage plane_depth(const Camera& camera, const Eigen::Vector3d& normal, doub
 
 constexpr double kNoEdge = 1e9;
 
-TEST_CASE("The depth of a slanted plane is exact between pixels", "[core]") {
+TEST_CASE("The depth of a slanted plane is exact between pixels") {
   const Camera camera = small_camera();
   const Eigen::Vector3d normal(0.3, -0.5, 0.9);
   const double distance_m = 4.0;
@@ -42,7 +42,7 @@ TEST_CASE("The depth of a slanted plane is exact between pixels", "[core]") {
   }
 }
 
-TEST_CASE("Pixels without a depth do not affect their neighbours", "[core]") {
+TEST_CASE("Pixels without a depth do not affect their neighbours") {
   DepthImage image = plane_depth(small_camera(), Eigen::Vector3d::UnitZ(), 2.0);
   image.millimetres[10 * 64 + 20] = 0;
   CHECK_FALSE(inverse_depth_at(image, {20.0, 10.0}, kNoEdge).has_value());
@@ -50,7 +50,7 @@ TEST_CASE("Pixels without a depth do not affect their neighbours", "[core]") {
   CHECK(inverse_depth_at(image, {20.6, 10.4}, kNoEdge).value() == Approx(0.5));
 }
 
-TEST_CASE("There is depth on either side of an edge but not across it", "[core]") {
+TEST_CASE("There is depth on either side of an edge but not across it") {
   DepthImage image = plane_depth(small_camera(), Eigen::Vector3d::UnitZ(), 2.0);
   for (std::size_t y = 0; y < 48; ++y)
     for (std::size_t x = 32; x < 64; ++x) image.millimetres[y * 64 + x] = 4000;
@@ -61,7 +61,7 @@ TEST_CASE("There is depth on either side of an edge but not across it", "[core]"
   CHECK(inverse_depth_at(image, {31.5, 20.5}, 0.3).value() == Approx(0.375));
 }
 
-TEST_CASE("Outside the image there is no depth", "[core]") {
+TEST_CASE("Outside the image there is no depth") {
   const DepthImage image = plane_depth(small_camera(), Eigen::Vector3d::UnitZ(), 2.0);
   CHECK(inverse_depth_at(image, {63.0, 47.0}, kNoEdge).has_value());
   CHECK(inverse_depth_at(image, {0.0, 0.0}, kNoEdge).has_value());
@@ -72,7 +72,7 @@ TEST_CASE("Outside the image there is no depth", "[core]") {
   CHECK_FALSE(inverse_depth_at({}, {0.0, 0.0}, kNoEdge).has_value());
 }
 
-TEST_CASE("An RGB-D rig has a disparity of f * baseline / z", "[core]") {
+TEST_CASE("An RGB-D rig has a disparity of f * baseline / z") {
   Camera camera = small_camera();
   camera.T_body_cam.linear() = Eigen::AngleAxisd(0.7, Eigen::Vector3d::UnitY()).matrix();
   const StereoRig rig = rgbd_rig(camera, 0.08);
@@ -87,7 +87,7 @@ TEST_CASE("An RGB-D rig has a disparity of f * baseline / z", "[core]") {
     CHECK_THROWS_AS(rgbd_rig(camera, baseline_m), std::invalid_argument);
 }
 
-TEST_CASE("A frame fits a rig if it has the images of the rig", "[core]") {
+TEST_CASE("A frame fits a rig if it has the images of the rig") {
   const Camera camera = small_camera();
   const GrayImage image{64, 48, std::vector<std::uint8_t>(64 * 48)};
   const StereoRig rgbd = rgbd_rig(camera, 0.1);

@@ -7,7 +7,7 @@
 
 namespace km {
 
-TEST_CASE("The bytes of a file are read unchanged", "[core]") {
+TEST_CASE("The bytes of a file are read unchanged") {
   const TemporaryFolder folder;
   const std::string bytes("a\0\r\n\xFF", 5);
   CHECK(read_input_file(folder.write("some", bytes)) == bytes);
@@ -17,7 +17,7 @@ TEST_CASE("The bytes of a file are read unchanged", "[core]") {
   CHECK(read_input_file("/proc/self/stat").size() > 10);  // has no size until it is read
 }
 
-TEST_CASE("A path that is not a file is refused with its kind", "[core]") {
+TEST_CASE("A path that is not a file is refused with its kind") {
   check_no_files<InputFileError>(".txt", [](const auto& file) { (void)read_input_file(file); });
   const TemporaryFolder folder;
   const auto places = no_files(folder, "");
@@ -34,13 +34,13 @@ TEST_CASE("A path that is not a file is refused with its kind", "[core]") {
   CHECK(problem_of_file("/dev/zero") == "not a file");
 }
 
-TEST_CASE("A text in UTF-16 is refused by name", "[core]") {
+TEST_CASE("A text in UTF-16 is refused by name") {
   const TemporaryFolder folder;
   CHECK_THROWS_WITH(read_input_file(folder.write("a.csv", std::string("\xFF\xFE\x31\0", 4))),
                     Contains("a.csv: a text in UTF-16: save it as UTF-8"));
 }
 
-TEST_CASE("A file beyond the limit is not read", "[core]") {
+TEST_CASE("A file beyond the limit is not read") {
   const TemporaryFolder folder;
   const auto file = folder.write("some", "12345");
   CHECK(read_input_file(file, 5) == "12345");
@@ -49,7 +49,7 @@ TEST_CASE("A file beyond the limit is not read", "[core]") {
   CHECK_THROWS_WITH(read_input_file(file), Contains("larger than 8192 MiB"));
 }
 
-TEST_CASE("A pipe is read until its writer closes it, and refused without a writer", "[core]") {
+TEST_CASE("A pipe is read until its writer closes it, and refused without a writer") {
   const TemporaryFolder folder;
   const fs::path pipe = folder.path() / "pipe";
   REQUIRE(mkfifo(pipe.c_str(), 0600) == 0);
@@ -62,14 +62,13 @@ TEST_CASE("A pipe is read until its writer closes it, and refused without a writ
   CHECK_THROWS_WITH(read_input_file(pipe), Contains("no program has written"));
 }
 
-TEST_CASE("Text in messages is printable and short", "[core]") {
+TEST_CASE("Text in messages is printable and short") {
   CHECK(readable("10 m, \xC3\xA4") == "10 m, \xC3\xA4");
   CHECK(readable("a\x1b[2J\n\x7f") == "a?[2J??");
   CHECK(readable("0123456789", 8) == "0123 ...");
 }
 
-TEST_CASE("Kind and permissions are those of the file that is read and not of its successor",
-          "[core]") {
+TEST_CASE("Kind and permissions are those of the file that is read and not of its successor") {
   namespace fs = std::filesystem;
   const TemporaryFolder folder;
   const fs::path name = folder.path() / "name";

@@ -6,7 +6,7 @@
 
 namespace km {
 
-TEST_CASE("JSON text keeps keys in order and numbers exact and is always valid", "[core]") {
+TEST_CASE("JSON text keeps keys in order and numbers exact and is always valid") {
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   const double third = 1.0 / 3.0;
   const Json json = {{"z", std::numeric_limits<std::uint64_t>::max()},

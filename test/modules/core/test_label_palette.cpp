@@ -22,7 +22,7 @@ bool equal(const std::vector<LabelClass>& a, const std::vector<LabelClass>& b) {
 
 }  // namespace
 
-TEST_CASE("A palette returns its classes by id and by colour", "[core][palette]") {
+TEST_CASE("A palette returns its classes by id and by colour") {
   const LabelPalette palette({{7, "wall", {1, 2, 3}}, {0, "unknown", {0, 0, 0}}});
   REQUIRE(palette.classes().size() == 2);
   CHECK(palette.classes()[0].name == "unknown");
@@ -36,8 +36,7 @@ TEST_CASE("A palette returns its classes by id and by colour", "[core][palette]"
   CHECK_FALSE(LabelPalette().id_of({0, 0, 0}));
 }
 
-TEST_CASE("The first of several colours of an id draws it and all of them mean it",
-          "[core][palette]") {
+TEST_CASE("The first of several colours of an id draws it and all of them mean it") {
   const LabelPalette palette = parse_label_palette(kHeader +
                                                        "furniture,10,20,30,255,4\n"
                                                        "chair,40,50,60,255,4\n"
@@ -50,8 +49,7 @@ TEST_CASE("The first of several colours of an id draws it and all of them mean i
   CHECK(palette.entries().size() == 2);
 }
 
-TEST_CASE("A palette refuses one colour for two ids and names that no table can contain",
-          "[core][palette]") {
+TEST_CASE("A palette refuses one colour for two ids and names that no table can contain") {
   CHECK_THROWS_WITH(LabelPalette({{1, "wall", {9, 9, 9}}, {2, "floor", {9, 9, 9}}}),
                     Contains("9,9,9") && Contains("'floor'") && Contains("id 1 and id 2"));
   for (const std::string name : {"", "a,b", "a#b", "a\nb", " a", "a\t"}) {
@@ -60,7 +58,7 @@ TEST_CASE("A palette refuses one colour for two ids and names that no table can 
   }
 }
 
-TEST_CASE("A bad table is refused with its file, line and value", "[core][palette]") {
+TEST_CASE("A bad table is refused with its file, line and value") {
   const auto refused = [](const std::string& text, const std::string& expected) {
     CAPTURE(text);
     CHECK_THROWS_WITH(parse_label_palette(text, "labels.csv"),
@@ -78,7 +76,7 @@ TEST_CASE("A bad table is refused with its file, line and value", "[core][palett
           ":3: the colour 1,2,3 of 'floor' stands for id 5, but for id 4 in line 2");
 }
 
-TEST_CASE("A palette is equal after writing and reading CSV", "[core][palette]") {
+TEST_CASE("A palette is equal after writing and reading CSV") {
   const LabelPalette palette({{3, "two words", {0, 128, 255}},
                               {255, "Missing", {255, 255, 255}},
                               {3, "alias", {1, 1, 1}},
@@ -89,7 +87,7 @@ TEST_CASE("A palette is equal after writing and reading CSV", "[core][palette]")
   CHECK(copy.id_of({1, 1, 1}) == LabelId{3});
 }
 
-TEST_CASE("Kimera-Semantics' tables are read or refused with a reason", "[core][palette]") {
+TEST_CASE("Kimera-Semantics' tables are read or refused with a reason") {
   const auto folder = shared_data("semantics");
   if (!folder) return;
   int read_count = 0;

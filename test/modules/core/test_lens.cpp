@@ -75,7 +75,7 @@ std::vector<cv::Point2d> points_of_opencv(const Lens& lens,
   return points;
 }
 
-TEST_CASE("Lenses map bearings like OpenCV", "[core][lens]") {
+TEST_CASE("Lenses map bearings like OpenCV") {
   const auto index = GENERATE(range(0, 8));
   CAPTURE(index);
   const Lens lens = all_lenses()[static_cast<std::size_t>(index)];
@@ -89,7 +89,7 @@ TEST_CASE("Lenses map bearings like OpenCV", "[core][lens]") {
   }
 }
 
-TEST_CASE("A double sphere maps bearings like the equations of its paper", "[core][lens]") {
+TEST_CASE("A double sphere maps bearings like the equations of its paper") {
   // Computed by hand at (0.6, -0.8, 1) with xi = -0.2, alpha = 0.6: d1 = sqrt(2), xi d1 + z = 1 -
   // 0.2 sqrt(2), d2 = sqrt(1 + that^2).
   const Lens lens(LensModel::kDoubleSphere, {-0.2, 0.6});
@@ -115,7 +115,7 @@ TEST_CASE("A double sphere maps bearings like the equations of its paper", "[cor
   }
 }
 
-TEST_CASE("Undistorting inverts distorting on the whole disc of a lens", "[core][lens]") {
+TEST_CASE("Undistorting inverts distorting on the whole disc of a lens") {
   const auto index = GENERATE(range(0, 11));
   CAPTURE(index);
   const Lens lens = all_lenses()[static_cast<std::size_t>(index)];
@@ -129,7 +129,7 @@ TEST_CASE("Undistorting inverts distorting on the whole disc of a lens", "[core]
   }
 }
 
-TEST_CASE("Random lenses are one-to-one on their discs", "[core][lens]") {
+TEST_CASE("Random lenses are one-to-one on their discs") {
   const auto seed = GENERATE(1U, 2U, 3U, 4U, 5U, 6U);
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -161,7 +161,7 @@ TEST_CASE("Random lenses are one-to-one on their discs", "[core][lens]") {
   }
 }
 
-TEST_CASE("A lens ends where its distortion folds back", "[core][lens]") {
+TEST_CASE("A lens ends where its distortion folds back") {
   // r - 0.3 r^3 and theta - 0.1 theta^3 have their maxima where their derivatives are 0.
   const Lens pinhole(LensModel::kRadialTangential, {-0.3, 0.0, 0.0, 0.0});
   CHECK(pinhole.max_bearing() == Approx(1.0 / std::sqrt(0.9)));
@@ -182,7 +182,7 @@ TEST_CASE("A lens ends where its distortion folds back", "[core][lens]") {
   }
 }
 
-TEST_CASE("Bearings end at 80 degrees", "[core][lens]") {
+TEST_CASE("Bearings end at 80 degrees") {
   for (const Lens& lens : {Lens(), kEuroc, kTumVi, kTumViDoubleSphere}) {
     CHECK(lens.max_bearing() == Approx(std::tan(80.0 * M_PI / 180.0)).epsilon(1e-12));
     CHECK(lens.distorted({0.0, std::tan(79.9 * M_PI / 180.0)}).has_value());
@@ -196,7 +196,7 @@ TEST_CASE("Bearings end at 80 degrees", "[core][lens]") {
   CHECK(kTumVi.undistorted({256.0 / 190.97, 0.0}).has_value());
 }
 
-TEST_CASE("Invalid coefficients of a lens are refused", "[core][lens]") {
+TEST_CASE("Invalid coefficients of a lens are refused") {
   const auto refuses = [](LensModel model, const std::vector<double>& k) {
     CHECK_THROWS_AS(Lens(model, k), std::invalid_argument);
   };

@@ -23,7 +23,7 @@ KeyframeOdometry keyframe_at(int k, KeyframeIndex index) {
   return keyframe;
 }
 
-TEST_CASE("The newest keyframe has its pose in the pose graph", "[ros_dds]") {
+TEST_CASE("The newest keyframe has its pose in the pose graph") {
   LiveFrames frames;
   CHECK(frames.T_map_odom().isApprox(SE3::Identity()));
   for (int k = 0; k <= 20; ++k) {
@@ -41,8 +41,7 @@ TEST_CASE("The newest keyframe has its pose in the pose graph", "[ros_dds]") {
   CHECK(frames.angular_rate().isApprox(Eigen::Vector3d(0, 0, 0.4), 1e-9));  // 0.02 rad in 50 ms
 }
 
-TEST_CASE("The pose in the map has the covariance of the trajectory and of the steps since",
-          "[ros_dds]") {
+TEST_CASE("The pose in the map has the covariance of the trajectory and of the steps since") {
   LiveFrames frames;
   const auto add = [&](int k, KeyframeIndex index) {
     frames.add(state_at(k));
@@ -67,7 +66,7 @@ TEST_CASE("The pose in the map has the covariance of the trajectory and of the s
   CHECK(frames.T_map_body(T_odom_body).Sigma.isApprox(compose(solved, step).Sigma, 1e-12));
 }
 
-TEST_CASE("The pose in the map has the error of the map's scale", "[ros_dds]") {
+TEST_CASE("The pose in the map has the error of the map's scale") {
   LiveFrames frames;
   frames.add(state_at(0));
   frames.add(keyframe_at(0, 0));
@@ -79,7 +78,7 @@ TEST_CASE("The pose in the map has the error of the map's scale", "[ros_dds]") {
   CHECK(along_fixed_axes(pose).topLeftCorner<3, 3>().trace() == Approx(5.0 * 5.0));
 }
 
-TEST_CASE("Keyframes of an earlier incarnation do not correct odometry", "[ros_dds]") {
+TEST_CASE("Keyframes of an earlier incarnation do not correct odometry") {
   LiveFrames frames;
   frames.add(state_at(0));
   frames.add(keyframe_at(0, 7));
@@ -92,7 +91,7 @@ SE3 at(double x, double y, double yaw = 0.0) {
   return make_pose(so3_exp({0, 0, yaw}), Eigen::Vector3d(x, y, 0));
 }
 
-TEST_CASE("Odometry beyond the last optimised keyframe follows it rigidly", "[core]") {
+TEST_CASE("Odometry beyond the last optimised keyframe follows it rigidly") {
   // In the optimised graph the body turned left while moving to (0, 1); in odometry it went
   // straight.
   const std::vector<StampedPose> odometry = {{0, at(0, 0)}, {1, at(1, 0)}, {2, at(3, 0)}};
@@ -103,14 +102,14 @@ TEST_CASE("Odometry beyond the last optimised keyframe follows it rigidly", "[co
   CHECK((corrected[2].T.translation() - Eigen::Vector3d(0, 3, 0)).norm() < 1e-12);
 }
 
-TEST_CASE("Between two keyframes the correction is interpolated in time", "[core]") {
+TEST_CASE("Between two keyframes the correction is interpolated in time") {
   const std::vector<StampedPose> odometry = {{0, at(0, 0)}, {1, at(1, 0)}, {4, at(4, 0)}};
   const std::vector<StampedPose> keyframes = {{0, at(0, 0)}, {4, at(4, 2)}};
   const auto corrected = correct_odometry(odometry, keyframes);
   CHECK((corrected[1].T.translation() - Eigen::Vector3d(1, 0.5, 0)).norm() < 1e-12);
 }
 
-TEST_CASE("A rigid change of frame moves every pose rigidly", "[core]") {
+TEST_CASE("A rigid change of frame moves every pose rigidly") {
   std::mt19937 rng(11);
   const SE3 T_world_odom = random_pose(rng);
   std::vector<StampedPose> odometry;
@@ -125,7 +124,7 @@ TEST_CASE("A rigid change of frame moves every pose rigidly", "[core]") {
   }
 }
 
-TEST_CASE("Without a common instant odometry is returned unchanged", "[core]") {
+TEST_CASE("Without a common instant odometry is returned unchanged") {
   const std::vector<StampedPose> odometry = {{0, at(0, 0)}, {2, at(1, 0)}};
   const std::vector<StampedPose> keyframes = {{1, at(9, 9)}};
   CHECK(correct_odometry(odometry, keyframes)[1].T.matrix() == odometry[1].T.matrix());

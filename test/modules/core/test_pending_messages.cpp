@@ -19,8 +19,7 @@ std::vector<std::string> serve_all(Pending& pending, const std::vector<int>& are
   return served;
 }
 
-TEST_CASE("Waiting messages are served oldest first and in turn between the senders",
-          "[pending_messages]") {
+TEST_CASE("Waiting messages are served oldest first and in turn between the senders") {
   Pending pending;
   for (const char* message : {"a1", "a2", "a3"}) REQUIRE(pending.push(1, message, 1, 0.0));
   REQUIRE(pending.push(2, "b1", 1, 0.0));
@@ -32,7 +31,7 @@ TEST_CASE("Waiting messages are served oldest first and in turn between the send
   CHECK(pending.empty());
 }
 
-TEST_CASE("A full queue refuses messages and removed messages make room", "[pending_messages]") {
+TEST_CASE("A full queue refuses messages and removed messages make room") {
   Pending pending({.bytes = 15, .bytes_of_one = 10});
   CHECK(pending.push(1, "a1", 6, 0.0));
   CHECK_FALSE(pending.push(1, "a2", 6, 0.0));
@@ -45,7 +44,7 @@ TEST_CASE("A full queue refuses messages and removed messages make room", "[pend
   CHECK(serve_all(pending, {1, 2}) == std::vector<std::string>{"a4", "b2"});
 }
 
-TEST_CASE("The waiting time of a message is known", "[pending_messages]") {
+TEST_CASE("The waiting time of a message is known") {
   Pending pending;
   REQUIRE(pending.push(1, "a", 1, 10.0));
   double waited_s = 0.0;

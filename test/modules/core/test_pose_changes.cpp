@@ -21,7 +21,7 @@ std::size_t stated(StatedPoses& poses, const Trajectory& trajectory) {
 
 }  // namespace
 
-TEST_CASE("A pose is stated again when it has moved", "[core]") {
+TEST_CASE("A pose is stated again when it has moved") {
   StatedPoses poses;
   Trajectory trajectory{kSelf, kSelf, line(100)};
   CHECK(stated(poses, trajectory) == 100);
@@ -58,7 +58,7 @@ TEST_CASE("A pose is stated again when it has moved", "[core]") {
   }
 }
 
-TEST_CASE("Covariances and poses of other robots are stated when they change", "[core]") {
+TEST_CASE("Covariances and poses of other robots are stated when they change") {
   StatedPoses poses;
   Trajectory trajectory{kSelf, kSelf, line(3)};
   CHECK(stated(poses, trajectory) == 3);

@@ -5,7 +5,7 @@
 namespace km {
 namespace {
 
-TEST_CASE("A file is replaced as a whole and leaves no other file", "[files]") {
+TEST_CASE("A file is replaced as a whole and leaves no other file") {
   const TemporaryFolder folder;
   folder.write("a", "what was there before is longer");
   write_file(folder.path() / "a", "new");
@@ -13,8 +13,7 @@ TEST_CASE("A file is replaced as a whole and leaves no other file", "[files]") {
   CHECK(std::distance(fs::directory_iterator(folder.path()), {}) == 1);
 }
 
-TEST_CASE("A file that cannot be written is reported with the reason and the former file stays",
-          "[files]") {
+TEST_CASE("A file that cannot be written is reported with the reason and the former file stays") {
   const TemporaryFolder folder;
   const fs::path taken = folder.path() / "taken";
   fs::create_directory(taken);
@@ -28,7 +27,7 @@ TEST_CASE("A file that cannot be written is reported with the reason and the for
   CHECK(folder.read("a") == "old");
 }
 
-TEST_CASE("A device is written in place and a full device is reported", "[files]") {
+TEST_CASE("A device is written in place and a full device is reported") {
   CHECK_NOTHROW(write_file("/dev/null", "x"));
   CHECK(fs::is_character_file("/dev/null"));
   CHECK_THROWS_WITH(write_file("/dev/full", "x"),
@@ -39,7 +38,7 @@ TEST_CASE("A device is written in place and a full device is reported", "[files]
   CHECK(waiting == "x");
 }
 
-TEST_CASE("A link stays a link and its file is written", "[files]") {
+TEST_CASE("A link stays a link and its file is written") {
   const TemporaryFolder folder;
   folder.write("file", "old");
   fs::create_symlink("file", folder.path() / "link");
@@ -48,7 +47,7 @@ TEST_CASE("A link stays a link and its file is written", "[files]") {
   CHECK(folder.read("file") == "new");
 }
 
-TEST_CASE("A link in place of the partial file is not followed", "[files]") {
+TEST_CASE("A link in place of the partial file is not followed") {
   const TemporaryFolder folder;
   folder.write("elsewhere", "old");
   fs::create_symlink("elsewhere", folder.path() / "a.part");
@@ -59,7 +58,7 @@ TEST_CASE("A link in place of the partial file is not followed", "[files]") {
   CHECK_FALSE(fs::exists(folder.path() / "a.part"));
 }
 
-TEST_CASE("A file for its owner alone can never be read by other users", "[files]") {
+TEST_CASE("A file for its owner alone can never be read by other users") {
   const TemporaryFolder folder;
   const fs::path secret = folder.path() / "secret";
   const fs::path elsewhere = folder.write("elsewhere", "old");
@@ -85,7 +84,7 @@ TEST_CASE("A file for its owner alone can never be read by other users", "[files
   CHECK_FALSE(fs::exists(folder.path() / "secret.part"));
 }
 
-TEST_CASE("Appended bytes follow the existing ones", "[files]") {
+TEST_CASE("Appended bytes follow the existing ones") {
   const TemporaryFolder folder;
   const bool durable = GENERATE(false, true);
   for (std::string line : {"one\n", "two\n"}) {

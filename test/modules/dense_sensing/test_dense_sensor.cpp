@@ -19,7 +19,7 @@ std::shared_ptr<const LabelImage> halves(const Camera& camera) {
   return labels;
 }
 
-TEST_CASE("Recorded depth and labels are not changed", "[dense_sensor]") {
+TEST_CASE("Recorded depth and labels are not changed") {
   const StereoRig rig = rgbd_rig(test_rig().cameras[0], 0.1);
   DenseSensor sensor(rig, {.labels = LabelsFrom::kImages});
   CHECK(sensor.camera().lens == rig.cameras[0].lens);
@@ -41,7 +41,7 @@ TEST_CASE("Recorded depth and labels are not changed", "[dense_sensor]") {
   CHECK(metric.sense(frame).labels == nullptr);
 }
 
-TEST_CASE("Labels and colours follow the pixels of rectified depth", "[dense_sensor]") {
+TEST_CASE("Labels and colours follow the pixels of rectified depth") {
   const StereoRig rig = test_rig();
   DenseSensorConfig config{.depth = DepthFrom::kStereo, .labels = LabelsFrom::kImages};
   config.stereo.downscale = GENERATE(1, 2);
@@ -75,7 +75,7 @@ TEST_CASE("Labels and colours follow the pixels of rectified depth", "[dense_sen
     }
 }
 
-TEST_CASE("A network labels the left image", "[dense_sensor]") {
+TEST_CASE("A network labels the left image") {
   const TemporaryFolder folder;
   PointwiseNetwork network;  // dark 0, bright 1
   network.weights = {{0.0F}, {1.0F}};
@@ -96,7 +96,7 @@ TEST_CASE("A network labels the left image", "[dense_sensor]") {
   CHECK(images.unmapped_pixels == images.labels->ids.size());
 }
 
-TEST_CASE("Images that are missing or of the wrong size are reported", "[dense_sensor]") {
+TEST_CASE("Images that are missing or of the wrong size are reported") {
   const StereoRig rig = test_rig();
   const StereoRig depth_rig = rgbd_rig(rig.cameras[0], 0.1);
   DenseSensor recorded(depth_rig, {.labels = LabelsFrom::kImages});
@@ -158,7 +158,7 @@ struct Bench {
   }
 };
 
-TEST_CASE("Frames are published at the rate with the camera's pose", "[dense_sensing_node]") {
+TEST_CASE("Frames are published at the rate with the camera's pose") {
   Bench bench;
   for (int i = 0; i < 41; ++i) bench.node->step(bench.frame(i, true));
   REQUIRE(bench.published.size() == 11);  // 2 s, both ends
@@ -174,7 +174,7 @@ TEST_CASE("Frames are published at the rate with the camera's pose", "[dense_sen
   CHECK(bench.last.without_labels == 11);
 }
 
-TEST_CASE("The camera's pose uses the estimated mounting", "[dense_sensing_node]") {
+TEST_CASE("The camera's pose uses the estimated mounting") {
   Bench bench;
   LocatedFrame frame = bench.frame(1, true);
   frame.T_body_rig =
@@ -187,7 +187,7 @@ TEST_CASE("The camera's pose uses the estimated mounting", "[dense_sensing_node]
   CHECK(expected.translation().y() == Approx(0.2 - 0.5 * std::sin(0.1)));
 }
 
-TEST_CASE("The next frame replaces a due frame without depth", "[dense_sensing_node]") {
+TEST_CASE("The next frame replaces a due frame without depth") {
   Bench bench;
   for (int i = 0; i < 40; ++i) bench.node->step(bench.frame(i, i % 3 == 1));
   REQUIRE(bench.published.size() >= 7);  // every 0.3 s
@@ -196,8 +196,7 @@ TEST_CASE("The next frame replaces a due frame without depth", "[dense_sensing_n
   CHECK(bench.last.frames == bench.published.size());
 }
 
-TEST_CASE("Due frames are dropped and counted while odometry needs the processors",
-          "[dense_sensing_node]") {
+TEST_CASE("Due frames are dropped and counted while odometry needs the processors") {
   Bench bench;
   for (int i = 0; i < 41; ++i) {
     if (i == 8) bench.load.publish(ShedLoad{.map = true, .stride = 1});

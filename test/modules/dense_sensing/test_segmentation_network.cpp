@@ -34,7 +34,7 @@ GrayImage stripes(int width, int height) {
   return image;
 }
 
-TEST_CASE("A network labels every pixel by the class with the best score", "[segmentation]") {
+TEST_CASE("A network labels every pixel by the class with the best score") {
   const TemporaryFolder folder;
   SegmentationNetwork network(config_of(folder.write("net.onnx", three_levels().onnx())));
   const Segmentation result = network.segment(stripes(16, 8));
@@ -48,7 +48,7 @@ TEST_CASE("A network labels every pixel by the class with the best score", "[seg
     }
 }
 
-TEST_CASE("Mean, scale and channels are applied before the network", "[segmentation]") {
+TEST_CASE("Mean, scale and channels are applied before the network") {
   const TemporaryFolder folder;
   PointwiseNetwork three = three_levels();
   three.channels = 3;
@@ -64,8 +64,7 @@ TEST_CASE("Mean, scale and channels are applied before the network", "[segmentat
   CHECK(int{result.labels.ids[9]} == 2);
 }
 
-TEST_CASE("Classes become the labels of the map and further classes are counted",
-          "[segmentation]") {
+TEST_CASE("Classes become the labels of the map and further classes are counted") {
   const TemporaryFolder folder;
   SegmentationConfig config = config_of(folder.write("net.onnx", three_levels().onnx()));
   config.label_map = {"7", "9"};
@@ -77,7 +76,7 @@ TEST_CASE("Classes become the labels of the map and further classes are counted"
   CHECK(result.unmapped_pixels == 4 * 8);
 }
 
-TEST_CASE("A single plane holds class numbers", "[segmentation]") {
+TEST_CASE("A single plane holds class numbers") {
   const TemporaryFolder folder;
   PointwiseNetwork numbers;
   numbers.weights = {{255.0F}};  // the grey level again
@@ -89,7 +88,7 @@ TEST_CASE("A single plane holds class numbers", "[segmentation]") {
   CHECK(int{result.labels.ids[9]} == 182);
 }
 
-TEST_CASE("A network that cannot be used is refused with the reason", "[segmentation]") {
+TEST_CASE("A network that cannot be used is refused with the reason") {
   const TemporaryFolder folder;
   const auto fails_with = [](const SegmentationConfig& config, const std::string& words) {
     CAPTURE(words);

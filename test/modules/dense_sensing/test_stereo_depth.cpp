@@ -58,7 +58,7 @@ DepthError error_on(const StereoRig& rig, const StereoDepthConfig& config,
   return compare(stereo.compute(frame.left, frame.right), stereo, plane, T_world_body);
 }
 
-TEST_CASE("With any lens a plane has the right depth", "[stereo_depth]") {
+TEST_CASE("With any lens a plane has the right depth") {
   struct Case {
     double focal_px;
     Lens lens;
@@ -80,7 +80,7 @@ TEST_CASE("With any lens a plane has the right depth", "[stereo_depth]") {
   CHECK(error.share > kMatchedShare);
 }
 
-TEST_CASE("A fisheye lens of 190 degrees is rectified to a view of some 120", "[stereo_depth]") {
+TEST_CASE("A fisheye lens of 190 degrees is rectified to a view of some 120") {
   StereoRig rig = test_rig();
   for (Camera& camera : rig.cameras) {
     camera.fx = camera.fy = 0.5 * camera.width / (95.0 * M_PI / 180.0);
@@ -94,7 +94,7 @@ TEST_CASE("A fisheye lens of 190 degrees is rectified to a view of some 120", "[
   CHECK(cv::countNonZero(rectification.seen()) == camera.width * camera.height);
 }
 
-TEST_CASE("Cameras that are rotated and have different lenses are rectified", "[stereo_depth]") {
+TEST_CASE("Cameras that are rotated and have different lenses are rectified") {
   StereoRig rig = test_rig();
   rig.cameras[1].T_body_cam =
       make_pose(so3_exp(Eigen::Vector3d(0.02, -0.03, 0.025)), {0.11, 0.004, -0.003});
@@ -107,12 +107,12 @@ TEST_CASE("Cameras that are rotated and have different lenses are rectified", "[
   CHECK(error.share > kMatchedShare);
 }
 
-TEST_CASE("Depth out of range is dropped", "[stereo_depth]") {
+TEST_CASE("Depth out of range is dropped") {
   StereoDepthConfig config{.max_depth_m = 1.5};
   CHECK(error_on(test_rig(), config, TexturedPlane{}, SE3::Identity()).share < 0.01);
 }
 
-TEST_CASE("Rigs and depth ranges without disparities to search are refused", "[stereo_depth]") {
+TEST_CASE("Rigs and depth ranges without disparities to search are refused") {
   const StereoRig rig = test_rig();
   CHECK_THROWS_AS(StereoDepth(rgbd_rig(rig.cameras[0], 0.1), {}), std::invalid_argument);
   StereoRig swapped = rig;
@@ -218,7 +218,7 @@ void check(const std::vector<StereoPairFile>& pairs, const StereoRig& rig, std::
   CHECK(median_of(differences.px) < kMaxMedian_px);
 }
 
-TEST_CASE("Dense depth agrees with triangulated corners on MH_01", "[stereo_depth][recorded]") {
+TEST_CASE("Dense depth agrees with triangulated corners on MH_01") {
   const auto folder = shared_data("euroc/MH_01_easy");
   if (!folder) return;
   ReaderReport report;

@@ -13,8 +13,7 @@ Finding finding_of(const char* id, Severity severity) {
 
 }  // namespace
 
-TEST_CASE("Findings are sorted by severity, and the most severe gives the exit code",
-          "[diagnosis]") {
+TEST_CASE("Findings are sorted by severity, and the most severe gives the exit code") {
   std::vector<Finding> findings = {
       finding_of("a", Severity::kNote), finding_of("b", Severity::kError),
       finding_of("c", Severity::kNote), finding_of("d", Severity::kWarning),
@@ -29,7 +28,7 @@ TEST_CASE("Findings are sorted by severity, and the most severe gives the exit c
   CHECK(exit_code_of({}) == 0);
 }
 
-TEST_CASE("A finding is three lines for people", "[diagnosis]") {
+TEST_CASE("A finding is three lines for people") {
   Finding finding = finding_of("stereo.swapped", Severity::kWarning);
   CHECK(to_text(std::span(&finding, 1)) ==
         "warning stereo.swapped: 7 of 9\n  means: m\n  to do: t\n");
@@ -58,7 +57,7 @@ SensorSample regular() {
 
 }  // namespace
 
-TEST_CASE("Rates and gaps of a recording are found", "[diagnosis]") {
+TEST_CASE("Rates and gaps of a recording are found") {
   struct Case {
     std::string ids;
     void (*change)(SensorSample&);
@@ -95,7 +94,7 @@ TEST_CASE("Rates and gaps of a recording are found", "[diagnosis]") {
   CHECK(ids_of(examine_streams(sample, {})) == c.ids);
 }
 
-TEST_CASE("Faults of a reader become findings by their share", "[diagnosis]") {
+TEST_CASE("Faults of a reader become findings by their share") {
   const SensorSample sample = regular();
   const auto with = [&](std::size_t count) {
     ReaderReport report;
@@ -116,7 +115,7 @@ TEST_CASE("Faults of a reader become findings by their share", "[diagnosis]") {
              Contains("20 images missing between others, 4.8 %"));
 }
 
-TEST_CASE("Images that are dark, bright, blurred or empty are found", "[diagnosis]") {
+TEST_CASE("Images that are dark, bright, blurred or empty are found") {
   const auto looks_of = [](double level, double saturated, double sharpness, std::size_t corners) {
     SensorSample sample;
     sample.qualities.assign(10, {level, saturated, sharpness, corners});
@@ -130,7 +129,7 @@ TEST_CASE("Images that are dark, bright, blurred or empty are found", "[diagnosi
   CHECK(ids_of(examine_images({})).empty());
 }
 
-TEST_CASE("Gravity shows the unit of the accelerometer", "[diagnosis]") {
+TEST_CASE("Gravity shows the unit of the accelerometer") {
   const auto with = [](double norm) {
     SensorSample sample = regular();
     for (ImuSample& measured : sample.imu) measured.accel = {0.0, norm, 0.0};
@@ -144,7 +143,7 @@ TEST_CASE("Gravity shows the unit of the accelerometer", "[diagnosis]") {
   CHECK(with(32.2) == "warning imu.gravity ");
 }
 
-TEST_CASE("A vocabulary that maps all features to few words is found", "[diagnosis]") {
+TEST_CASE("A vocabulary that maps all features to few words is found") {
   // A word for each of 256 first bytes, in two levels of 16.
   VocabularyData tree{.branching = 16, .depth = 2};
   const auto descriptor = [](int byte) {

@@ -49,7 +49,7 @@ std::vector<StereoMatches> seen_by(const StereoRig& truth, double wrong_share = 
 
 }  // namespace
 
-TEST_CASE("A fault of the pair's calibration is identified", "[diagnosis]") {
+TEST_CASE("A fault of the pair's calibration is identified") {
   const StereoFault fault = GENERATE(StereoFault::kInvertedPair, StereoFault::kInvertedCameras,
                                      StereoFault::kInvertedLeft, StereoFault::kInvertedRight);
   CAPTURE(static_cast<int>(fault));
@@ -63,7 +63,7 @@ TEST_CASE("A fault of the pair's calibration is identified", "[diagnosis]") {
   CHECK(best_alternative(images, rig()).fault == StereoFault::kSwappedImages);
 }
 
-TEST_CASE("A turned right camera is no fault of focal lengths", "[diagnosis]") {
+TEST_CASE("A turned right camera is no fault of focal lengths") {
   constexpr double kTurned_rad = 0.005;  // 2.3 px; a focal length does the same to a stripe
   StereoRig turned = rig();
   turned.cameras[1].T_body_cam.rotate(Eigen::AngleAxisd(kTurned_rad, Eigen::Vector3d::UnitX()));
@@ -72,7 +72,7 @@ TEST_CASE("A turned right camera is no fault of focal lengths", "[diagnosis]") {
   CHECK(best_alternative(images, rig()).fault == StereoFault::kNone);
 }
 
-TEST_CASE("Random matches fit no calibration", "[diagnosis]") {
+TEST_CASE("Random matches fit no calibration") {
   const StereoAlternative best = best_alternative(seen_by(rig(), 1.0), rig());
   CHECK(best.fault == StereoFault::kNone);
   CHECK(best.fit.inlier_ratio < 0.1);
@@ -110,7 +110,7 @@ std::vector<BearingStep> seen_points(const Eigen::Vector3d& rotation, const Eige
 
 }  // namespace
 
-TEST_CASE("The rotation between two images is found with any translation", "[diagnosis]") {
+TEST_CASE("The rotation between two images is found with any translation") {
   std::mt19937 rng(GENERATE(1U, 2U, 3U));
   const Eigen::Vector3d rotation(0.03, -0.05, 0.02);
   const Eigen::Vector3d t = GENERATE(Eigen::Vector3d(0.0, 0.0, 0.0), Eigen::Vector3d(0.1, 0.0, 0.0),
@@ -169,8 +169,7 @@ double degrees_between(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b) {
 
 }  // namespace
 
-TEST_CASE("Mounting and offset and scale follow from rotations of camera and gyroscope",
-          "[diagnosis]") {
+TEST_CASE("Mounting and offset and scale follow from rotations of camera and gyroscope") {
   const double scale = GENERATE(1.0, 57.2958), late_s = GENERATE(0.0, 0.0203, -0.0467);
   CAPTURE(scale, late_s);
   const auto fit = fit_inertial(seen(kMounting), samples(scale, late_s));
@@ -186,7 +185,7 @@ TEST_CASE("Mounting and offset and scale follow from rotations of camera and gyr
   CHECK((fit->constant + kMounting * bias).norm() < 2e-3);
 }
 
-TEST_CASE("Steps outside the samples do not count and too few steps give no fit", "[diagnosis]") {
+TEST_CASE("Steps outside the samples do not count and too few steps give no fit") {
   auto steps = seen(kMounting);
   for (VisualRotation& step : steps) step.from += 60'000'000'000, step.to += 60'000'000'000;
   CHECK_FALSE(fit_inertial(steps, samples(1.0, 0.0)));
@@ -274,7 +273,7 @@ InertialFit rough_fit() {
 
 }  // namespace
 
-TEST_CASE("The focal length follows from the gyroscope's rotation", "[diagnosis]") {
+TEST_CASE("The focal length follows from the gyroscope's rotation") {
   const double given = GENERATE(0.97, 1.0, 1.03);
   CAPTURE(given);
   const auto exact =

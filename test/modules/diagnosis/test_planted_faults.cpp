@@ -62,7 +62,7 @@ void swap_images(SensorSample& sample) {
 
 }  // namespace
 
-TEST_CASE("MH_01 gives no findings, and an inserted fault is the only one", "[diagnosis]") {
+TEST_CASE("MH_01 gives no findings, and an inserted fault is the only one") {
   if (!machine_hall()) return;
   struct Case {
     Ids ids;
@@ -153,7 +153,7 @@ TEST_CASE("MH_01 gives no findings, and an inserted fault is the only one", "[di
   CHECK(found_in(recorded) == c.ids);
 }
 
-TEST_CASE("A pair that is turned a little is not one of another mode", "[diagnosis]") {
+TEST_CASE("A pair that is turned a little is not one of another mode") {
   if (!machine_hall()) return;
   StereoRig rig = machine_hall()->rig.stereo;
   rig.cameras[1].T_body_cam.linear() *=
@@ -161,7 +161,7 @@ TEST_CASE("A pair that is turned a little is not one of another mode", "[diagnos
   CHECK(best_alternative(machine_hall()->sample.stereo, rig).fault != StereoFault::kOtherMode);
 }
 
-TEST_CASE("V1_01 at rest gives no findings and no figures that need motion", "[diagnosis]") {
+TEST_CASE("V1_01 at rest gives no findings and no figures that need motion") {
   const auto data = shared_data("euroc/V1_01_easy");
   if (!data) return;
   const TemporaryFolder folder;
@@ -173,7 +173,7 @@ TEST_CASE("V1_01 at rest gives no findings and no figures that need motion", "[d
 }
 
 TEST_CASE("The world of the demo gives no findings and an inserted fault is the only one",
-          "[diagnosis][demo_world]") {
+          "[demo_world]") {
   if (!fs::exists(kDemoWorld)) {
     std::cout << "SKIPPED: the test of the demo has not rendered its world\n";
     return;

@@ -109,7 +109,7 @@ std::size_t check_all(const World& world, const DistanceField& field) {
   return known;
 }
 
-TEST_CASE("Distances equal brute force while obstacles come and go", "[distance_field]") {
+TEST_CASE("Distances equal brute force while obstacles come and go") {
   const auto seed = GENERATE(1U, 2U, 3U);
   CAPTURE(seed);
   std::mt19937 random(seed);
@@ -148,7 +148,7 @@ TEST_CASE("Distances equal brute force while obstacles come and go", "[distance_
   }
 }
 
-TEST_CASE("A slice has the distances to a wall", "[distance_field]") {
+TEST_CASE("A slice has the distances to a wall") {
   World world(3);  // wall at x >= 12, with its surface at x = 11.5 voxels
   for (int x = 12; x < world.side(); ++x)
     for (int y = 0; y < world.side(); ++y)
@@ -168,7 +168,7 @@ DepthImage wall_at(std::uint16_t millimetres) {
   return {160, 120, std::vector<std::uint16_t>(160 * 120, millimetres)};
 }
 
-TEST_CASE("The mapper reports space from which distances to a wall follow", "[distance_field]") {
+TEST_CASE("The mapper reports space from which distances to a wall follow") {
   const Camera camera{.width = 160, .height = 120, .fx = 80, .fy = 80, .cx = 79.5, .cy = 59.5};
   SemanticMappingConfig config{.voxel_size_m = kVoxel_m, .min_views = 1, .window_m = 3.0};
   SemanticMapper mapper(config, camera);

@@ -49,7 +49,7 @@ std::vector<TrueKeyframe> two_rows(std::uint32_t count) {
 
 const SE3 kTruth = at(0.0, 0.4);  // pose of robot 1's keyframe i in robot 0's
 
-TEST_CASE("The overlap of two views is the share of the image in both", "[closure_truth]") {
+TEST_CASE("The overlap of two views is the share of the image in both") {
   const double grid = 1.0 / 16;  // half a cell of the grid's eight columns
   CHECK(view_overlap(camera(), SE3::Identity(), 3.0) == 1.0);
   // The image is 2 * depth wide at any depth: after a sideways motion by a share of it, the rest is
@@ -65,7 +65,7 @@ TEST_CASE("The overlap of two views is the share of the image in both", "[closur
   CHECK(view_overlap(camera(), behind, depth_m) == 0.0);
 }
 
-TEST_CASE("Inserted errors are counted at each stage, by the given limits", "[closure_truth]") {
+TEST_CASE("Inserted errors are counted at each stage, by the given limits") {
   using enum ClosureStage;
   const auto keyframes = two_rows(6);
   const SE3 off_m = kTruth * at(0.6, 0.0);
@@ -109,8 +109,7 @@ TEST_CASE("Inserted errors are counted at each stage, by the given limits", "[cl
   CHECK(correct({.max_translation_m = 0.61}) == 4);
 }
 
-TEST_CASE("A closure beyond the limits is false unless its covariance explains the error",
-          "[closure_truth]") {
+TEST_CASE("A closure beyond the limits is false unless its covariance explains the error") {
   const auto keyframes = two_rows(2);
   ClosureRecord off = closure({0, 0}, {1, 0}, ClosureStage::kInlier, kTruth * at(0.0, 2.0, 8.0));
   const auto scores = [&] { return score_closures(keyframes, std::vector{off}, camera()).inliers; };
@@ -128,7 +127,7 @@ TEST_CASE("A closure beyond the limits is false unless its covariance explains t
   CHECK(scores().beyond_limits == 0);
 }
 
-TEST_CASE("Places scale with the depth of the scene", "[closure_truth]") {
+TEST_CASE("Places scale with the depth of the scene") {
   // Side by side 0.4 m apart; the second robot's last keyframe is far away
   auto keyframes = two_rows(2);
   const auto pairs = [&](double depth_m) {
@@ -141,7 +140,7 @@ TEST_CASE("Places scale with the depth of the scene", "[closure_truth]") {
   CHECK(pairs(0.0) == 1);   // unknown: the default of 5 m
 }
 
-TEST_CASE("Closures within a robot count for precision and not for recall", "[closure_truth]") {
+TEST_CASE("Closures within a robot count for precision and not for recall") {
   std::vector<TrueKeyframe> keyframes = {{{0, 0}, at(0, 0), 4.0}, {{0, 9}, at(0.1, 0), 4.0}};
   const ClosureScores scores = score_closures(
       keyframes, std::vector{closure({0, 0}, {0, 9}, ClosureStage::kInlier, at(0.1, 0))}, camera());
@@ -152,7 +151,7 @@ TEST_CASE("Closures within a robot count for precision and not for recall", "[cl
   CHECK(std::isnan(score_closures(keyframes, {}, camera()).inliers.precision()));
 }
 
-TEST_CASE("True pairs are counted by the angle between the viewing directions", "[closure_truth]") {
+TEST_CASE("True pairs are counted by the angle between the viewing directions") {
   using enum ClosureStage;
   // All look at the point 4 m in front of the first one: beside it, from the side, and from the
   // other side.
@@ -179,7 +178,7 @@ TEST_CASE("True pairs are counted by the angle between the viewing directions", 
   CHECK(sum == scores.true_pairs);
 }
 
-TEST_CASE("Invalid closures and options are refused", "[closure_truth]") {
+TEST_CASE("Invalid closures and options are refused") {
   const auto keyframes = two_rows(2);
   const std::vector<ClosureRecord> none = {
       closure({0, 0}, {1, 0}, ClosureStage::kVerified, std::nullopt)};
@@ -194,7 +193,7 @@ const std::string kHeader =
     "from_robot,from_keyframe,to_robot,to_keyframe,similarity,stage,matches,inliers,"
     "tx,ty,tz,qx,qy,qz,qw,sigma_rx,sigma_ry,sigma_rz,sigma_tx,sigma_ty,sigma_tz,reason\n";
 
-TEST_CASE("Errors in closure files are reported with their line", "[closure_files]") {
+TEST_CASE("Errors in closure files are reported with their line") {
   const TemporaryFolder folder;
   const auto [row, problem] = GENERATE(table<std::string, std::string>(
       {{"1,2,3", "c.csv line 2: 3 fields, expected 21"},

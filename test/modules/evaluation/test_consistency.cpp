@@ -37,8 +37,7 @@ struct Chain {
   [[nodiscard]] ConsistencyInput input() const { return {"chain", truth, estimate, covariances}; }
 };
 
-TEST_CASE("The NEES of right covariances is 1, and grows with the square of the errors",
-          "[evaluation]") {
+TEST_CASE("The NEES of right covariances is 1, and grows with the square of the errors") {
   for (const double factor : {1.0, 2.0}) {
     double pose = 0.0, within = 0.0;
     constexpr unsigned kRuns = 200;
@@ -59,7 +58,7 @@ TEST_CASE("The NEES of right covariances is 1, and grows with the square of the 
   }
 }
 
-TEST_CASE("Poses with covariances are read as they are written", "[evaluation]") {
+TEST_CASE("Poses with covariances are read as they are written") {
   const Chain chain(3, 1.0);
   TemporaryFolder folder;
   std::string text;

@@ -29,7 +29,7 @@ std::string euroc() {
 
 }  // namespace
 
-TEST_CASE("A corrupted trajectory is refused with its line or has finite errors", "[evaluation]") {
+TEST_CASE("A corrupted trajectory is refused with its line or has finite errors") {
   const std::string good = GENERATE(tum(), euroc());
   const auto truth = parse_trajectory(tum(), "truth");
   check_corrupted<InputFileError>(good, "corrupted.tum", [&](const std::string& text) {
@@ -48,7 +48,7 @@ TEST_CASE("A corrupted trajectory is refused with its line or has finite errors"
   });
 }
 
-TEST_CASE("Corrupted tables of a run are refused with file and line", "[evaluation]") {
+TEST_CASE("Corrupted tables of a run are refused with file and line") {
   const TemporaryFolder folder;
   SECTION("keyframes.csv") {
     check_corrupted<InputFileError>(
@@ -80,7 +80,7 @@ TEST_CASE("Corrupted tables of a run are refused with file and line", "[evaluati
   }
 }
 
-TEST_CASE("A path that is no file of results is refused by name", "[evaluation]") {
+TEST_CASE("A path that is no file of results is refused by name") {
   check_no_files<InputFileError>(".tum", [](const auto& place) { (void)read_trajectory(place); });
   check_no_files<InputFileError>(".csv", [](const auto& place) { (void)read_keyframes(place); });
   check_no_files<std::runtime_error>(".json", [](const auto& place) { (void)read_json(place); });

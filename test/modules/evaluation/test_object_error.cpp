@@ -8,7 +8,7 @@ NamedObject thing(const char* name, double x, double length = 1.0) {
   return {name, {{x, 0.0, 0.5}, 0.0, {length, 1.0, 1.0}}};
 }
 
-TEST_CASE("Objects are matched by class and overlap, each once", "[evaluation]") {
+TEST_CASE("Objects are matched by class and overlap, each once") {
   const std::vector<NamedObject> truth = {thing("chair", 0.0), thing("chair", 5.0),
                                           thing("chair", 20.0), thing("table", 10.0)};
   const std::vector<NamedObject> estimates = {thing("chair", 0.0, 0.5),  // half of the first chair
@@ -38,7 +38,7 @@ TEST_CASE("Objects are matched by class and overlap, each once", "[evaluation]")
   CHECK_THROWS_AS(score_objects(truth, estimates, {true}, 0.25), std::invalid_argument);
 }
 
-TEST_CASE("The mapped surface of an object excludes the ground and other objects", "[evaluation]") {
+TEST_CASE("The mapped surface of an object excludes the ground and other objects") {
   LabelledMesh mesh;
   const auto add_square = [&](const Eigen::Vector3f& a, const Eigen::Vector3f& u,
                               const Eigen::Vector3f& v) {

@@ -62,7 +62,7 @@ std::vector<StampedPose> square() {
   return poses;
 }
 
-TEST_CASE("Quantiles lie linearly between the values", "[statistics]") {
+TEST_CASE("Quantiles lie linearly between the values") {
   const std::vector<double> values = {40.0, 10.0, 30.0, 20.0, 50.0};
   CHECK(quantile(values, 0.0) == 10.0);
   CHECK(quantile(values, 0.5) == 30.0);
@@ -72,7 +72,7 @@ TEST_CASE("Quantiles lie linearly between the values", "[statistics]") {
   CHECK(std::isnan(quantile({}, 0.5)));
 }
 
-TEST_CASE("A moved copy of the truth has no error", "[evaluation]") {
+TEST_CASE("A moved copy of the truth has no error") {
   const int seed = GENERATE(range(0, 5));
   CAPTURE(seed);
   std::mt19937 rng(static_cast<unsigned>(seed));
@@ -89,7 +89,7 @@ TEST_CASE("A moved copy of the truth has no error", "[evaluation]") {
   CHECK(error_of(truth, moved(truth, T, 0.25)).joint.position_m.rmse > 0.1);
 }
 
-TEST_CASE("Relative errors are the drift over a second", "[evaluation]") {
+TEST_CASE("Relative errors are the drift over a second") {
   // 1 m/s with 2 % too much speed, and a rotation of 0.01 rad/s too much.
   const auto truth = sample(0.0, 10.0, 101, [](double t_s) {
     return make_pose(Eigen::Matrix3d::Identity(), {t_s, 0.0, 0.0});
@@ -108,7 +108,7 @@ TEST_CASE("Relative errors are the drift over a second", "[evaluation]") {
         Approx(kDegrees * 0.01).epsilon(1e-6));
 }
 
-TEST_CASE("One alignment for a team shows the distance between its robots", "[evaluation]") {
+TEST_CASE("One alignment for a team shows the distance between its robots") {
   // Two perfect estimates, the second 6 cm too high: the best compromise errs by 3 cm everywhere.
   const auto truth = square();
   const auto lifted =
@@ -123,7 +123,7 @@ TEST_CASE("One alignment for a team shows the distance between its robots", "[ev
   CHECK(error_of(truth, lifted).joint.position_m.rmse < 1e-9);
 }
 
-TEST_CASE("Completeness is the covered share of the window", "[evaluation]") {
+TEST_CASE("Completeness is the covered share of the window") {
   const auto truth = sample(0.0, 100.0, 1001, curve);  // 10 s
   const auto half = sample(5.0, 20.0, 101, curve);     // 5 to 10 s
   CHECK(error_of(truth, half).joint.completeness == Approx(0.5));
@@ -134,7 +134,7 @@ TEST_CASE("Completeness is the covered share of the window", "[evaluation]") {
   CHECK(trajectory_error(team).joint.completeness == Approx(10.0 / 15.0));
 }
 
-TEST_CASE("Trajectories that cannot be compared are refused by name", "[evaluation]") {
+TEST_CASE("Trajectories that cannot be compared are refused by name") {
   const auto truth = sample(0.0, 10.0, 100, curve);
   const auto elsewhere = sample(100.0, 10.0, 100, curve);
   CHECK_THROWS_WITH(error_of(truth, elsewhere),
@@ -151,7 +151,7 @@ TEST_CASE("Trajectories that cannot be compared are refused by name", "[evaluati
   CHECK(error_of(truth, still).joint.position_m.rmse > 0.1);
 }
 
-TEST_CASE("The error of a real estimate agrees with an independent computation", "[evaluation]") {
+TEST_CASE("The error of a real estimate agrees with an independent computation") {
   const auto folder = shared_data("trajectory_eval");
   if (!folder) return;
   const auto truth = read_trajectory(*folder / "freiburg1_xyz-groundtruth.txt");
@@ -175,7 +175,7 @@ std::vector<PosePair> pairs_of(int count, const Truth& truth, const Estimate& es
   return pairs;
 }
 
-TEST_CASE("Drift is measured over multiples of 1, 2 and 5 up to half the path", "[segment_error]") {
+TEST_CASE("Drift is measured over multiples of 1, 2 and 5 up to half the path") {
   CHECK(segment_lengths(300.0) == std::vector<double>{10.0, 20.0, 50.0, 100.0});
   CHECK(segment_lengths(5.43) == std::vector<double>{0.2, 0.5, 1.0, 2.0});
   CHECK(segment_lengths(0.05).size() == 2);
@@ -183,8 +183,7 @@ TEST_CASE("Drift is measured over multiples of 1, 2 and 5 up to half the path", 
   CHECK(segment_errors(std::vector<PosePair>{}).lengths_m.empty());
 }
 
-TEST_CASE("Drift has the error of the scale, and of the rotation per metre, in any frame",
-          "[segment_error]") {
+TEST_CASE("Drift has the error of the scale, and of the rotation per metre, in any frame") {
   const double scale = GENERATE(0.9, 1.0, 1.03);
   const double step_m = 0.3;   // no divisor of the lengths
   const double turn = 0.0005;  // [rad] a step, about the direction of motion
@@ -215,8 +214,7 @@ std::vector<StampedPose> straight_way(int poses) {
   return way;
 }
 
-TEST_CASE("Surroundings are aligned on a straight path and for a single pose",
-          "[surroundings_alignment]") {
+TEST_CASE("Surroundings are aligned on a straight path and for a single pose") {
   const int poses = GENERATE(1, 2, 20);
   const SE3 T_truth_estimate = make_pose(so3_exp({0.4, -0.2, 2.0}), {5, -3, 2});
   const auto estimate = straight_way(poses);
@@ -226,7 +224,7 @@ TEST_CASE("Surroundings are aligned on a straight path and for a single pose",
   CHECK((found.matrix() - T_truth_estimate.matrix()).norm() < 1e-9);
 }
 
-TEST_CASE("Missing relative errors are not perfect errors", "[evaluation]") {
+TEST_CASE("Missing relative errors are not perfect errors") {
   const auto poses = sample(0.0, 20.0, 10, curve);  // half a second
   const std::vector<TrajectoryInput> inputs = {{"alpha", poses, poses, {}},
                                                {"b<&>eta", poses, poses, {}}};
@@ -250,7 +248,7 @@ SE3 screw(double t_s) {
   return make_pose(so3_exp({0.0, 0.0, 0.5 * t_s}), {2.0 * t_s, 1.0, 0.0});
 }
 
-TEST_CASE("Across a gap and outside the trajectory only a near pose counts", "[evaluation]") {
+TEST_CASE("Across a gap and outside the trajectory only a near pose counts") {
   const auto poses = sample(0.0, 1.0, 3, screw);
   CHECK_FALSE(pose_at(poses, kSecond * 3 / 2, 0.9, 0.1));
   CHECK(pose_at(poses, kSecond * 3 / 2, 1.0, 0.1));
@@ -267,8 +265,7 @@ TEST_CASE("Across a gap and outside the trajectory only a near pose counts", "[e
   CHECK_FALSE(pose_at({}, 0, 0.1, 0.01));
 }
 
-TEST_CASE("Covered time is that between neighbours without a gap inside the window",
-          "[evaluation]") {
+TEST_CASE("Covered time is that between neighbours without a gap inside the window") {
   auto poses = sample(1.0, 10.0, 11, screw);        // 1 to 2 s
   const auto later = sample(5.0, 10.0, 11, screw);  // 5 to 6 s
   poses.insert(poses.end(), later.begin(), later.end());

@@ -6,8 +6,7 @@
 
 namespace km {
 
-TEST_CASE("TUM and EuRoC rows give the same pose, and the first of equal stamps counts",
-          "[evaluation]") {
+TEST_CASE("TUM and EuRoC rows give the same pose, and the first of equal stamps counts") {
   const std::string text =
       GENERATE("# t tx ty tz qx qy qz qw\n1403636579.758555392 1 2 3 0 0 0.6 0.8\n",
                "#timestamp, p, q, v\n1403636579758555392,1,2,3,0.8,0,0,0.6,9,9,9\n",
@@ -26,7 +25,7 @@ TEST_CASE("TUM and EuRoC rows give the same pose, and the first of equal stamps 
   CHECK(repeated[0].T.translation().x() == 1.0);
 }
 
-TEST_CASE("An impossible trajectory is refused with file and line", "[evaluation]") {
+TEST_CASE("An impossible trajectory is refused with file and line") {
   struct Case {
     const char *text, *message;
   };
@@ -50,7 +49,7 @@ TEST_CASE("An impossible trajectory is refused with file and line", "[evaluation
   CHECK_THROWS_WITH(read_trajectory("/nowhere.txt"), "/nowhere.txt: no such file");
 }
 
-TEST_CASE("A header names the columns, and sizes of stamps their unit", "[evaluation]") {
+TEST_CASE("A header names the columns, and sizes of stamps their unit") {
   const std::string text = GENERATE(
       // OKVIS2, Basalt, MCD, ORB-SLAM3, TUM in milliseconds, a header with seconds and commas
       "timestamp, p_WS_W_x, p_WS_W_y, p_WS_W_z, q_WS_x, q_WS_y, q_WS_z, q_WS_w, v_WS_W_x\n"
@@ -69,14 +68,14 @@ TEST_CASE("A header names the columns, and sizes of stamps their unit", "[evalua
   CHECK(poses[0].T.linear().isApprox(Eigen::Quaterniond(0.8, 0, 0, 0.6).toRotationMatrix(), 1e-12));
 }
 
-TEST_CASE("The true poses of a recording in EuRoC's layout are found", "[evaluation]") {
+TEST_CASE("The true poses of a recording in EuRoC's layout are found") {
   const TemporaryFolder folder;
   const auto file = folder.write("mav0/state_groundtruth_estimate0/data.csv", "");
   for (const auto& place : {folder.path(), folder.path() / "mav0", file.parent_path(), file})
     CHECK(find_trajectory(place) == file);
 }
 
-TEST_CASE("Stamps in microseconds are refused where nanoseconds are expected", "[evaluation]") {
+TEST_CASE("Stamps in microseconds are refused where nanoseconds are expected") {
   std::string text;
   for (int k = 0; k < 20; ++k)
     text += std::to_string(1403636579758555 + 50000 * k) + ",0,0,0,1,0,0,0\n";
@@ -85,8 +84,7 @@ TEST_CASE("Stamps in microseconds are refused where nanoseconds are expected", "
                     "microseconds, milliseconds or seconds?");
 }
 
-TEST_CASE("Poses of KITTI have their stamps in times.txt, and a bag is no trajectory",
-          "[evaluation]") {
+TEST_CASE("Poses of KITTI have their stamps in times.txt, and a bag is no trajectory") {
   const TemporaryFolder folder;
   folder.write("poses/07.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n0 -1 0 4 1 0 0 5 0 0 1 6\n");
   const auto file = folder.path() / "poses/07.txt";

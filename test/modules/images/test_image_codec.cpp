@@ -43,7 +43,7 @@ const Bytes kPalette = {
     0x60, 0x64, 0x00, 0x00, 0x00, 0x05, 0x00, 0x02, 0xd1, 0x66, 0x33, 0x78, 0x00, 0x00, 0x00,
     0x00, 0x49, 0x45, 0x4e, 0x44, 0xae, 0x42, 0x60, 0x82};
 
-TEST_CASE("Colours of a palette are looked up", "[image_codec]") {
+TEST_CASE("Colours of a palette are looked up") {
   const cv::Mat stored = decoded(kPalette, DecodedPixels::kStored);
   CHECK(largest_difference(stored, (cv::Mat_<cv::Vec4b>(1, 2) << cv::Vec4b(255, 0, 0, 255),
                                     cv::Vec4b(0, 0, 255, 128))) == 0.0);
@@ -52,7 +52,7 @@ TEST_CASE("Colours of a palette are looked up", "[image_codec]") {
             (cv::Mat_<cv::Vec3b>(1, 2) << cv::Vec3b(255, 0, 0), cv::Vec3b(0, 0, 255))) == 0.0);
 }
 
-TEST_CASE("PNG files are decoded as OpenCV decodes them", "[image_codec]") {
+TEST_CASE("PNG files are decoded as OpenCV decodes them") {
   const int type = GENERATE(CV_8UC1, CV_16UC1, CV_8UC3, CV_8UC4);
   CAPTURE(type);
   const cv::Mat image = picture(type);
@@ -65,7 +65,7 @@ TEST_CASE("PNG files are decoded as OpenCV decodes them", "[image_codec]") {
                            cv::imdecode(file, cv::IMREAD_GRAYSCALE)) <= 1.0);
 }
 
-TEST_CASE("JPEG files are decoded as OpenCV decodes them", "[image_codec]") {
+TEST_CASE("JPEG files are decoded as OpenCV decodes them") {
   const int type = GENERATE(CV_8UC1, CV_8UC3);
   const int quality = GENERATE(30, 92);
   CAPTURE(type, quality);
@@ -77,7 +77,7 @@ TEST_CASE("JPEG files are decoded as OpenCV decodes them", "[image_codec]") {
                            cv::imdecode(file, cv::IMREAD_GRAYSCALE)) == 0.0);
 }
 
-TEST_CASE("OpenCV decodes encoded files", "[image_codec]") {
+TEST_CASE("OpenCV decodes encoded files") {
   const int type = GENERATE(CV_8UC1, CV_16UC1, CV_8UC3, CV_8UC4);
   CAPTURE(type);
   const cv::Mat image = picture(type);
@@ -89,7 +89,7 @@ TEST_CASE("OpenCV decodes encoded files", "[image_codec]") {
   CHECK(largest_difference(jpeg, judge) <= 2.0);
 }
 
-TEST_CASE("A part of a larger image is encoded", "[image_codec]") {
+TEST_CASE("A part of a larger image is encoded") {
   const cv::Mat part = picture(CV_8UC1)(cv::Rect(8, 9, 20, 11));
   CHECK(largest_difference(decoded(encode_png(part), DecodedPixels::kStored), part) == 0.0);
   CHECK(largest_difference(decoded(encode_jpeg(part, 100), DecodedPixels::kStored), part) <= 4.0);
@@ -135,8 +135,7 @@ std::string png_with(const std::string& chunks) {
   return std::string(file.begin(), file.end()).insert(kHeaderEnd, chunks);
 }
 
-TEST_CASE("A PNG file whose text or colour profile unpacks to more than 8 MiB is not decoded",
-          "[image_codec]") {
+TEST_CASE("A PNG file whose text or colour profile unpacks to more than 8 MiB is not decoded") {
   using namespace std::string_literals;
   CHECK(why(png_with(chunk("zTXt", "key\0\0"s + compressed_zeros(1U << 20U)))) == "61 columns");
   const std::string zeros = compressed_zeros(9U << 20U);
@@ -149,14 +148,14 @@ TEST_CASE("A PNG file whose text or colour profile unpacks to more than 8 MiB is
   CHECK(why(png_with(half + half)) == "PNG: reached chunk/cache limits");
 }
 
-TEST_CASE("An image of more than 48 MiB of pixels is not decoded", "[image_codec]") {
+TEST_CASE("An image of more than 48 MiB of pixels is not decoded") {
   std::string png = png_with("");
   png.replace(16, 8, four_bytes(16384) + four_bytes(3073));
   png.replace(12, kHeaderEnd - 12, chunk("IHDR", png.substr(16, 13)).substr(4));
   CHECK(why(png) == "16384x3073 px, at most 48 MiB are decoded");
 }
 
-TEST_CASE("Files that are no image say why", "[image_codec]") {
+TEST_CASE("Files that are no image say why") {
   CHECK(why("") == "neither a PNG nor a JPEG file");
   CHECK(why("GIF89a") == "neither a PNG nor a JPEG file");
   CHECK(why("\x89PNG") == "PNG: end of stream");
@@ -170,7 +169,7 @@ TEST_CASE("Files that are no image say why", "[image_codec]") {
   CHECK(why(tall) == "61x32769 px, at most 16384 are decoded");
 }
 
-TEST_CASE("Images that cannot be stored are refused", "[image_codec]") {
+TEST_CASE("Images that cannot be stored are refused") {
   CHECK_THROWS_AS(encode_png({}), ImageCodecError);
   CHECK_THROWS_AS(encode_png(cv::Mat(2, 2, CV_32FC1)), ImageCodecError);
   CHECK_THROWS_AS(encode_jpeg({}, 80), ImageCodecError);

@@ -22,8 +22,7 @@ int sample(const cv::Mat& patches, int row, int u, int v) {
   return patches.at<std::uint8_t>(row, v * kPatchSide + u);
 }
 
-TEST_CASE("Samples are two pixels of the octave apart along the corner's axes",
-          "[keypoint_patches]") {
+TEST_CASE("Samples are two pixels of the octave apart along the corner's axes") {
   const cv::Mat ramp = image_of([](int x, int) { return x; });
   const int octave = GENERATE(0, 3, 7);
   const double step = kPatchSpacing_px * std::pow(kPyramidScale, octave);
@@ -41,7 +40,7 @@ TEST_CASE("Samples are two pixels of the octave apart along the corner's axes",
     }
 }
 
-TEST_CASE("A turned image with turned corners has similar patches", "[keypoint_patches]") {
+TEST_CASE("A turned image with turned corners has similar patches") {
   const float turn_deg = GENERATE(20.0F, 90.0F, 200.0F);
   const double turn = static_cast<double>(turn_deg) * std::numbers::pi / 180.0;
   const auto grey = [](double x, double y) {  // about the centre of the image
@@ -60,7 +59,7 @@ TEST_CASE("A turned image with turned corners has similar patches", "[keypoint_p
   CHECK(cv::norm(a, unturned, cv::NORM_L1) / samples > 20.0);
 }
 
-TEST_CASE("Samples beyond the border repeat it", "[keypoint_patches]") {
+TEST_CASE("Samples beyond the border repeat it") {
   const cv::Mat ramp = image_of([](int x, int y) { return (x + y) / 2; });
   const cv::Mat patches = keypoint_patches(ramp, std::vector{corner(0, 0, 0), corner(239, 239, 0)});
   CHECK(sample(patches, 0, 0, 0) == sample(patches, 0, 11, 11));

@@ -123,7 +123,7 @@ std::vector<JournalPlace> places_in(const fs::path& file) {
   return places;
 }
 
-TEST_CASE("Every journal entry is restored exactly", "[journal]") {
+TEST_CASE("Every journal entry is restored exactly") {
   std::mt19937 rng(2);
   const KeyframeOdometry keyframe = step(4, rng);
   const auto decoded = decode_journal_entry(encode_journal_entry(keyframe));
@@ -164,7 +164,7 @@ TEST_CASE("Every journal entry is restored exactly", "[journal]") {
   }
 }
 
-TEST_CASE("Bytes that are no journal entry are refused", "[journal]") {
+TEST_CASE("Bytes that are no journal entry are refused") {
   std::mt19937 rng(3);
   std::vector<std::uint8_t> bytes = encode_journal_entry(features(0, rng));
   for (std::size_t size = 0; size < bytes.size(); ++size)
@@ -185,7 +185,7 @@ TEST_CASE("Bytes that are no journal entry are refused", "[journal]") {
   CHECK_FALSE(decode_journal_entry(bytes).value);
 }
 
-TEST_CASE("A truncated journal is intact up to its last full entry", "[journal]") {
+TEST_CASE("A truncated journal is intact up to its last full entry") {
   const TemporaryFolder folder;
   const std::vector<JournalEntry> run = some_run();
   const std::string text = (written(folder, run), folder.read("run.journal"));
@@ -204,7 +204,7 @@ TEST_CASE("A truncated journal is intact up to its last full entry", "[journal]"
   CHECK(read(folder.write("cut", text)).second.size() == run.size());
 }
 
-TEST_CASE("A flipped bit costs one entry, and its place is stated", "[journal]") {
+TEST_CASE("A flipped bit costs one entry, and its place is stated") {
   const TemporaryFolder folder;
   const std::vector<JournalEntry> run = some_run();
   const auto expected = bytes_of(run);
@@ -237,7 +237,7 @@ TEST_CASE("A flipped bit costs one entry, and its place is stated", "[journal]")
   }
 }
 
-TEST_CASE("Bytes with many false marks are read in little time", "[journal]") {
+TEST_CASE("Bytes with many false marks are read in little time") {
   const TemporaryFolder folder;
   std::string marks;
   for (int k = 0; k < 200000; ++k) marks += std::string("\x7FKMJRNL5\x00\x00\x20\x00", 12);
@@ -262,7 +262,7 @@ std::vector<JournalEntry> line_run(KeyframeIndex count) {
   return run;
 }
 
-TEST_CASE("After damage to any one entry, the run is restored with all keyframes", "[journal]") {
+TEST_CASE("After damage to any one entry, the run is restored with all keyframes") {
   const TemporaryFolder folder;
   const std::vector<JournalEntry> entries = line_run(6);
   const std::vector<JournalPlace> places = places_in(written(folder, entries));
@@ -293,7 +293,7 @@ TEST_CASE("After damage to any one entry, the run is restored with all keyframes
   }
 }
 
-TEST_CASE("Decisions and the solution are restored as they were last", "[journal]") {
+TEST_CASE("Decisions and the solution are restored as they were last") {
   const TemporaryFolder folder;
   std::vector<JournalEntry> entries = some_run();
   std::mt19937 rng(14);
@@ -329,7 +329,7 @@ TEST_CASE("Decisions and the solution are restored as they were last", "[journal
   CHECK(after.solution.trajectory.T_world_kf.size() == 2);
 }
 
-TEST_CASE("Files that are no journals are refused by name", "[journal]") {
+TEST_CASE("Files that are no journals are refused by name") {
   const TemporaryFolder folder;
   CHECK_THROWS_WITH(restore_run(folder.write("notes.txt", "Dear diary, today...")),
                     Contains("notes.txt") && Contains("no journal"));
@@ -338,7 +338,7 @@ TEST_CASE("Files that are no journals are refused by name", "[journal]") {
   CHECK(restore_run(folder.write("begun", "\x7FKMJ")).keyframes.empty());
 }
 
-TEST_CASE("A continued journal loses its incomplete end and grows", "[journal]") {
+TEST_CASE("A continued journal loses its incomplete end and grows") {
   const TemporaryFolder folder;
   const std::vector<JournalEntry> run = some_run();
   const fs::path file = written(folder, run);
@@ -359,7 +359,7 @@ TEST_CASE("A continued journal loses its incomplete end and grows", "[journal]")
   CHECK(std::get<JournalStart>(all[run.size() - 1]).boot == 0x123450001);
 }
 
-TEST_CASE("An entry can be read at the place that add() returned", "[journal]") {
+TEST_CASE("An entry can be read at the place that add() returned") {
   const TemporaryFolder folder;
   const std::vector<JournalEntry> run = some_run();
   const fs::path file = written(folder, run);
@@ -383,7 +383,7 @@ TEST_CASE("An entry can be read at the place that add() returned", "[journal]") 
   CHECK_THROWS_AS(read_journal_entry(folder.path() / "missing", places[1]), InputFileError);
 }
 
-TEST_CASE("A disk that is full for a while loses no entry", "[journal]") {
+TEST_CASE("A disk that is full for a while loses no entry") {
   const TemporaryFolder folder;
   const fs::path file = folder.path() / "run.journal";
   const auto before = std::signal(SIGXFSZ, SIG_IGN);
@@ -406,7 +406,7 @@ TEST_CASE("A disk that is full for a while loses no entry", "[journal]") {
   CHECK(bytes_of(read(file).second) == bytes_of(run));
 }
 
-TEST_CASE("A run is restored up to its last full keyframe", "[journal]") {
+TEST_CASE("A run is restored up to its last full keyframe") {
   const TemporaryFolder folder;
   std::vector<JournalEntry> entries = some_run();
   std::mt19937 rng(6);
@@ -431,7 +431,7 @@ TEST_CASE("A run is restored up to its last full keyframe", "[journal]") {
   CHECK(run.outcomes[2].reason == "too few matches");
 }
 
-TEST_CASE("A run continues after its last full keyframe each time it is killed", "[journal]") {
+TEST_CASE("A run continues after its last full keyframe each time it is killed") {
   const TemporaryFolder folder;
   std::vector<JournalEntry> entries = some_run();
   std::mt19937 rng(7);
@@ -450,7 +450,7 @@ TEST_CASE("A run continues after its last full keyframe each time it is killed",
   }
 }
 
-TEST_CASE("Closures with another robot end with its incarnation", "[journal]") {
+TEST_CASE("Closures with another robot end with its incarnation") {
   const TemporaryFolder folder;
   std::vector<JournalEntry> entries = some_run();
   const std::uint64_t boot = std::uint64_t{5} << kResumeBits;
@@ -468,7 +468,7 @@ TEST_CASE("Closures with another robot end with its incarnation", "[journal]") {
   CHECK(run.keyframes.size() == 5);
 }
 
-TEST_CASE("A finished run under another id keeps only its own results", "[journal]") {
+TEST_CASE("A finished run under another id keeps only its own results") {
   const TemporaryFolder folder;
   std::vector<JournalEntry> entries = some_run();
   std::mt19937 rng(10);
@@ -486,7 +486,7 @@ TEST_CASE("A finished run under another id keeps only its own results", "[journa
   }
 }
 
-TEST_CASE("Contradicting journal entries are named", "[journal]") {
+TEST_CASE("Contradicting journal entries are named") {
   const TemporaryFolder folder;
   std::mt19937 rng(8);
   const JournalStart start{kRobot, 1, "x"};

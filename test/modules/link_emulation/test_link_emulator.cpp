@@ -53,7 +53,7 @@ bool passes(LinkEmulator& emulator, double time_s) {
 
 }  // namespace
 
-TEST_CASE("A broadcast frame goes to every other robot", "[link_emulation]") {
+TEST_CASE("A broadcast frame goes to every other robot") {
   const EthernetFrame frame = GENERATE(broadcast(), multicast());
   LinkEmulator emulator(script_of(4));
   emulator.send(2, 0.0, frame);
@@ -62,7 +62,7 @@ TEST_CASE("A broadcast frame goes to every other robot", "[link_emulation]") {
   CHECK(reached == std::set<std::size_t>{0, 1, 3});
 }
 
-TEST_CASE("A frame to an unknown address is dropped and not counted", "[link_emulation]") {
+TEST_CASE("A frame to an unknown address is dropped and not counted") {
   LinkEmulator emulator(script_of(2));
   emulator.send(0, 0.0, frame_to(7));
   emulator.send(0, 0.0, frame_to(0));
@@ -71,8 +71,7 @@ TEST_CASE("A frame to an unknown address is dropped and not counted", "[link_emu
   CHECK(emulator.counts(0, 1) == LinkCounts{});
 }
 
-TEST_CASE("Frames arrive unchanged, after the exact delay, and jitter stays within its bounds",
-          "[link_emulation]") {
+TEST_CASE("Frames arrive unchanged, after the exact delay, and jitter stays within its bounds") {
   LinkPlan link;
   link.trace = LinkTrace({{0.0, std::numeric_limits<double>::infinity(), 0.25}});
   LinkEmulator exact(script_of(2, link));
@@ -101,7 +100,7 @@ TEST_CASE("Frames arrive unchanged, after the exact delay, and jitter stays with
   CHECK(std::abs(sum_s / kFrames - 0.3) < 5.0 * 0.1 / std::sqrt(12.0 * kFrames));
 }
 
-TEST_CASE("The share of lost frames is the probability", "[link_emulation]") {
+TEST_CASE("The share of lost frames is the probability") {
   LinkPlan link{.loss = GENERATE(0.0, 0.05, 0.3, 1.0)};
   const unsigned seed = GENERATE(1, 2, 3);
   CAPTURE(link.loss, seed);
@@ -116,7 +115,7 @@ TEST_CASE("The share of lost frames is the probability", "[link_emulation]") {
   CHECK(emulator.due(0.0).size() == kFrames - static_cast<std::size_t>(count));
 }
 
-TEST_CASE("A link carries its rate and no more", "[link_emulation]") {
+TEST_CASE("A link carries its rate and no more") {
   LinkPlan link = limited(10e3, 0.5);
   link.queue_bytes = 1e9;
   LinkEmulator emulator(script_of(2, link));
@@ -129,7 +128,7 @@ TEST_CASE("A link carries its rate and no more", "[link_emulation]") {
   CHECK(*emulator.next_s() == Approx(100.6).epsilon(1e-12));
 }
 
-TEST_CASE("A full queue drops the newest frames", "[link_emulation]") {
+TEST_CASE("A full queue drops the newest frames") {
   LinkPlan link = limited(10e3);
   link.queue_bytes = 5.0 * kFrame_bytes;
   LinkEmulator emulator(script_of(2, link));
@@ -144,8 +143,7 @@ TEST_CASE("A full queue drops the newest frames", "[link_emulation]") {
   CHECK(all_of(emulator).size() == 7);
 }
 
-TEST_CASE("A queue waits while the rate of a trace is zero and then continues",
-          "[link_emulation]") {
+TEST_CASE("A queue waits while the rate of a trace is zero and then continues") {
   LinkPlan link;
   link.trace = LinkTrace({{0.0, 1000.0, 0.0},
                           {1.0, 1000.0, 0.0},
@@ -161,7 +159,7 @@ TEST_CASE("A queue waits while the rate of a trace is zero and then continues",
   CHECK(arrived[1].due_s == Approx(5.9));
 }
 
-TEST_CASE("A recorded link carries a packet at each of its instants", "[link_emulation]") {
+TEST_CASE("A recorded link carries a packet at each of its instants") {
   LinkPlan link = limited(1.0, 0.5);  // the rate does not count
   link.packets = PacketSchedule({0, 20, 20, 50});
   link.queue_bytes = 5500.0;
@@ -180,7 +178,7 @@ TEST_CASE("A recorded link carries a packet at each of its instants", "[link_emu
   for (std::size_t i = 0; i < due_s.size(); ++i) CHECK(due_s[i] == Approx(expected_s[i]));
 }
 
-TEST_CASE("An outage begins and ends as planned for its direction", "[link_emulation]") {
+TEST_CASE("An outage begins and ends as planned for its direction") {
   LinkScript script = script_of(2);
   script.link(0, 1).outages = {{1.0, 2.0}, {5.0, 6.0}};
   LinkEmulator emulator(script);
@@ -199,7 +197,7 @@ TEST_CASE("An outage begins and ends as planned for its direction", "[link_emula
   CHECK(lost(emulator, LinkLoss::kOutage) == 3);
 }
 
-TEST_CASE("A partition separates groups while it lasts", "[link_emulation]") {
+TEST_CASE("A partition separates groups while it lasts") {
   LinkScript script = script_of(4);
   script.partitions = {{{10.0, 20.0}, {0, 0, 1, 1}}};
   LinkEmulator emulator(script);
@@ -217,7 +215,7 @@ TEST_CASE("A partition separates groups while it lasts", "[link_emulation]") {
   CHECK(emulator.counts(0, 1).lost[kPartition] == FrameTally{});
 }
 
-TEST_CASE("Robots receive each other within range", "[link_emulation]") {
+TEST_CASE("Robots receive each other within range") {
   LinkPlan link{.range_m = 5.0};
   LinkScript script = script_of(2, link);
   // They meet at 10 s, at 1 m/s each from 20 m, and stay there from 12 s on at 4 m.
@@ -232,7 +230,7 @@ TEST_CASE("Robots receive each other within range", "[link_emulation]") {
   CHECK(lost(emulator, LinkLoss::kRange) == 2);
 }
 
-TEST_CASE("A recording that waits moves its robot later", "[link_emulation]") {
+TEST_CASE("A recording that waits moves its robot later") {
   LinkPlan link{.range_m = 5.0};
   LinkScript script = script_of(2, link);
   script.rate = 2.0;
@@ -245,7 +243,7 @@ TEST_CASE("A recording that waits moves its robot later", "[link_emulation]") {
   CHECK_FALSE(passes(emulator, 3.6));
 }
 
-TEST_CASE("The loss of a pair's frames is independent of other links", "[link_emulation]") {
+TEST_CASE("The loss of a pair's frames is independent of other links") {
   LinkPlan link{.loss = 0.5};
   const auto fates = [&](bool others) {
     LinkScript script = script_of(3, link);
@@ -266,7 +264,7 @@ TEST_CASE("The loss of a pair's frames is independent of other links", "[link_em
   CHECK(fates(true) == fates(false));
 }
 
-TEST_CASE("A script that lacks something is refused", "[link_emulation]") {
+TEST_CASE("A script that lacks something is refused") {
   using Change = void (*)(LinkScript&);
   const auto change = GENERATE(
       values<Change>({[](auto& script) { script.links.pop_back(); },
@@ -284,7 +282,7 @@ TEST_CASE("A script that lacks something is refused", "[link_emulation]") {
   CHECK_THROWS_AS(LinkEmulator(script), std::invalid_argument);
 }
 
-TEST_CASE("The table of links has a row for each ordered pair", "[link_emulation]") {
+TEST_CASE("The table of links has a row for each ordered pair") {
   LinkScript script = script_of(2);
   script.link(0, 1).trace = LinkTrace({{0.0, std::numeric_limits<double>::infinity(), 0.5}});
   script.link(1, 0).loss = 1.0;

@@ -20,7 +20,7 @@ std::string refusal(const Parse& parse, const std::string& text) {
 
 }  // namespace
 
-TEST_CASE("A link trace is a straight line between its rows", "[link_emulation]") {
+TEST_CASE("A link trace is a straight line between its rows") {
   const LinkTrace trace =
       parse_link_trace("time_s,bytes_per_s,delay_s\n10,100,0.1\n20,300,0.5\n", "trace.csv");
   REQUIRE(trace.has_limit());
@@ -37,7 +37,7 @@ TEST_CASE("A link trace is a straight line between its rows", "[link_emulation]"
   CHECK(trace.capacity_until(22.0) == Approx(2600.0));
 }
 
-TEST_CASE("The time of a capacity is the first time at which it is reached", "[link_emulation]") {
+TEST_CASE("The time of a capacity is the first time at which it is reached") {
   const LinkTrace trace({{0.0, 50.0, 0.0}, {4.0, 0.0, 0.0}, {6.0, 0.0, 0.0}, {9.0, 80.0, 0.0}});
   std::mt19937 rng(1);
   std::uniform_real_distribution<double> time_s(-5.0, 15.0);
@@ -53,7 +53,7 @@ TEST_CASE("The time of a capacity is the first time at which it is reached", "[l
   CHECK(LinkTrace({{0.0, 10.0, 0.0}, {2.0, 0.0, 0.0}}).time_of(10.5) == kInfinite);
 }
 
-TEST_CASE("An error in a link trace is reported with its line", "[link_emulation]") {
+TEST_CASE("An error in a link trace is reported with its line") {
   CHECK(refusal(parse_link_trace, "") == "trace.csv: has no row");
   CHECK(refusal(parse_link_trace, "time_s,bytes_per_s,delay_s\n") == "trace.csv: has no row");
   CHECK(refusal(parse_link_trace, "0,1,0\n1,2\n") ==
@@ -67,11 +67,11 @@ TEST_CASE("An error in a link trace is reported with its line", "[link_emulation
         "trace.csv:2: time_s is not after that of the row before");
 }
 
-TEST_CASE("A missing link trace is refused by name", "[link_emulation]") {
+TEST_CASE("A missing link trace is refused by name") {
   check_no_files<LinkTraceError>(".csv", [](const auto& file) { (void)read_link_trace(file); });
 }
 
-TEST_CASE("A corrupted link trace is refused by name or usable", "[link_emulation]") {
+TEST_CASE("A corrupted link trace is refused by name or usable") {
   check_corrupted<LinkTraceError>(
       "time_s,bytes_per_s,delay_s\n0,125000,0.02\n1.5,60000,0.05\n3,0,0.2\n4,9000,0.1\n",
       "trace.csv", [](const std::string& text) {
@@ -81,7 +81,7 @@ TEST_CASE("A corrupted link trace is refused by name or usable", "[link_emulatio
       });
 }
 
-TEST_CASE("A packet schedule carries 1500 bytes at each instant and repeats", "[link_emulation]") {
+TEST_CASE("A packet schedule carries 1500 bytes at each instant and repeats") {
   const PacketSchedule schedule = parse_packet_schedule("0\n57\n57\n100\n", "trace.csv");
   CHECK(schedule.capacity_until(0.0) == 1500.0);
   CHECK(schedule.capacity_until(0.0569) == 1500.0);
@@ -104,7 +104,7 @@ TEST_CASE("A packet schedule carries 1500 bytes at each instant and repeats", "[
   }
 }
 
-TEST_CASE("An error in a packet schedule is reported with its line", "[link_emulation]") {
+TEST_CASE("An error in a packet schedule is reported with its line") {
   CHECK(refusal(parse_packet_schedule, "") == "trace.csv: the last time is 0 or missing");
   CHECK(refusal(parse_packet_schedule, "0\n0\n") == "trace.csv: the last time is 0 or missing");
   CHECK(refusal(parse_packet_schedule, "1\n2 3\n") == "trace.csv:2: 2 fields, expected a time");

@@ -53,7 +53,7 @@ class World {
   std::shared_ptr<const Vocabulary> vocabulary_;
 };
 
-TEST_CASE("a view of any place of the map gives the pose in the map", "[localization]") {
+TEST_CASE("a view of any place of the map gives the pose in the map") {
   World world(GENERATE(1U, 2U, 3U));
   const int place = GENERATE(range(0, kPlaces));
   CAPTURE(place);
@@ -72,13 +72,13 @@ TEST_CASE("a view of any place of the map gives the pose in the map", "[localiza
   CHECK(xi.tail<3>().norm() < 0.03);
 }
 
-TEST_CASE("other places do not match the map", "[localization]") {
+TEST_CASE("other places do not match the map") {
   World world(GENERATE(4U, 5U));
   MapMatcher matcher = world.matcher();
   for (KeyframeIndex i = 1; i < 6; ++i) CHECK_FALSE(matcher.match(world.elsewhere(i)).closure);
 }
 
-TEST_CASE("a map without keyframes, or without poses, is refused", "[localization]") {
+TEST_CASE("a map without keyframes, or without poses, is refused") {
   World world(6);
   const auto make = [](FinishedMap map) {
     VocabularyData data{.branching = 2,

@@ -45,7 +45,7 @@ std::shared_ptr<const DepthImage> plane_depth(const Camera& camera) {
   return std::make_shared<const DepthImage>(std::move(image));
 }
 
-TEST_CASE("Descriptors are the rows of the extractor", "[loop_closure]") {
+TEST_CASE("Descriptors are the rows of the extractor") {
   cv::Mat image(120, 160, CV_8U);
   cv::RNG(7).fill(image, cv::RNG::UNIFORM, 0, 256);
   std::vector<cv::KeyPoint> keypoints;
@@ -60,7 +60,7 @@ TEST_CASE("Descriptors are the rows of the extractor", "[loop_closure]") {
   CHECK_THROWS_AS(descriptor_of_row(cv::Mat(1, 61, CV_8U), 0), cv::Exception);
 }
 
-TEST_CASE("keypoints of an RGB-D frame have the depth of their pixel", "[loop_closure]") {
+TEST_CASE("keypoints of an RGB-D frame have the depth of their pixel") {
   const StereoRig rig = rgbd_rig(test_camera(), 0.08);
   KeyframeFeatureExtractor extractor(rig, {});
   StereoFrame frame{0, checkered(rig.cameras[0]), {}};
@@ -87,8 +87,7 @@ TEST_CASE("keypoints of an RGB-D frame have the depth of their pixel", "[loop_cl
   CHECK(holes > 20);
 }
 
-TEST_CASE("A reduced keyframe has its first keypoints, those with depth before the others",
-          "[loop_closure]") {
+TEST_CASE("A reduced keyframe has its first keypoints, those with depth before the others") {
   KeyframeFeatures features;
   for (int i = 0; i < 6; ++i) {
     features.keypoints.push_back({.bearing = Eigen::Vector2f(0.1F * static_cast<float>(i), 0.0F),
@@ -111,7 +110,7 @@ TEST_CASE("A reduced keyframe has its first keypoints, those with depth before t
   CHECK(numbers(6) == std::vector<int>{0, 1, 2, 3, 4, 5});
 }
 
-TEST_CASE("keypoints without a trusted depth have none", "[loop_closure]") {
+TEST_CASE("keypoints without a trusted depth have none") {
   const StereoRig rig = rgbd_rig(test_camera(), 0.08);
   KeyframeFeaturesConfig config{.min_depth_m = 3.0, .max_depth_m = 4.0};
   KeyframeFeatureExtractor extractor(rig, config);
@@ -129,7 +128,7 @@ TEST_CASE("keypoints without a trusted depth have none", "[loop_closure]") {
   CHECK(trusted > 50);
 }
 
-TEST_CASE("a frame that does not fit its rig is refused", "[loop_closure]") {
+TEST_CASE("a frame that does not fit its rig is refused") {
   const StereoRig rgbd = rgbd_rig(test_camera(), 0.08);
   StereoRig stereo = rgbd;
   stereo.depth_source = DepthSource::kRightImage;
@@ -184,14 +183,14 @@ float found(const StereoRig& rig, const Eigen::Vector2d& left, double truth) {
   return matcher.inverse_depths(frame, {&bearing, 1}).front();
 }
 
-TEST_CASE("The epipolar matcher sees no place twice under folded distortion", "[loop_closure]") {
+TEST_CASE("The epipolar matcher sees no place twice under folded distortion") {
   const double x = GENERATE(-0.9, -0.8, -0.7);
   CAPTURE(x);
   const StereoRig rig = folding_rig();
   CHECK(found(rig, {x, 0.0}, 0.0) == 0.0F);  // at infinity, farther than is asked for
 }
 
-TEST_CASE("Inside the fold of its distortion a lens gives depth", "[loop_closure]") {
+TEST_CASE("Inside the fold of its distortion a lens gives depth") {
   const double x = GENERATE(-0.6, -0.4, 0.0, 0.5);
   CAPTURE(x);
   CHECK(found(folding_rig(), {x, 0.1}, 0.25) == Approx(0.25).epsilon(0.02));

@@ -37,8 +37,7 @@ struct Chain {
   }
 };
 
-TEST_CASE("the covariance of a keyframe is accumulated along the chain",
-          "[keyframe_features_node]") {
+TEST_CASE("the covariance of a keyframe is accumulated along the chain") {
   std::mt19937 rng(1);
   Chain chain;
   UncertainPose expected;
@@ -66,8 +65,7 @@ TEST_CASE("the covariance of a keyframe is accumulated along the chain",
   }
 }
 
-TEST_CASE("a keyframe has the features of the image with its stamp, through the thread",
-          "[keyframe_features_node]") {
+TEST_CASE("a keyframe has the features of the image with its stamp, through the thread") {
   Chain chain;
   chain.node.start();
   // As odometry starts: several keyframes, then all images.
@@ -86,7 +84,7 @@ TEST_CASE("a keyframe has the features of the image with its stamp, through the 
   CHECK_FALSE(chain.published[1].features.keypoints.empty());
 }
 
-TEST_CASE("features are seen from where the cameras were found to be", "[keyframe_features_node]") {
+TEST_CASE("features are seen from where the cameras were found to be") {
   std::mt19937 rng(2);
   Chain chain;
   chain.node.step(KeyframeOdometry{.id = {4, 0}, .stamp = 10});

@@ -7,8 +7,8 @@ namespace {
 
 // Which parts of a keyframe a robot requests, and what its owner sends.
 
-TEST_CASE("words that arrive near a closure that was verified meanwhile lead to no further request",
-          "[loop_closure_node]") {
+TEST_CASE(
+    "words that arrive near a closure that was verified meanwhile lead to no further request") {
   Meeting meeting(scene_with_words(31));
   tell_words(meeting);
   auto& [scene, robot, peer] = meeting;
@@ -29,8 +29,7 @@ TEST_CASE("words that arrive near a closure that was verified meanwhile lead to 
   CHECK(robot.reports.back().reason == "not requested: near a verified closure");
 }
 
-TEST_CASE("a reply contains the points whose words the requester's own keyframe has",
-          "[loop_closure_node]") {
+TEST_CASE("a reply contains the points whose words the requester's own keyframe has") {
   const bool has_bow = GENERATE(true, false);
   CAPTURE(has_bow);
   const Scene scene(13);
@@ -65,8 +64,7 @@ TEST_CASE("a reply contains the points whose words the requester's own keyframe 
   CHECK(sent.keypoints.size() == expected.size());
 }
 
-TEST_CASE("the features of a keyframe are requested once its words agree with an own keyframe",
-          "[loop_closure_node]") {
+TEST_CASE("the features of a keyframe are requested once its words agree with an own keyframe") {
   Meeting meeting(scene_with_words(21));
   tell_words(meeting);
   auto& [scene, robot, peer] = meeting;
@@ -96,8 +94,8 @@ TEST_CASE("the features of a keyframe are requested once its words agree with an
   CHECK(stages_of(robot.reports) == Stages{kCandidate, kRequested, kVerified});
 }
 
-TEST_CASE("descriptors of other points than those of the words are replaced by the whole keyframe",
-          "[loop_closure_node]") {
+TEST_CASE(
+    "descriptors of other points than those of the words are replaced by the whole keyframe") {
   Meeting meeting(scene_with_words(25));
   tell_words(meeting);
   auto& [scene, robot, peer] = meeting;
@@ -123,8 +121,7 @@ TEST_CASE("descriptors of other points than those of the words are replaced by t
   CHECK(robot.closures[0].inliers > 100);
 }
 
-TEST_CASE("no features are requested of a keyframe whose words are elsewhere",
-          "[loop_closure_node]") {
+TEST_CASE("no features are requested of a keyframe whose words are elsewhere") {
   Meeting meeting(scene_with_words(22));
   tell_words(meeting);
   auto& [scene, robot, peer] = meeting;
@@ -149,8 +146,7 @@ TEST_CASE("no features are requested of a keyframe whose words are elsewhere",
   CHECK(robot.requests[0].message->own == 900);
 }
 
-TEST_CASE("keyframes are matched by the network that both robots have, and otherwise by ORB",
-          "[loop_closure_node]") {
+TEST_CASE("keyframes are matched by the network that both robots have, and otherwise by ORB") {
   const auto [own, theirs] =
       GENERATE(std::pair(7, 7), std::pair(7, 8), std::pair(7, 0), std::pair(0, 7));
   const bool by_network = own == theirs;

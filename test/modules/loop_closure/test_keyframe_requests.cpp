@@ -6,7 +6,7 @@ namespace {
 
 using Ids = std::vector<KeyframeId>;
 
-TEST_CASE("a keyframe is asked for once, and again after the time-out", "[keyframe_requests]") {
+TEST_CASE("a keyframe is asked for once, and again after the time-out") {
   KeyframeRequests requests(2.0, 4);
   requests.want({7, 1});
   requests.want({7, 1});
@@ -18,7 +18,7 @@ TEST_CASE("a keyframe is asked for once, and again after the time-out", "[keyfra
   CHECK(requests.size() == 0);
 }
 
-TEST_CASE("the time-out doubles up to eightfold", "[keyframe_requests]") {
+TEST_CASE("the time-out doubles up to eightfold") {
   KeyframeRequests requests(1.0, 4);
   requests.want({7, 1});
   std::vector<double> asked;
@@ -30,7 +30,7 @@ TEST_CASE("the time-out doubles up to eightfold", "[keyframe_requests]") {
     CHECK(asked[i] == Approx(expected[i]).margin(0.15));
 }
 
-TEST_CASE("the number of unanswered requests to one peer is bounded", "[keyframe_requests]") {
+TEST_CASE("the number of unanswered requests to one peer is bounded") {
   KeyframeRequests requests(2.0, 2);
   for (std::uint32_t i = 0; i < 5; ++i) requests.want({7, i});
   requests.want({8, 0});
@@ -39,8 +39,7 @@ TEST_CASE("the number of unanswered requests to one peer is bounded", "[keyframe
   CHECK(requests.due(0.1) == Ids{{7, 2}});
 }
 
-TEST_CASE("a keyframe that does not exist yet makes room and is tried later",
-          "[keyframe_requests]") {
+TEST_CASE("a keyframe that does not exist yet makes room and is tried later") {
   KeyframeRequests requests(2.0, 1);
   requests.want({7, 9});
   requests.want({7, 1});
@@ -52,7 +51,7 @@ TEST_CASE("a keyframe that does not exist yet makes room and is tried later",
   CHECK(requests.due(2.1) == Ids{{7, 9}});
 }
 
-TEST_CASE("a late reply counts and a reply without a request does not", "[keyframe_requests]") {
+TEST_CASE("a late reply counts and a reply without a request does not") {
   KeyframeRequests requests(2.0, 1);
   CHECK_FALSE(requests.arrived({7, 1}));
   requests.want({7, 1});
@@ -65,12 +64,12 @@ TEST_CASE("a late reply counts and a reply without a request does not", "[keyfra
   CHECK(requests.due(10.0).empty());
 }
 
-TEST_CASE("windows and time-outs must be positive", "[keyframe_requests]") {
+TEST_CASE("windows and time-outs must be positive") {
   CHECK_THROWS_AS(KeyframeRequests(0.0, 1), std::invalid_argument);
   CHECK_THROWS_AS(KeyframeRequests(1.0, 0), std::invalid_argument);
 }
 
-TEST_CASE("the cache drops the keyframe used longest ago", "[keyframe_cache]") {
+TEST_CASE("the cache drops the keyframe used longest ago") {
   KeyframeCache cache(2);
   const auto keyframe = [](std::uint32_t index) {
     Keyframe k;

@@ -39,8 +39,7 @@ cv::Mat edge() {
   return image;
 }
 
-TEST_CASE("A descriptor is the direction of the network's numbers for the patch",
-          "[keypoint_describer]") {
+TEST_CASE("A descriptor is the direction of the network's numbers for the patch") {
   const TemporaryFolder folder;
   KeypointDescriber describer = describer_of(folder, first_sample());
   CHECK(describer.network() != 0);
@@ -56,7 +55,7 @@ TEST_CASE("A descriptor is the direction of the network's numbers for the patch"
   CHECK(describer.describe(edge(), {}).empty());
 }
 
-TEST_CASE("A patch of one grey level has a descriptor", "[keypoint_describer]") {
+TEST_CASE("A patch of one grey level has a descriptor") {
   const TemporaryFolder folder;
   const cv::Mat flat(200, 200, CV_8U, cv::Scalar(90));
   const auto found = describer_of(folder, first_sample()).describe(flat, corners_on_edge(2));
@@ -64,8 +63,7 @@ TEST_CASE("A patch of one grey level has a descriptor", "[keypoint_describer]") 
   for (const int number : numbers_of(found[0])) CHECK(number == 0);
 }
 
-TEST_CASE("A network of another input or output is refused with its file and the reason",
-          "[keypoint_describer]") {
+TEST_CASE("A network of another input or output is refused with its file and the reason") {
   const TemporaryFolder folder;
   PointwiseNetwork small = first_sample();
   small.height = 8;
@@ -78,7 +76,7 @@ TEST_CASE("A network of another input or output is refused with its file and the
                                                  Contains("keyframe_features.network"));
 }
 
-TEST_CASE("The shipped network gives the numbers of its training", "[keypoint_describer]") {
+TEST_CASE("The shipped network gives the numbers of its training") {
   cv::Mat image(240, 240, CV_8U);
   for (int y = 0; y < image.rows; ++y)
     for (int x = 0; x < image.cols; ++x)

@@ -32,7 +32,7 @@ KeyframeReply random_reply(std::mt19937& rng, int points) {
   return reply;
 }
 
-TEST_CASE("A keyframe, and that one was not found, survive the wire", "[codec]") {
+TEST_CASE("A keyframe, and that one was not found, survive the wire") {
   std::mt19937 rng(GENERATE(1U, 2U, 3U));
   KeyframeReply sent = random_reply(rng, 1000);
   sent.descriptors = {sent.keyframe.features.matched[5]};
@@ -57,7 +57,7 @@ TEST_CASE("A keyframe, and that one was not found, survive the wire", "[codec]")
   CHECK(none.value->keyframe.odometry.id == KeyframeId{kOwner, 99});
 }
 
-TEST_CASE("Hostile replies are refused with a reason", "[codec]") {
+TEST_CASE("Hostile replies are refused with a reason") {
   std::mt19937 rng(7);
   KeyframeReply reply = random_reply(rng, 20);
   reply.descriptors.resize(3);
@@ -87,7 +87,7 @@ TEST_CASE("Hostile replies are refused with a reason", "[codec]") {
        {"a negative focal length", no_features, [](auto& m) { m.features[0] |= 0x80; }}});
 }
 
-TEST_CASE("A closure survives the wire exactly", "[codec]") {
+TEST_CASE("A closure survives the wire exactly") {
   std::mt19937 rng(8);
   const Closure sent{.from = {{kOwner, 1}, random_pose(rng), random_covariance(rng, 0.1)},
                      .to = {{9, 5}, random_pose(rng), random_covariance(rng, 0.2)},
@@ -105,7 +105,7 @@ TEST_CASE("A closure survives the wire exactly", "[codec]") {
   CHECK(result.value->similarity == 0.75);
 }
 
-TEST_CASE("Hostile closures and requests are refused with a reason", "[codec]") {
+TEST_CASE("Hostile closures and requests are refused with a reason") {
   std::mt19937 rng(9);
   const Closure closure{.from = {{kOwner, 1}, random_pose(rng), Matrix6::Identity()},
                         .to = {{9, 5}, random_pose(rng), Matrix6::Identity()}};
@@ -137,7 +137,7 @@ TEST_CASE("Hostile closures and requests are refused with a reason", "[codec]") 
   CHECK(result->network == 40123);
 }
 
-TEST_CASE("Points of words survive the wire, and hostile ones are refused", "[codec]") {
+TEST_CASE("Points of words survive the wire, and hostile ones are refused") {
   const Keypoint point{.bearing = {0.5F, -0.25F}, .inverse_depth = 0.5F, .octave = 2};
   const KeyframeWords sent{
       .number = 12, .keyframe = {kOwner, 7}, .words = {450.0, 0.1, {{point, 3}, {point, 4000}}}};

@@ -5,7 +5,7 @@
 namespace km {
 namespace {
 
-TEST_CASE("a candidate becomes a closure by one request and one reply", "[loop_closure_node]") {
+TEST_CASE("a candidate becomes a closure by one request and one reply") {
   Meeting meeting(1);
   auto& [scene, robot, peer] = meeting;
   robot.give(scene.candidate());
@@ -26,8 +26,7 @@ TEST_CASE("a candidate becomes a closure by one request and one reply", "[loop_c
   CHECK(robot.reports.back().inliers == closure.inliers);
 }
 
-TEST_CASE("a candidate that waits is not requested near a closure that was verified meanwhile",
-          "[loop_closure_node]") {
+TEST_CASE("a candidate that waits is not requested near a closure that was verified meanwhile") {
   const int separation = GENERATE(0, 64);
   const Scene scene(30);
   Robot robot(
@@ -61,8 +60,7 @@ TEST_CASE("a candidate that waits is not requested near a closure that was verif
   }
 }
 
-TEST_CASE("a candidate seen twice is verified once, and a keyframe fetched once",
-          "[loop_closure_node]") {
+TEST_CASE("a candidate seen twice is verified once, and a keyframe fetched once") {
   Meeting meeting(2);
   auto& [scene, robot, peer] = meeting;
   robot.give(scene.candidate());
@@ -79,8 +77,7 @@ TEST_CASE("a candidate seen twice is verified once, and a keyframe fetched once"
   CHECK(robot.closures.size() == 2);
 }
 
-TEST_CASE("a robot compares no pair that its peer compares or has verified",
-          "[loop_closure_node]") {
+TEST_CASE("a robot compares no pair that its peer compares or has verified") {
   Meeting meeting(24);
   auto& [scene, robot, peer] = meeting;
   SECTION("compares") {
@@ -107,8 +104,7 @@ PeerEvent event_of(PeerEventKind kind) {
   return event;
 }
 
-TEST_CASE("work with a restarted peer begins again and with a resumed one continues",
-          "[loop_closure_node]") {
+TEST_CASE("work with a restarted peer begins again and with a resumed one continues") {
   Meeting meeting(5);
   auto& [scene, robot, peer] = meeting;
   std::vector<PeerEventKind> restarts;
@@ -133,8 +129,7 @@ TEST_CASE("work with a restarted peer begins again and with a resumed one contin
   }
 }
 
-TEST_CASE("work for a peer is dropped when it restarts and requested again when it comes back",
-          "[loop_closure_node]") {
+TEST_CASE("work for a peer is dropped when it restarts and requested again when it comes back") {
   const bool measured = GENERATE(true, false);
   const bool own_is_missing = GENERATE(true, false);
   CAPTURE(measured, own_is_missing);
@@ -180,8 +175,7 @@ LoopClosureConfig with_full_keyframes(int count) {
   return config;
 }
 
-TEST_CASE("candidates inside one robot need no request, in whatever order things arrive",
-          "[loop_closure_node]") {
+TEST_CASE("candidates inside one robot need no request, in whatever order things arrive") {
   const Scene scene = scene_of_one_robot();
   Robot robot(kSelf);
   const bool candidate_first = GENERATE(false, true);
@@ -197,7 +191,7 @@ TEST_CASE("candidates inside one robot need no request, in whatever order things
   CHECK(robot.closures.size() == 1);  // the same pair from the other side
 }
 
-TEST_CASE("inside one robot keyframes are matched by ORB alone", "[loop_closure_node]") {
+TEST_CASE("inside one robot keyframes are matched by ORB alone") {
   Scene scene = scene_of_one_robot();
   describe(scene, 7, 7);
   const bool has_orb = GENERATE(true, false);
@@ -210,8 +204,7 @@ TEST_CASE("inside one robot keyframes are matched by ORB alone", "[loop_closure_
   CHECK(robot.closures.size() == (has_orb ? 1 : 0));
 }
 
-TEST_CASE("a closure inside a robot must be more certain than one between robots",
-          "[loop_closure_node]") {
+TEST_CASE("a closure inside a robot must be more certain than one between robots") {
   Scene inside = scene_of_one_robot();
   const auto sigma_rad = [&] {
     return Verifier({}).verify(inside.own.features, inside.peer.features).rotation_sigma_rad;
@@ -240,8 +233,7 @@ TEST_CASE("a closure inside a robot must be more certain than one between robots
   CHECK(meeting.robot.closures.size() == 1);
 }
 
-TEST_CASE("an old keyframe of the robot itself keeps a part of its keypoints",
-          "[loop_closure_node]") {
+TEST_CASE("an old keyframe of the robot itself keeps a part of its keypoints") {
   const Scene scene = scene_of_one_robot();
   const int full = GENERATE(50, 51);
   CAPTURE(full);
@@ -256,8 +248,7 @@ TEST_CASE("an old keyframe of the robot itself keeps a part of its keypoints",
     CHECK(robot.closures[0].inliers > 100);
 }
 
-TEST_CASE("an old keyframe of the robot itself is read from the disk with all its keypoints",
-          "[loop_closure_node]") {
+TEST_CASE("an old keyframe of the robot itself is read from the disk with all its keypoints") {
   const Scene scene = scene_of_one_robot();
   bool is_there = true;
   int read_keyframeed = 0;
@@ -290,7 +281,7 @@ TEST_CASE("an old keyframe of the robot itself is read from the disk with all it
   }
 }
 
-TEST_CASE("a measured closure needs only the odometry of the other end", "[loop_closure_node]") {
+TEST_CASE("a measured closure needs only the odometry of the other end") {
   Scene views(9);
   views.own.features = views.peer.features = {};
   Meeting meeting(views);
@@ -306,8 +297,7 @@ TEST_CASE("a measured closure needs only the odometry of the other end", "[loop_
   CHECK(robot.closures[0].to.T_odom_kf.isApprox(scene.peer.odometry.T_odom_kf));
 }
 
-TEST_CASE("closures that start at another robot and misdirected requests are ignored",
-          "[loop_closure_node]") {
+TEST_CASE("closures that start at another robot and misdirected requests are ignored") {
   const Scene scene(10);
   Robot robot(kSelf);
   robot.give(scene.own);

@@ -58,7 +58,7 @@ std::vector<Match> by_definition(const KeyframeFeatures& a, const KeyframeFeatur
   return matches;
 }
 
-TEST_CASE("matching agrees with its definition", "[matching]") {
+TEST_CASE("matching agrees with its definition") {
   const auto seed = GENERATE(range(1U, 11U));
   const auto network = GENERATE(as<std::uint16_t>(), 0, 7);
   CAPTURE(seed, network);
@@ -80,7 +80,7 @@ TEST_CASE("matching agrees with its definition", "[matching]") {
   CHECK_FALSE(matches.empty());
 }
 
-TEST_CASE("numbers of a network are rounded to a fourteenth of their range", "[matching]") {
+TEST_CASE("numbers of a network are rounded to a fourteenth of their range") {
   std::mt19937 rng(6);
   std::normal_distribution<float> normal;
   std::array<float, kMatchedNumbers> numbers{};
@@ -99,7 +99,7 @@ TEST_CASE("numbers of a network are rounded to a fourteenth of their range", "[m
     CHECK(zero == 0);
 }
 
-TEST_CASE("without a second descriptor there is no ratio and no match", "[matching]") {
+TEST_CASE("without a second descriptor there is no ratio and no match") {
   const auto network = GENERATE(as<std::uint16_t>(), 0, 7);
   const auto none = features_of({}, network), one = features_of({{}}, network),
              two = features_of({{}, {255}}, network);
@@ -109,7 +109,7 @@ TEST_CASE("without a second descriptor there is no ratio and no match", "[matchi
   CHECK(match_descriptors(one, two, {}).size() == 1);
 }
 
-TEST_CASE("guided matching distinguishes equal descriptors by their place", "[matching]") {
+TEST_CASE("guided matching distinguishes equal descriptors by their place") {
   std::mt19937 rng(4);
   KeyframePair pair = make_keyframe_pair(rng, 50, {}, 0.0);
   // Keypoints far enough apart in the image not to compete.
@@ -141,7 +141,7 @@ TEST_CASE("guided matching distinguishes equal descriptors by their place", "[ma
   CHECK(match_guided(T_a_b, sparse.from, sparse.to, {}) == matches);
 }
 
-TEST_CASE("guided matching survives keypoints from anywhere", "[matching]") {
+TEST_CASE("guided matching survives keypoints from anywhere") {
   std::mt19937 rng(5);
   KeyframePair pair = make_keyframe_pair(rng, 20, {}, 0.0);
   pair.from.focal_px = pair.to.focal_px = 1e6;

@@ -37,8 +37,7 @@ void check_near(const Keypoint& sent, const Keypoint& received) {
         0.05);
 }
 
-TEST_CASE("Features are packed in 17 bytes a keypoint, rounded by less than their noise",
-          "[packed_keypoints]") {
+TEST_CASE("Features are packed in 17 bytes a keypoint, rounded by less than their noise") {
   const KeyframeFeatures sent = random_features(GENERATE(1U, 2U), 500);
   const std::vector<std::uint8_t> bytes = pack(sent);
   CHECK(bytes.size() < 17 * sent.keypoints.size());
@@ -56,8 +55,7 @@ TEST_CASE("Features are packed in 17 bytes a keypoint, rounded by less than thei
   CHECK(unpack_features({})->keypoints.empty());
 }
 
-TEST_CASE("Word points are packed in 6 bytes each, rounded by less than their noise",
-          "[packed_keypoints]") {
+TEST_CASE("Word points are packed in 6 bytes each, rounded by less than their noise") {
   const WordPoints sent = points_of(random_features(3, 500));
   const std::vector<std::uint8_t> bytes = pack(sent);
   CHECK(bytes.size() < 6 * sent.points.size() + 20);
@@ -75,8 +73,7 @@ TEST_CASE("Word points are packed in 6 bytes each, rounded by less than their no
   CHECK(nothing->points.empty());
 }
 
-TEST_CASE("Keypoints that end early or late, or state what no camera has, are refused",
-          "[packed_keypoints]") {
+TEST_CASE("Keypoints that end early or late, or state what no camera has, are refused") {
   const KeyframeFeatures features = random_features(4, 12);
   const WordPoints points = points_of(features);
   for (const bool of_words : {false, true}) {
@@ -107,7 +104,7 @@ TEST_CASE("Keypoints that end early or late, or state what no camera has, are re
   });
 }
 
-TEST_CASE("Descriptors are packed as they are", "[packed_keypoints]") {
+TEST_CASE("Descriptors are packed as they are") {
   const std::vector<MatchedDescriptor> sent = random_features(5, 12).matched;
   std::vector<std::uint8_t> bytes = pack(sent);
   CHECK(bytes.size() == sent.size() * kMatchedBytes);

@@ -41,7 +41,7 @@ std::vector<RecordedKeyframe> load_v1_01(const fs::path& sequence) {
   return keyframes;
 }
 
-TEST_CASE("closures of V1_01 are many, accurate, and as uncertain as they state", "[verifier]") {
+TEST_CASE("closures of V1_01 are many, accurate, and as uncertain as they state") {
   const auto sequence = shared_data("euroc/V1_01_easy");
   if (!sequence) return;
   const std::vector<RecordedKeyframe> keyframes = load_v1_01(*sequence);
@@ -82,7 +82,7 @@ TEST_CASE("closures of V1_01 are many, accurate, and as uncertain as they state"
 // Two robots in one room: frames before 500, and from 500 on; every sixth of the available frames.
 // The images are not registered: colour has no intrinsics of its own (its lens is wider than that
 // of depth), and its camera stands beside the depth camera. Most of the error comes from this.
-TEST_CASE("closures of an RGB-D recording are in the right place", "[verifier]") {
+TEST_CASE("closures of an RGB-D recording are in the right place") {
   const auto folder = shared_data("7scenes_redkitchen");
   if (!folder) return;
   RecordedKitchen kitchen(*folder);

@@ -26,7 +26,7 @@ SE3 camera_pose(const KeyframePair& keyframes) {
   return keyframes.from.T_body_cam.inverse() * keyframes.T_from_to * keyframes.to.T_body_cam;
 }
 
-TEST_CASE("points on a line, in one place, or too few have no alignment", "[relative_pose]") {
+TEST_CASE("points on a line, in one place, or too few have no alignment") {
   std::vector<Eigen::Vector3d> points;
   SECTION("a line") {
     for (int i = 0; i < 10; ++i) points.emplace_back(0.1 * i + 0.1, 0.1 * i + 0.2, 0.1 * i + 0.3);
@@ -41,7 +41,7 @@ TEST_CASE("points on a line, in one place, or too few have no alignment", "[rela
   CHECK_FALSE(align_points(points, points));
 }
 
-TEST_CASE("refinement reaches the truth of points without noise", "[relative_pose]") {
+TEST_CASE("refinement reaches the truth of points without noise") {
   const auto seed = GENERATE(range(1U, 6U));
   const bool one_sided = GENERATE(false, true);
   CAPTURE(seed, one_sided);
@@ -58,7 +58,7 @@ TEST_CASE("refinement reaches the truth of points without noise", "[relative_pos
   CHECK(se3_log(T_a_b.inverse() * fit->T_a_b).norm() < 1e-6);  // keypoints are floats
 }
 
-TEST_CASE("RANSAC finds the pose and the inliers among 70 % outliers", "[relative_pose]") {
+TEST_CASE("RANSAC finds the pose and the inliers among 70 % outliers") {
   const auto seed = GENERATE(range(1U, 6U));
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -86,7 +86,7 @@ TEST_CASE("RANSAC finds the pose and the inliers among 70 % outliers", "[relativ
 
 // 400 trials: 95 % of a chi-squared variable lie below its quantile, with a standard deviation of
 // 1.1 %. Cauchy weights make the information a little too small: a few more are inside.
-TEST_CASE("errors of the refined pose have the covariance it claims", "[relative_pose]") {
+TEST_CASE("errors of the refined pose have the covariance it claims") {
   const ImageNoise noise{0.7, 0.3};
   constexpr int kTrials = 400;
   constexpr double kQuantile95 = 12.592;  // 6 degrees of freedom
@@ -111,7 +111,7 @@ TEST_CASE("errors of the refined pose have the covariance it claims", "[relative
 
 // Disparities of 8 to 25 px with 2 px of noise: linearised about the measurement itself, refinement
 // finds 3 % too little motion.
-TEST_CASE("noise of the depths does not shorten the motion", "[relative_pose]") {
+TEST_CASE("noise of the depths does not shorten the motion") {
   const ImageNoise noise{0.7, 2.0};
   constexpr int kTrials = 100;
   std::mt19937 rng(17);
@@ -134,7 +134,7 @@ TEST_CASE("noise of the depths does not shorten the motion", "[relative_pose]") 
   CHECK(standard_error < 0.005);  // or the test could not see the bias
 }
 
-TEST_CASE("a pose held by two points loses its information with them", "[relative_pose]") {
+TEST_CASE("a pose held by two points loses its information with them") {
   std::mt19937 rng(2);
   const ImageNoise noise{0.7, 0.3};
   const KeyframePair keyframes = make_keyframe_pair(rng, 40, noise, 0.0);
@@ -148,7 +148,7 @@ TEST_CASE("a pose held by two points loses its information with them", "[relativ
   CHECK(symmetric_eigen(left).values(0) < 1e-6 * symmetric_eigen(fit->information).values(0));
 }
 
-TEST_CASE("RANSAC stops as soon as its confidence allows", "[relative_pose]") {
+TEST_CASE("RANSAC stops as soon as its confidence allows") {
   std::mt19937 rng(1);
   const KeyframePair keyframes = make_keyframe_pair(rng, 50, {}, 0.0);
   const RansacResult result = ransac_pose(image_pairs(keyframes, {}), {}, rng);
@@ -168,8 +168,7 @@ SE3 moved(const Vector6& twist_body, double late_s) {
   return se3_exp(late_s * twist_body);
 }
 
-TEST_CASE("Points of a rolling shutter are where a global shutter sees them",
-          "[loop_closure][rolling_shutter]") {
+TEST_CASE("Points of a rolling shutter are where a global shutter sees them") {
   constexpr double kReadout_s = 0.0015;  // so short that terms of second order are small
   std::mt19937 rng(GENERATE(range(0U, 4U)));
   const SE3 T_body_cam = random_pose(rng);
@@ -202,8 +201,7 @@ TEST_CASE("Points of a rolling shutter are where a global shutter sees them",
   CHECK(largest > 5e-4);
 }
 
-TEST_CASE("A global shutter's points, and those of a camera at rest, do not move",
-          "[loop_closure][rolling_shutter]") {
+TEST_CASE("A global shutter's points, and those of a camera at rest, do not move") {
   std::mt19937 rng(7);
   KeyframeFeatures features;
   features.keypoints = {{.bearing = {0.1F, -0.2F}, .inverse_depth = 0.5F}};

@@ -23,8 +23,7 @@ void succeed(RequestPolicy& policy, KeyframeIndex query, KeyframeIndex own) {
   policy.add_result({kPeer, query}, true);
 }
 
-TEST_CASE("No keyframe near a closure is requested and the distance grows with successes",
-          "[request_policy]") {
+TEST_CASE("No keyframe near a closure is requested and the distance grows with successes") {
   LoopClosureConfig config{.max_closure_separation = 3, .max_request_separation = 0};
   RequestPolicy policy(config);
   for (KeyframeIndex successes = 1; successes <= 5; ++successes) {
@@ -46,7 +45,7 @@ TEST_CASE("No keyframe near a closure is requested and the distance grows with s
   CHECK(policy.decide(candidate(100, 50, 1, kPeer + 1)) == Decision::kRequest);  // another robot
 }
 
-TEST_CASE("No keyframe near a requested one is requested", "[request_policy]") {
+TEST_CASE("No keyframe near a requested one is requested") {
   LoopClosureConfig config{.max_request_separation = 2};
   RequestPolicy policy(config);
   REQUIRE(policy.decide(candidate(10, 20)) == Decision::kRequest);
@@ -62,8 +61,7 @@ TEST_CASE("No keyframe near a requested one is requested", "[request_policy]") {
   CHECK(policy.decide(candidate(0, 0)) == Decision::kRequest);
 }
 
-TEST_CASE("A pair that the peer compares is not requested, and none beside it after a closure",
-          "[request_policy]") {
+TEST_CASE("A pair that the peer compares is not requested, and none beside it after a closure") {
   LoopClosureConfig config{.max_request_separation = 2};
   RequestPolicy policy(config);
   policy.add_peer_request(kPeer, 10, 20);
@@ -76,7 +74,7 @@ TEST_CASE("A pair that the peer compares is not requested, and none beside it af
   CHECK(policy.decide(candidate(102, 200)) == Decision::kRequest);
 }
 
-TEST_CASE("A peer that requests without end is not listened to without end", "[request_policy]") {
+TEST_CASE("A peer that requests without end is not listened to without end") {
   RequestPolicy policy{LoopClosureConfig{}};
   for (KeyframeIndex i = 0; i < 100'000; ++i) policy.add_peer_request(kPeer, i, 20);
   CHECK(policy.decide(candidate(99'999, 20)) == Decision::kNearRequest);
@@ -97,8 +95,7 @@ int requests_among(RequestPolicy& policy, KeyframeIndex first, KeyframeIndex las
   return requests;
 }
 
-TEST_CASE("Candidates that fail are requested less and less often, more probable ones are not",
-          "[request_policy]") {
+TEST_CASE("Candidates that fail are requested less and less often, more probable ones are not") {
   LoopClosureConfig config{.max_request_separation = 0};
   RequestPolicy policy(config);
   // After m failures p is about log(m) / m, so n queries cost about sqrt(n log(n)) requests.
@@ -109,8 +106,7 @@ TEST_CASE("Candidates that fail are requested less and less often, more probable
   CHECK(policy.decide({{kPeer, 10'000}, {kSelf, 7}, 1.4, 5}) == Decision::kRequest);
 }
 
-TEST_CASE("The candidates of one query count once, with the most probable one",
-          "[request_policy]") {
+TEST_CASE("The candidates of one query count once, with the most probable one") {
   LoopClosureConfig config;
   config.max_closure_separation = config.max_request_separation = 0;
   config.min_closure_probability = 1.0;
@@ -128,7 +124,7 @@ TEST_CASE("The candidates of one query count once, with the most probable one",
   CHECK(decide(query + 1, 7, kEven) == Decision::kRequest);
 }
 
-TEST_CASE("Robots without closures request less probable candidates", "[request_policy]") {
+TEST_CASE("Robots without closures request less probable candidates") {
   LoopClosureConfig config;
   config.max_closure_separation = config.max_request_separation = 0;
   RequestPolicy policy(config);
@@ -146,8 +142,7 @@ TEST_CASE("Robots without closures request less probable candidates", "[request_
     CHECK(decide(query, kTenth) == Decision::kImprobable);
 }
 
-TEST_CASE("A candidate whose probability is not a number is requested as one that is improbable",
-          "[request_policy]") {
+TEST_CASE("A candidate whose probability is not a number is requested as one that is improbable") {
   RequestPolicy policy{LoopClosureConfig{}};
   for (KeyframeIndex query = 100; query < 400; query += 100) succeed(policy, query, query);
   int requests = 0;
@@ -168,7 +163,7 @@ double evidence_of(const LoopCandidate& c) {
   return 11.7 * c.similarity + 1.1 * c.support;
 }
 
-TEST_CASE("Similarity and support make a closure more probable", "[closure_odds]") {
+TEST_CASE("Similarity and support make a closure more probable") {
   const ClosureOdds odds;
   CHECK(odds.probability(found_with(12.9 / 11.7, 1)) == Approx(0.5));
   CHECK(odds.probability(found_with(1.0, 1)) == Approx(logistic(12.8 - 14.0)));
@@ -176,7 +171,7 @@ TEST_CASE("Similarity and support make a closure more probable", "[closure_odds]
   CHECK(odds.probability(found_with(1.0, 9)) == odds.probability(found_with(1.0, 5)));
 }
 
-TEST_CASE("The estimate is the maximum of the posterior distribution", "[closure_odds]") {
+TEST_CASE("The estimate is the maximum of the posterior distribution") {
   // Results as in a room: few closures among 40 requests.
   std::mt19937 engine(11);
   std::uniform_real_distribution<double> similarity(0.6, 1.1), unit(0.0, 1.0);

@@ -10,7 +10,7 @@ namespace {
 
 const ImageNoise kNoise;
 
-TEST_CASE("the verifier recovers the pose of the bodies", "[verifier]") {
+TEST_CASE("the verifier recovers the pose of the bodies") {
   const auto seed = GENERATE(range(1U, 11U));
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -49,20 +49,19 @@ double mean_squared_error(double sigmas, double motion, const Vector6& mounting)
 
 // The mean of 600 squares has a standard deviation of 6 %. Errors of the points are independent
 // here, and the covariance allows for three times their variance.
-TEST_CASE("the covariance of a closure follows the noise of its keypoints", "[verifier]") {
+TEST_CASE("the covariance of a closure follows the noise of its keypoints") {
   const double sigmas = GENERATE(0.4, 0.7, 1.0);
   CAPTURE(sigmas);
   CHECK(3.0 * mean_squared_error(sigmas, 0.0, Vector6::Zero()) == Approx(1.0).margin(0.2));
 }
 
-TEST_CASE("the covariance of a closure contains that of the mounting of both cameras",
-          "[verifier]") {
+TEST_CASE("the covariance of a closure contains that of the mounting of both cameras") {
   Vector6 mounting;
   mounting << 0.01, 0.02, 0.01, 0.03, 0.02, 0.01;
   CHECK(mean_squared_error(0.4, 0.15, mounting) == Approx(1.0).margin(0.2));
 }
 
-TEST_CASE("a keypoint that is not a number is no inlier", "[verifier]") {
+TEST_CASE("a keypoint that is not a number is no inlier") {
   std::mt19937 rng(2);
   KeyframePair pair = make_keyframe_pair(rng, 100, kNoise, 0.0);
   pair.to.keypoints[7].bearing.x() = std::nanf("");
@@ -74,14 +73,14 @@ TEST_CASE("a keypoint that is not a number is no inlier", "[verifier]") {
   CHECK(is_covariance(result.covariance));
 }
 
-TEST_CASE("keyframes of different places are refused", "[verifier]") {
+TEST_CASE("keyframes of different places are refused") {
   std::mt19937 rng(3);
   const KeyframePair here = make_keyframe_pair(rng, 300, kNoise, 1.0);
   const KeyframePair there = make_keyframe_pair(rng, 300, kNoise, 1.0);
   CHECK(Verifier({}).verify(here.from, there.to).status == VerificationStatus::kTooFewMatches);
 }
 
-TEST_CASE("similar images of different shape have no consensus", "[verifier]") {
+TEST_CASE("similar images of different shape have no consensus") {
   std::mt19937 rng(4);
   KeyframePair pair = make_keyframe_pair(rng, 100, kNoise, 1.0);
   std::shuffle(pair.to.keypoints.begin(), pair.to.keypoints.end(), rng);  // descriptors stay
@@ -91,7 +90,7 @@ TEST_CASE("similar images of different shape have no consensus", "[verifier]") {
   CHECK(result.consensus < Verifier::kMinConsensus);
 }
 
-TEST_CASE("a closure that depends on a small far patch is refused", "[verifier]") {
+TEST_CASE("a closure that depends on a small far patch is refused") {
   std::mt19937 rng(5);
   KeyframePair pair = make_keyframe_pair(rng, 60, kNoise, 0.0);
   for (KeyframeFeatures* features : {&pair.from, &pair.to})
@@ -103,7 +102,7 @@ TEST_CASE("a closure that depends on a small far patch is refused", "[verifier]"
   CHECK(Verifier({}).verify(pair.from, pair.to).status == VerificationStatus::kUncertainPose);
 }
 
-TEST_CASE("too few inliers are refused by number", "[verifier]") {
+TEST_CASE("too few inliers are refused by number") {
   std::mt19937 rng(6);
   const KeyframePair pair = make_keyframe_pair(rng, 14, kNoise, 0.3);
   LoopClosureConfig config;
@@ -112,7 +111,7 @@ TEST_CASE("too few inliers are refused by number", "[verifier]") {
   CHECK(Verifier(config).verify(pair.from, pair.to).status != VerificationStatus::kTooFewInliers);
 }
 
-TEST_CASE("keyframes without features or without depth are refused", "[verifier]") {
+TEST_CASE("keyframes without features or without depth are refused") {
   std::mt19937 rng(7);
   KeyframePair pair = make_keyframe_pair(rng, 50, kNoise, 0.0);
   CHECK(Verifier({}).verify({}, {}).status == VerificationStatus::kTooFewMatches);

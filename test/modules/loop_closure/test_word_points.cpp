@@ -31,7 +31,7 @@ KeyframePair two_views(std::mt19937& rng, std::size_t common) {
   return pair;
 }
 
-TEST_CASE("Points of common words agree where the keyframes see one place", "[word_points]") {
+TEST_CASE("Points of common words agree where the keyframes see one place") {
   std::mt19937 rng(3);
   const std::size_t common = GENERATE(0U, 20U, 60U, 150U);
   CAPTURE(common);
@@ -45,7 +45,7 @@ TEST_CASE("Points of common words agree where the keyframes see one place", "[wo
   CHECK(may_show_one_place(pair.from, vocabulary(), sent, {}) == (common > 0));
 }
 
-TEST_CASE("Only points with depth whose words the other keyframe has are sent", "[word_points]") {
+TEST_CASE("Only points with depth whose words the other keyframe has are sent") {
   std::mt19937 rng(4);
   KeyframePair pair = two_views(rng, 150);
   pair.to.keypoints[7].inverse_depth = 0.0F;
@@ -65,8 +65,7 @@ TEST_CASE("Only points with depth whose words the other keyframe has are sent", 
   CHECK(common_word_places(pair.to, vocabulary(), theirs, 0).empty());
 }
 
-TEST_CASE("No points, and points that no keypoint can pair with, agree with nothing",
-          "[word_points]") {
+TEST_CASE("No points, and points that no keypoint can pair with, agree with nothing") {
   std::mt19937 rng(5);
   const KeyframePair pair = two_views(rng, 150);
   WordPoints points = common_word_points(pair.to, vocabulary(), all_words(), kAll);
@@ -77,7 +76,7 @@ TEST_CASE("No points, and points that no keypoint can pair with, agree with noth
   CHECK_FALSE(may_show_one_place(pair.from, vocabulary(), points, {}));
 }
 
-TEST_CASE("Both bounds must be reached", "[word_points]") {
+TEST_CASE("Both bounds must be reached") {
   std::mt19937 rng(6);
   const KeyframePair pair = two_views(rng, 60);
   WordPoints sent = common_word_points(pair.to, vocabulary(), all_words(), kAll);
@@ -99,7 +98,7 @@ TEST_CASE("Both bounds must be reached", "[word_points]") {
 
 using Words = std::vector<std::uint32_t>;
 
-TEST_CASE("Words of peers are kept by keyframe, the newest of each", "[loop_closure]") {
+TEST_CASE("Words of peers are kept by keyframe, the newest of each") {
   PeerWords words;
   words.put({7, 1}, {1, 2});
   words.put({8, 1}, {3});
@@ -111,7 +110,7 @@ TEST_CASE("Words of peers are kept by keyframe, the newest of each", "[loop_clos
   CHECK(words.find({9, 1}) == nullptr);
 }
 
-TEST_CASE("A peer that sends words without end loses its own oldest", "[loop_closure]") {
+TEST_CASE("A peer that sends words without end loses its own oldest") {
   const std::size_t size = GENERATE(0U, 1000U, 65536U);
   PeerWords words;
   words.put({8, 0}, {1});

@@ -40,7 +40,7 @@ std::set<int> values(const OccupancyGrid& grid, double x0, double y0, double x1,
 
 using Values = std::set<int>;
 
-TEST_CASE("A room is free inside, its walls are occupied, and the outside is unknown", "[map_2d]") {
+TEST_CASE("A room is free inside, its walls are occupied, and the outside is unknown") {
   Surfaces surfaces;
   surfaces.room(0, 0, 6, 4).wall(4, 2, 8, 2, 0, 2.5F);  // one wall continues outside
   if (GENERATE(true, false)) surfaces.without_labels();
@@ -55,7 +55,7 @@ TEST_CASE("A room is free inside, its walls are occupied, and the outside is unk
   CHECK(grid.at({100, -100}) == kUnknown);
 }
 
-TEST_CASE("A table is an obstacle only for robots that do not fit under it", "[map_2d]") {
+TEST_CASE("A table is an obstacle only for robots that do not fit under it") {
   Surfaces surfaces;
   surfaces.room(0, 0, 6, 6).level(2, 2, 3.5F, 3, 0.75F, kWallLabel);
   SECTION("floor below it was seen") {}
@@ -67,7 +67,7 @@ TEST_CASE("A table is an obstacle only for robots that do not fit under it", "[m
   CHECK(values(map_of(surfaces), 2.05, 2.05, 3.45, 2.95) == Values{kOccupied});
 }
 
-TEST_CASE("A table over unseen floor is an obstacle", "[map_2d]") {
+TEST_CASE("A table over unseen floor is an obstacle") {
   Surfaces surfaces;
   // The table fills most of its tile of 2 m, and no floor is seen below it.
   surfaces.level(0, 0, 6, 2, 0, 0).level(0, 4, 6, 6, 0, 0).level(2.1F, 2.1F, 3.9F, 3.1F, 0.75F, 0);
@@ -75,7 +75,7 @@ TEST_CASE("A table over unseen floor is an obstacle", "[map_2d]") {
   CHECK(values(map_of(surfaces), 2.15, 2.15, 3.85, 3.05) == Values{kOccupied});
 }
 
-TEST_CASE("Ramps and stairs that are labelled as floor are free", "[map_2d]") {
+TEST_CASE("Ramps and stairs that are labelled as floor are free") {
   const bool labelled = GENERATE(true, false);
   Surfaces surfaces;
   surfaces.level(0, 0, 4, 4, 0, kFloorLabel);
@@ -96,7 +96,7 @@ TEST_CASE("Ramps and stairs that are labelled as floor are free", "[map_2d]") {
   CHECK(found.contains(kFree) == labelled);
 }
 
-TEST_CASE("Two floors are free, and the step between them is not", "[map_2d]") {
+TEST_CASE("Two floors are free, and the step between them is not") {
   Surfaces surfaces;
   surfaces.level(0, 0, 5, 4, 0, kFloorLabel).level(5, 0, 10, 4, 0.6F, kFloorLabel);
   if (GENERATE(true, false)) surfaces.without_labels();
@@ -109,7 +109,7 @@ TEST_CASE("Two floors are free, and the step between them is not", "[map_2d]") {
     CHECK(values(map_of(surfaces, climber), 0.1, 0.1, 9.9, 3.9) == Values{kFree});
 }
 
-TEST_CASE("Rays through the band free cells, and follow the poses of their keyframes", "[map_2d]") {
+TEST_CASE("Rays through the band free cells, and follow the poses of their keyframes") {
   Surfaces surfaces;
   surfaces.level(0, 0, 1, 4, 0, kFloorLabel).wall(2.5F, 4, 2.5F, 0, 0, 2);
   std::vector<ViewRays> views(2);
@@ -187,8 +187,7 @@ std::vector<Eigen::Vector2d> planned(const OccupancyGrid& grid, const Eigen::Vec
   return path;
 }
 
-TEST_CASE("A path through free cells does not touch a box of which only the front is mapped",
-          "[map_2d]") {
+TEST_CASE("A path through free cells does not touch a box of which only the front is mapped") {
   const Eigen::AlignedBox3d box(Eigen::Vector3d(4, 1.5, 0), Eigen::Vector3d(6, 4.5, 0.9));
   Surfaces surfaces;
   surfaces.level(0, 0, 3, 6, 0, kFloorLabel).level(7, 0, 9, 2, 0, kFloorLabel);
@@ -205,7 +204,7 @@ TEST_CASE("A path through free cells does not touch a box of which only the fron
     CHECK_FALSE(box.contains(Eigen::Vector3d(p.x(), p.y(), 0.1)));
 }
 
-TEST_CASE("Without floor there is no map, and a map that is too large is refused", "[map_2d]") {
+TEST_CASE("Without floor there is no map, and a map that is too large is refused") {
   const Map2dConfig config;
   CHECK(make_map_2d(config, {LabelledMesh{}, palette()}).status == Map2dStatus::kEmpty);
   Surfaces walls;
@@ -223,7 +222,7 @@ TEST_CASE("Without floor there is no map, and a map that is too large is refused
   CHECK(make_map_2d(config, {far.mesh, palette()}).status == Map2dStatus::kTooLarge);
 }
 
-TEST_CASE("map_server reads the map that was written", "[map_2d]") {
+TEST_CASE("map_server reads the map that was written") {
   OccupancyGrid grid{0.05, {-1.25, 10.0}, 3, 2, {}};
   grid.cells = {OccupancyGrid::kFree,     OccupancyGrid::kOccupied, OccupancyGrid::kUnknown,
                 OccupancyGrid::kOccupied, OccupancyGrid::kFree,     OccupancyGrid::kFree};
@@ -240,7 +239,7 @@ TEST_CASE("map_server reads the map that was written", "[map_2d]") {
   CHECK(map_of_image(map_image(grid)).width == 3);
 }
 
-TEST_CASE("Bytes that are no image of a map are refused", "[map_2d]") {
+TEST_CASE("Bytes that are no image of a map are refused") {
   const char* const image =
       GENERATE("", "P5", "P5 1 1 255", "P6\n1 1\n255\n.", "P5\n2 1\n255\n.", "P5\n0 0\n255\n",
                "P5\n-1 -1\n255\n.", "P5\n1 1\n65535\n.", "P5\n99999999 1\n255\n.", "P5 x 1 255\n.");
@@ -260,7 +259,7 @@ DenseFrame frame_at(double x, std::uint16_t millimetres) {
   return frame;
 }
 
-TEST_CASE("Rays end on the surface that the camera sees, up to a range", "[map_2d]") {
+TEST_CASE("Rays end on the surface that the camera sees, up to a range") {
   const auto millimetres = GENERATE(std::uint16_t{2000}, std::uint16_t{9000});
   RayThinner thinner(camera(), 5.0);
   const auto rays = thinner.add(frame_at(1, millimetres));
@@ -271,8 +270,7 @@ TEST_CASE("Rays end on the surface that the camera sees, up to a range", "[map_2
     REQUIRE(end.x() == Approx(1.0 + std::min(millimetres / 1000.0, 5.0)));
 }
 
-TEST_CASE("Images without depth, of another size or from nearly the same pose give no rays",
-          "[map_2d]") {
+TEST_CASE("Images without depth, of another size or from nearly the same pose give no rays") {
   RayThinner thinner(camera(), 5.0);
   CHECK(thinner.add(frame_at(0, 0))->ends.empty());
   CHECK_FALSE(thinner.add(frame_at(0.2, 2000)));
@@ -285,7 +283,7 @@ TEST_CASE("Images without depth, of another size or from nearly the same pose gi
   CHECK_FALSE(thinner.add(small));
 }
 
-TEST_CASE("The node maps the last mesh and moves the rays with its keyframes", "[map_2d]") {
+TEST_CASE("The node maps the last mesh and moves the rays with its keyframes") {
   Topic<DenseFrame> frames;
   Topic<OccupancyGrid> maps;
   std::vector<OccupancyGrid> received;

@@ -64,7 +64,7 @@ auto content_of(const MeshChunk& chunk, MeshChunk::Triple face) {
 
 }  // namespace
 
-TEST_CASE("A chunk is equal after packing and unpacking", "[mesh]") {
+TEST_CASE("A chunk is equal after packing and unpacking") {
   MeshChunk chunk = shuffled_chunk();
   SECTION("with all") {}
   SECTION("without labels") {
@@ -94,7 +94,7 @@ TEST_CASE("A chunk is equal after packing and unpacking", "[mesh]") {
   CHECK(unpacked(chunk) == chunk);
 }
 
-TEST_CASE("Sorting a chunk in space changes only the order of its vertices and faces", "[mesh]") {
+TEST_CASE("Sorting a chunk in space changes only the order of its vertices and faces") {
   const MeshChunk chunk = shuffled_chunk(), sorted = sorted_in_space(chunk);
   CHECK(fault_of(sorted) == nullptr);
   CHECK(counts_of(sorted).vertices == counts_of(chunk).vertices);
@@ -108,7 +108,7 @@ TEST_CASE("Sorting a chunk in space changes only the order of its vertices and f
   CHECK(sorted_in_space(sorted) == sorted);
 }
 
-TEST_CASE("A sorted and packed chunk takes less than a third of its bytes", "[mesh]") {
+TEST_CASE("A sorted and packed chunk takes less than a third of its bytes") {
   const MeshChunk chunk = shuffled_chunk();
   CHECK(3 * packed(sorted_in_space(chunk)).size() < plain_bytes(chunk));
   CHECK(packed(sorted_in_space(chunk)).size() < packed(chunk).size());

@@ -47,7 +47,7 @@ MeshChunk seen_triangle(std::array<MeshChunk::View, 2> views) {
 
 }  // namespace
 
-TEST_CASE("A rounded pose is within a millimetre and a tenth of a milliradian", "[mesh]") {
+TEST_CASE("A rounded pose is within a millimetre and a tenth of a milliradian") {
   const auto i = GENERATE(range(0, 20));
   const SE3 T = make_pose(so3_exp({0.3 * i, -0.1 * i, 2.9 - 0.2 * i}),
                           {0.12345 * i, -1e3 + 0.7777 * i, 1e6 - 0.3333 * i});
@@ -61,7 +61,7 @@ TEST_CASE("A rounded pose is within a millimetre and a tenth of a milliradian", 
                   std::invalid_argument);
 }
 
-TEST_CASE("However long a trajectory is, its poses stay within the bound", "[mesh]") {
+TEST_CASE("However long a trajectory is, its poses stay within the bound") {
   CHECK(mesh_keyframe_step(0) == 4);
   CHECK(mesh_keyframe_step(4096) == 4);
   CHECK(mesh_keyframe_step(4097) == 8);
@@ -71,7 +71,7 @@ TEST_CASE("However long a trajectory is, its poses stay within the bound", "[mes
   CHECK(count >= std::min<std::size_t>(kMaxMeshKeyframes / 2, (keyframes + 3) / 4));
 }
 
-TEST_CASE("A vertex moves with the mean of its first and its last view", "[mesh]") {
+TEST_CASE("A vertex moves with the mean of its first and its last view") {
   std::vector<SE3> now(5, SE3::Identity());
   now[4] = make_pose(Eigen::Matrix3d::Identity(), {0.0, 0.0, 8.0});
   const MeshPoses poses = poses_of(now);
@@ -87,7 +87,7 @@ TEST_CASE("A vertex moves with the mean of its first and its last view", "[mesh]
   CHECK(height({4, 4}) == Approx(8.0));
 }
 
-TEST_CASE("A chunk without poses of its keyframes stays as it was sent", "[mesh]") {
+TEST_CASE("A chunk without poses of its keyframes stays as it was sent") {
   const MeshChunk chunk = seen_triangle({0, 4});
   MeshPoses poses =
       poses_of(std::vector<SE3>(5, make_pose(Eigen::Matrix3d::Identity(), {1.0, 1.0, 1.0})));
@@ -102,7 +102,7 @@ TEST_CASE("A chunk without poses of its keyframes stays as it was sent", "[mesh]
   CHECK(place(fixed, &poses).vertices == place(fixed, nullptr).vertices);
 }
 
-TEST_CASE("A correction moves no face to another chunk", "[mesh]") {
+TEST_CASE("A correction moves no face to another chunk") {
   SeenSheet sheet;
   const std::vector<MeshChunk> before = sheet.chunks();
   const SE3 T = make_pose(so3_exp({0.0, 0.0, 0.4}), {1.3, 0.7, 0.0});
@@ -125,7 +125,7 @@ TEST_CASE("A correction moves no face to another chunk", "[mesh]") {
   }
 }
 
-TEST_CASE("A chunk of a long visit has fewer keyframes but keeps its views", "[mesh]") {
+TEST_CASE("A chunk of a long visit has fewer keyframes but keeps its views") {
   SeenSheet sheet(4001);
   for (auto& vertex : sheet.mesh.vertices) vertex *= 0.25F;  // one cell
   sheet.origin.mapped = sheet.mesh.vertices;
@@ -152,7 +152,7 @@ TEST_CASE("A chunk of a long visit has fewer keyframes but keeps its views", "[m
   CHECK(highest > 3.9);
 }
 
-TEST_CASE("Surfaces that were mapped at one place and belong far apart are sent apart", "[mesh]") {
+TEST_CASE("Surfaces that were mapped at one place and belong far apart are sent apart") {
   SeenSheet sheet;
   const std::size_t vertices = sheet.mesh.vertices.size();
   LabelledMesh far = sheet.mesh;
@@ -173,7 +173,7 @@ TEST_CASE("Surfaces that were mapped at one place and belong far apart are sent 
   CHECK(faces == sheet.mesh.faces.size());
 }
 
-TEST_CASE("Poses are sent again if they move surface or have other keyframes", "[mesh]") {
+TEST_CASE("Poses are sent again if they move surface or have other keyframes") {
   std::vector<SE3> trajectory(9, SE3::Identity());
   const MeshPoses before = poses_of(trajectory);
   CHECK_FALSE(has_moved(before, poses_of(trajectory), 0.0));

@@ -36,7 +36,7 @@ std::string refusal(const LabelledMesh& mesh, const ChunkGrid& grid = kGrid) {
   return {};
 }
 
-TEST_CASE("The chunks of a mesh contain the whole mesh", "[mesh]") {
+TEST_CASE("The chunks of a mesh contain the whole mesh") {
   const bool labelled = GENERATE(true, false);
   LabelledMesh mesh = wavy_sheet(150, 0.1);
   if (!labelled) mesh.labels.clear();
@@ -54,7 +54,7 @@ TEST_CASE("The chunks of a mesh contain the whole mesh", "[mesh]") {
   CHECK(faces_in_space(again) == faces_in_space(mesh));
 }
 
-TEST_CASE("A cell that is too full is sent in several parts", "[mesh]") {
+TEST_CASE("A cell that is too full is sent in several parts") {
   const LabelledMesh mesh = wavy_sheet(180, 0.01);  // 1.8 m: four cells, 16 000 faces each
   const SplitMesh pieces = split_mesh(mesh, 1, 1, kGrid);
   std::map<std::array<std::int32_t, 3>, std::uint16_t> parts;
@@ -66,7 +66,7 @@ TEST_CASE("A cell that is too full is sent in several parts", "[mesh]") {
   CHECK(faces_in_space(assembled(pieces.chunks)) == faces_in_space(mesh));
 }
 
-TEST_CASE("An unchanged mesh gives the same chunks", "[mesh]") {
+TEST_CASE("An unchanged mesh gives the same chunks") {
   const LabelledMesh mesh = wavy_sheet(100, 0.1);
   const SplitMesh before = split_mesh(mesh, 1, 1, kGrid);
   SECTION("in another order of faces and corners") {
@@ -90,7 +90,7 @@ TEST_CASE("An unchanged mesh gives the same chunks", "[mesh]") {
   }
 }
 
-TEST_CASE("Chunks differ by differences that a viewer would show", "[mesh]") {
+TEST_CASE("Chunks differ by differences that a viewer would show") {
   const LabelledMesh mesh = wavy_sheet(10, 0.1);
   const auto chunk_of = [](const LabelledMesh& m) { return split_mesh(m, 1, 1, {}).chunks.at(0); };
   const MeshChunk before = chunk_of(mesh);
@@ -114,8 +114,7 @@ TEST_CASE("Chunks differ by differences that a viewer would show", "[mesh]") {
   check_change(1.0, 0.0, [](auto& chunk) { chunk.anchor = 9; });
 }
 
-TEST_CASE("A mesh that cannot be sent is refused and a face that is too long is dropped",
-          "[mesh]") {
+TEST_CASE("A mesh that cannot be sent is refused and a face that is too long is dropped") {
   CHECK(split_mesh({}, 1, 1, kGrid).chunks.empty());
   const LabelledMesh good = wavy_sheet(2, 0.1);
   LabelledMesh mesh = good;
@@ -154,7 +153,7 @@ std::vector<std::int32_t> sent_cells(ChunkSchedule& schedule) {
 
 using Cells = std::vector<std::int32_t>;
 
-TEST_CASE("Moves below the threshold are sent when their sum exceeds it", "[mesh]") {
+TEST_CASE("Moves below the threshold are sent when their sum exceeds it") {
   ChunkSchedule schedule(0.010);  // chunks have steps of 1 mm
   schedule.update({chunk(0)});
   CHECK(sent_cells(schedule) == Cells{0});
@@ -164,7 +163,7 @@ TEST_CASE("Moves below the threshold are sent when their sum exceeds it", "[mesh
   CHECK(sent_cells(schedule) == Cells{0});
 }
 
-TEST_CASE("Only the newest state of a chunk is sent and only once", "[mesh]") {
+TEST_CASE("Only the newest state of a chunk is sent and only once") {
   ChunkSchedule schedule(0.0);
   schedule.update({chunk(0, 1)});
   schedule.update({chunk(0, 2)});
@@ -178,7 +177,7 @@ TEST_CASE("Only the newest state of a chunk is sent and only once", "[mesh]") {
   CHECK_FALSE(schedule.next());
 }
 
-TEST_CASE("A cell that vanished is sent empty once and may return", "[mesh]") {
+TEST_CASE("A cell that vanished is sent empty once and may return") {
   ChunkSchedule schedule(0.0);
   schedule.update({chunk(0), chunk(1)});
   CHECK(sent_cells(schedule) == Cells{0, 1});
@@ -194,7 +193,7 @@ TEST_CASE("A cell that vanished is sent empty once and may return", "[mesh]") {
   CHECK(sent_cells(schedule) == Cells{0});
 }
 
-TEST_CASE("After a restart everything is sent again and vanished cells are sent empty", "[mesh]") {
+TEST_CASE("After a restart everything is sent again and vanished cells are sent empty") {
   ChunkSchedule schedule(0.0);
   schedule.update({chunk(0), chunk(1), chunk(2)});
   CHECK(sent_cells(schedule) == Cells{0, 1, 2});
@@ -209,7 +208,7 @@ TEST_CASE("After a restart everything is sent again and vanished cells are sent 
   CHECK_FALSE(schedule.next());
 }
 
-TEST_CASE("Every chunk is sent although all change faster than they can be sent", "[mesh]") {
+TEST_CASE("Every chunk is sent although all change faster than they can be sent") {
   ChunkSchedule schedule(0.0);
   Cells sent;
   for (std::uint16_t version = 1; version <= 10; ++version) {
@@ -232,7 +231,7 @@ void add_all(TeamMesh& team, const std::vector<MeshChunk>& chunks) {
   for (const MeshChunk& chunk : chunks) REQUIRE(team.add(chunk) == ChunkVerdict::kTaken);
 }
 
-TEST_CASE("The team's mesh has the newest chunk of each robot and cell", "[mesh]") {
+TEST_CASE("The team's mesh has the newest chunk of each robot and cell") {
   TeamMesh team;
   CHECK(team.placed().empty());
   add_all(team, chunks_of(5, 1));
@@ -252,7 +251,7 @@ TEST_CASE("The team's mesh has the newest chunk of each robot and cell", "[mesh]
   CHECK(team.placed().size() == chunks - 1);
 }
 
-TEST_CASE("A robot that restarts replaces its mesh", "[mesh]") {
+TEST_CASE("A robot that restarts replaces its mesh") {
   TeamMesh team;
   add_all(team, chunks_of(5, 77));
   REQUIRE(team.add(MeshPoses{.robot = 5, .boot = 77}) == ChunkVerdict::kTaken);
@@ -268,7 +267,7 @@ TEST_CASE("A robot that restarts replaces its mesh", "[mesh]") {
   CHECK(assembled(team, 5).vertices.size() == 11 * 11);
 }
 
-TEST_CASE("A robot cannot send more than its bound", "[mesh]") {
+TEST_CASE("A robot cannot send more than its bound") {
   MeshChunk chunk = chunks_of(5, 1, 10).front();
   TeamMesh team(10 * plain_bytes(chunk) + 1);
   for (std::int32_t i = 0; i < 10; ++i) {

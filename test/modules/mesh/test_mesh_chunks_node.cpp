@@ -52,7 +52,7 @@ MapSharingConfig slow() {
   return config;
 }
 
-TEST_CASE("Chunks are sent no faster than configured", "[node]") {
+TEST_CASE("Chunks are sent no faster than configured") {
   SentMesh out;
   Inbox<MeshChunk>& sent = out.chunks;
   MeshChunksNode node(slow(), 7, out.topics());
@@ -78,7 +78,7 @@ TEST_CASE("Chunks are sent no faster than configured", "[node]") {
   CHECK(now_s - 1000.0 < least_s + 3.0);  // and no slower
 }
 
-TEST_CASE("A mesh that changes while it is sent ends in its newest state", "[node]") {
+TEST_CASE("A mesh that changes while it is sent ends in its newest state") {
   SentMesh out;
   Inbox<MeshChunk>& sent = out.chunks;
   MeshChunksNode node(slow(), 7, out.topics());
@@ -118,7 +118,7 @@ struct TwoViews {
   MeshOrigin origin;
 };
 
-TEST_CASE("Poses take at most a tenth of the bytes, and the newest are sent last", "[node]") {
+TEST_CASE("Poses take at most a tenth of the bytes, and the newest are sent last") {
   SentMesh out;
   MapSharingConfig config{.max_bytes_per_s = 1000.0};
   MeshChunksNode node(config, 7, out.topics());
@@ -152,7 +152,7 @@ Arrived<MeshChunk> received(const MeshChunk& chunk) {
   return encoded_by(TeamPeer{chunk.key.robot, 12345}, chunk);
 }
 
-TEST_CASE("A mesh chunk is equal after encoding and decoding", "[codec]") {
+TEST_CASE("A mesh chunk is equal after encoding and decoding") {
   MeshChunk chunk = some_chunk();
   SECTION("with labels") {}
   SECTION("without labels") {
@@ -174,7 +174,7 @@ TEST_CASE("A mesh chunk is equal after encoding and decoding", "[codec]") {
   CHECK(*result.value == chunk);
 }
 
-TEST_CASE("The largest chunk is equal after encoding and decoding", "[codec]") {
+TEST_CASE("The largest chunk is equal after encoding and decoding") {
   const LabelledMesh mesh = wavy_sheet(180, 0.01);
   MeshOrigin origin{.seen_by = {}, .T_world_kf = {}, .mapped = mesh.vertices};
   origin.T_world_kf.assign(2000, SE3::Identity());
@@ -191,7 +191,7 @@ TEST_CASE("The largest chunk is equal after encoding and decoding", "[codec]") {
   CHECK(largest <= kMaxChunkBytes);
 }
 
-TEST_CASE("An impossible mesh chunk is refused", "[codec]") {
+TEST_CASE("An impossible mesh chunk is refused") {
   MeshChunk chunk = some_chunk();
   state_keyframes(chunk);
   const char* const missing = "elements are missing or too many";
@@ -249,7 +249,7 @@ TEST_CASE("An impossible mesh chunk is refused", "[codec]") {
         [](auto& m) { m.wire.origin.y = std::numeric_limits<std::int32_t>::min(); }}});
 }
 
-TEST_CASE("Poses of a mesh are equal after encoding and decoding", "[codec]") {
+TEST_CASE("Poses of a mesh are equal after encoding and decoding") {
   MeshPoses poses{.robot = 700, .anchor = 3};
   poses.keyframes = mesh_keyframes(
       std::vector<SE3>(GENERATE(0U, 1U, 4096U), make_pose(so3_exp({0.1, 2.0, 0.3}), {-1e6, 2, 3})));
@@ -262,7 +262,7 @@ TEST_CASE("Poses of a mesh are equal after encoding and decoding", "[codec]") {
   CHECK(*result.value == poses);
 }
 
-TEST_CASE("Impossible poses of a mesh are refused", "[codec]") {
+TEST_CASE("Impossible poses of a mesh are refused") {
   const MeshPoses poses{.keyframes = mesh_keyframes(std::vector<SE3>(20, SE3::Identity()))};
   const char* const missing = "elements are missing or too many";
   check_refusals<MeshPoses>(

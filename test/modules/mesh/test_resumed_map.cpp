@@ -34,7 +34,7 @@ void check_equal(const MapMesh& a, const MapMesh& b) {
   CHECK(a.voxel_m == b.voxel_m);
 }
 
-TEST_CASE("A map is read from its file to the last bit", "[map_file]") {
+TEST_CASE("A map is read from its file to the last bit") {
   const TemporaryFolder folder;
   const auto file = folder.path() / "run.map";
   for (MapMesh map : {strip(7, 0.0F, 5), MapMesh()}) {
@@ -47,7 +47,7 @@ TEST_CASE("A map is read from its file to the last bit", "[map_file]") {
   }
 }
 
-TEST_CASE("A map file that is truncated or corrupted is refused by name", "[map_file]") {
+TEST_CASE("A map file that is truncated or corrupted is refused by name") {
   const TemporaryFolder folder;
   write_map_file(folder.path() / "run.map", strip(3, 0.0F, 0));
   const std::string bytes = folder.read("run.map");
@@ -65,7 +65,7 @@ TEST_CASE("A map file that is truncated or corrupted is refused by name", "[map_
   CHECK_THROWS_AS(read_map_file(folder.path() / "missing"), InputFileError);
 }
 
-TEST_CASE("A map file with faces of missing vertices is refused", "[map_file]") {
+TEST_CASE("A map file with faces of missing vertices is refused") {
   const TemporaryFolder folder;
   MapMesh map = strip(3, 0.0F, 0);
   map.mesh.faces[1][2] = 5;
@@ -77,7 +77,7 @@ TEST_CASE("A map file with faces of missing vertices is refused", "[map_file]") 
   CHECK_THROWS_AS(read_map_file(folder.path() / "run.map"), InputFileError);
 }
 
-TEST_CASE("New surface is appended to the former map under ids that follow", "[resumed_map]") {
+TEST_CASE("New surface is appended to the former map under ids that follow") {
   const ResumedMap resumed(strip(4, 0.0F, 100), 6);
   const MapMesh now = strip(2, 50.0F, 0);
   const MapMesh both = resumed.with(now);
@@ -93,8 +93,7 @@ TEST_CASE("New surface is appended to the former map under ids that follow", "[r
   check_equal(resumed.with(MapMesh()), resumed.before());
 }
 
-TEST_CASE("Superseded surface of the former map is dropped and the mapper gets its own part",
-          "[resumed_map]") {
+TEST_CASE("Superseded surface of the former map is dropped and the mapper gets its own part") {
   ResumedMap resumed(strip(4, 0.0F, 100), 20);  // ids 100, 103, ... 115; then from 116 on
   const SupersededSurface rest =
       resumed.drop({{{100, 119}, {103, 119}, {106, 119}, {119, 122}, {122, 115}, {125, 119}}});

@@ -39,7 +39,7 @@ double rms_m(const std::vector<Eigen::Vector3f>& points) {
   return std::sqrt(sum / static_cast<double>(points.size()));
 }
 
-TEST_CASE("The filter removes noise of walls and keeps their corner", "[mesh]") {
+TEST_CASE("The filter removes noise of walls and keeps their corner") {
   const LabelledMesh noisy = noisy_corner(0.005F), ideal = noisy_corner(0.0F);
   CHECK(rms_m(noisy.vertices) > 0.0045);
   CHECK(rms_m(filter_surface(noisy.vertices, noisy.faces)) < 0.0025);
@@ -47,7 +47,7 @@ TEST_CASE("The filter removes noise of walls and keeps their corner", "[mesh]") 
   for (std::size_t v = 0; v < kept.size(); ++v) CHECK((kept[v] - ideal.vertices[v]).norm() < 1e-4F);
 }
 
-TEST_CASE("Filtering near a change gives the positions of filtering everything", "[mesh]") {
+TEST_CASE("Filtering near a change gives the positions of filtering everything") {
   LabelledMesh mesh = noisy_corner(0.005F);
   auto filtered = filter_surface(mesh.vertices, mesh.faces);
   std::vector<std::uint32_t> changed = {100, 101, 102};

@@ -21,7 +21,7 @@ void check_complete(const SimplifiedMesh& simplified, const MapMesh& map) {
 
 }  // namespace
 
-TEST_CASE("Nodes spread over flat surface at about the spacing", "[mesh_deformation]") {
+TEST_CASE("Nodes spread over flat surface at about the spacing") {
   const SheetSize size{.columns = 200, .rows = 100, .step_m = 0.1, .keyframe_step_m = 0.5};
   const MapMesh map = sheet(size);  // 20 m x 10 m
   const SimplifiedMesh simplified = simplify(map, kScale);
@@ -39,8 +39,7 @@ TEST_CASE("Nodes spread over flat surface at about the spacing", "[mesh_deformat
   }
 }
 
-TEST_CASE("Surfaces of distant times have separate nodes and no common edge",
-          "[mesh_deformation]") {
+TEST_CASE("Surfaces of distant times have separate nodes and no common edge") {
   MapMesh map = sheet({.columns = 40, .rows = 40, .step_m = 0.1, .keyframe_step_m = 10.0});
   MapMesh again = map;  // the same place on a later visit, 5 cm above, joined along one border
   for (auto& vertex : again.mesh.vertices) vertex.z() += 0.05F;
@@ -61,7 +60,7 @@ TEST_CASE("Surfaces of distant times have separate nodes and no common edge",
           kScale.max_gap_keyframes);
 }
 
-TEST_CASE("Faces that form no manifold are decimated too", "[mesh_deformation]") {
+TEST_CASE("Faces that form no manifold are decimated too") {
   const auto seed = GENERATE(range(0U, 5U));
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -86,7 +85,7 @@ TEST_CASE("Faces that form no manifold are decimated too", "[mesh_deformation]")
   for (const std::uint32_t point : collapsed.kept) CHECK(point < soup.points.size());
 }
 
-TEST_CASE("Vertices without faces have nodes, and an empty mesh has none", "[mesh_deformation]") {
+TEST_CASE("Vertices without faces have nodes, and an empty mesh has none") {
   MapMesh map;
   CHECK(simplify(map, kScale).nodes.empty());
   map.mesh.vertices = {{0, 0, 0}, {0.1F, 0, 0}, {5, 0, 0}};

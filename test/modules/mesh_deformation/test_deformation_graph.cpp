@@ -13,7 +13,7 @@ constexpr double kDerivative = 1e-5;  // central differences of step 1e-6, value
 
 }  // namespace
 
-TEST_CASE("A node is tied to keyframes spread over its time of sight", "[mesh_deformation]") {
+TEST_CASE("A node is tied to keyframes spread over its time of sight") {
   const auto keyframes = [](SeenBy seen, std::size_t count) {
     std::vector<KeyframeIndex> result;
     const MeshNode node{Eigen::Vector3d::Zero(), seen};
@@ -30,7 +30,7 @@ TEST_CASE("A node is tied to keyframes spread over its time of sight", "[mesh_de
   CHECK(keyframes({10, 100}, 4) == List{10, 100});
 }
 
-TEST_CASE("A cube held at two corners stretches", "[mesh_deformation]") {
+TEST_CASE("A cube held at two corners stretches") {
   DeformationGraph graph;
   for (int i = 0; i < 8; ++i) graph.nodes.emplace_back(i % 2, i / 2 % 2, i / 4);
   for (std::uint32_t i = 0; i < 8; ++i)
@@ -58,7 +58,7 @@ TEST_CASE("A cube held at two corners stretches", "[mesh_deformation]") {
   CHECK(nodes[7].translation().x() + nodes[6].translation().x() == Approx(1.0).margin(1e-3));
 }
 
-TEST_CASE("The derivatives of rigidity agree with differences", "[mesh_deformation]") {
+TEST_CASE("The derivatives of rigidity agree with differences") {
   const auto seed = GENERATE(range(0U, 5U));
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -74,7 +74,7 @@ TEST_CASE("The derivatives of rigidity agree with differences", "[mesh_deformati
   CHECK((term.by_b - by_b).cwiseAbs().maxCoeff() < kDerivative);
 }
 
-TEST_CASE("The derivatives of the rotation term agree with differences", "[mesh_deformation]") {
+TEST_CASE("The derivatives of the rotation term agree with differences") {
   const auto seed = GENERATE(range(0U, 5U));
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -95,7 +95,7 @@ TEST_CASE("The derivatives of the rotation term agree with differences", "[mesh_
   CHECK((term.by_node - by_node).cwiseAbs().maxCoeff() < kDerivative);
 }
 
-TEST_CASE("The anchor term is the tangent vector from the anchor", "[mesh_deformation]") {
+TEST_CASE("The anchor term is the tangent vector from the anchor") {
   const auto seed = GENERATE(range(0U, 5U));
   CAPTURE(seed);
   std::mt19937 rng(seed);

@@ -47,7 +47,7 @@ Scene random_scene(std::mt19937& rng, std::size_t vertices, std::size_t nodes) {
 
 }  // namespace
 
-TEST_CASE("Weights are (1 - d/d_max)^2, normalised", "[mesh_deformation]") {
+TEST_CASE("Weights are (1 - d/d_max)^2, normalised") {
   Scene scene;
   scene.add_vertex({0, 0, 0}, {0, 0});
   for (const double x : {1.0, 2.0, 4.0}) scene.add_node({x, 0, 0}, {0, 0}, moved_to(x, 0, 0));
@@ -71,7 +71,7 @@ TEST_CASE("Weights are (1 - d/d_max)^2, normalised", "[mesh_deformation]") {
   }
 }
 
-TEST_CASE("The nodes of a vertex are those of an exhaustive search", "[mesh_deformation]") {
+TEST_CASE("The nodes of a vertex are those of an exhaustive search") {
   const auto seed = GENERATE(range(0U, 3U));
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -96,7 +96,7 @@ TEST_CASE("The nodes of a vertex are those of an exhaustive search", "[mesh_defo
   }
 }
 
-TEST_CASE("A vertex without a node near in time moves with its keyframe", "[mesh_deformation]") {
+TEST_CASE("A vertex without a node near in time moves with its keyframe") {
   Scene scene;
   scene.add_vertex({1, 2, 3}, {7, 9});
   scene.add_node({1, 2, 3}, {100, 110}, moved_to(50, 0, 0));

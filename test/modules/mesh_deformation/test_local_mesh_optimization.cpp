@@ -20,7 +20,7 @@ std::string refusal(const MapMesh& map, const std::vector<SE3>& odometry,
 
 }  // namespace
 
-TEST_CASE("Keyframes that move rigidly move the mesh rigidly", "[mesh_deformation]") {
+TEST_CASE("Keyframes that move rigidly move the mesh rigidly") {
   const auto seed = GENERATE(range(0U, 3U));
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -41,8 +41,7 @@ TEST_CASE("Keyframes that move rigidly move the mesh rigidly", "[mesh_deformatio
   CHECK(result.mesh.labels == map.mesh.labels);
 }
 
-TEST_CASE("A straight corridor follows bent keyframes and stays locally rigid",
-          "[mesh_deformation]") {
+TEST_CASE("A straight corridor follows bent keyframes and stays locally rigid") {
   // 20 m on a circle of 15 m: the end rises by 11 m and turns by 76 degrees.
   const double radius_m = 15.0;
   const SheetSize size{.columns = 80, .rows = 8, .step_m = 0.25, .keyframe_step_m = 0.5};
@@ -69,7 +68,7 @@ TEST_CASE("A straight corridor follows bent keyframes and stays locally rigid",
   CHECK(largest_stretch < 0.1);
 }
 
-TEST_CASE("Invalid input is refused by name", "[mesh_deformation]") {
+TEST_CASE("Invalid input is refused by name") {
   struct Call {
     MapMesh map = sheet(kSheet);
     std::vector<SE3> keyframes = keyframes_above(kSheet), optimised = keyframes;

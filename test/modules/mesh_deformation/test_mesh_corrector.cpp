@@ -16,7 +16,7 @@ struct Corridor {
   void bend_to(double radius_m) { T_world_kf = bent(T_odom_kf, radius_m); }
 };
 
-TEST_CASE("A mesh is corrected once and again only for a reason", "[mesh_deformation]") {
+TEST_CASE("A mesh is corrected once and again only for a reason") {
   Corridor corridor;
   corridor.bend_to(20.0);
   MeshCorrector corrector(MeshDeformationConfig{});
@@ -54,8 +54,7 @@ TEST_CASE("A mesh is corrected once and again only for a reason", "[mesh_deforma
   }
 }
 
-TEST_CASE("A mesh corrected from scratch does not depend on earlier corrections",
-          "[mesh_deformation]") {
+TEST_CASE("A mesh corrected from scratch does not depend on earlier corrections") {
   Corridor corridor;
   corridor.bend_to(20.0);
   MeshCorrector fresh(MeshDeformationConfig{});
@@ -114,7 +113,7 @@ struct TwoVisits {
   std::uint64_t version = 1;
 };
 
-TEST_CASE("The newer of two visits that coincide after correction stays", "[mesh_deformation]") {
+TEST_CASE("The newer of two visits that coincide after correction stays") {
   TwoVisits visits;
   MeshDeformationConfig config{.duplicate_faces = 0};
   CopyLimits limits{.copies = 1};
@@ -162,7 +161,7 @@ TEST_CASE("The newer of two visits that coincide after correction stays", "[mesh
   }
 }
 
-TEST_CASE("Copies stay until a further visit exceeds their share", "[mesh_deformation]") {
+TEST_CASE("Copies stay until a further visit exceeds their share") {
   TwoVisits visits;
   MeshDeformationConfig config{.duplicate_faces = 0};
   CopyLimits limits{.copies = 1};
@@ -183,8 +182,7 @@ std::vector<SE3> random_poses(std::mt19937& rng, std::size_t count) {
   return poses;
 }
 
-TEST_CASE("Keyframes without an optimised pose follow odometry from the last that has one",
-          "[mesh_deformation]") {
+TEST_CASE("Keyframes without an optimised pose follow odometry from the last that has one") {
   std::mt19937 rng(2);
   const std::vector<SE3> odometry = random_poses(rng, 4);
   const SE3 T_world_odom = random_pose(rng);

@@ -69,7 +69,7 @@ class Hours {
   double now_s_ = 1e9;
 };
 
-TEST_CASE("The mesh deformation node publishes the optimised mesh", "[node]") {
+TEST_CASE("The mesh deformation node publishes the optimised mesh") {
   Robot robot;
   MeshDeformationNode node(every_two_seconds(), kSelf, robot.topics());
   Hours hours(node);
@@ -100,7 +100,7 @@ TEST_CASE("The mesh deformation node publishes the optimised mesh", "[node]") {
   CHECK(robot.results()[1].mesh.vertices.back().x() == Approx(last_vertex_x(40.0)).margin(0.05));
 }
 
-TEST_CASE("A correction waits until the last one is a period old", "[node]") {
+TEST_CASE("A correction waits until the last one is a period old") {
   Robot robot;
   MeshDeformationNode node(every_two_seconds(), kSelf, robot.topics());
   show_map(robot, node);
@@ -115,7 +115,7 @@ TEST_CASE("A correction waits until the last one is a period old", "[node]") {
   CHECK(robot.results().size() == 2);
 }
 
-TEST_CASE("A map that arrives before its keyframes waits for them", "[node]") {
+TEST_CASE("A map that arrives before its keyframes waits for them") {
   Robot robot;
   MeshDeformationNode node(every_two_seconds(), kSelf, robot.topics());
   Hours hours(node);
@@ -129,7 +129,7 @@ TEST_CASE("A map that arrives before its keyframes waits for them", "[node]") {
   CHECK(robot.results().size() == 1);
 }
 
-TEST_CASE("The last correction is from scratch and no other follows", "[node]") {
+TEST_CASE("The last correction is from scratch and no other follows") {
   Robot robot;
   MeshDeformationNode node(every_two_seconds(), kSelf, robot.topics());
   show_map(robot, node);
@@ -149,7 +149,7 @@ TEST_CASE("The last correction is from scratch and no other follows", "[node]") 
   CHECK(robot.results().size() == 2);
 }
 
-TEST_CASE("A last map that cannot be corrected is reported", "[node]") {
+TEST_CASE("A last map that cannot be corrected is reported") {
   Robot robot;
   MeshDeformationNode node(every_two_seconds(), kSelf, robot.topics());
   node.step(robot.keyframe(0), 0.0);
@@ -160,7 +160,7 @@ TEST_CASE("A last map that cannot be corrected is reported", "[node]") {
   CHECK(robot.results().empty());
 }
 
-TEST_CASE("A mesh is current once it is corrected, also if there is none", "[node]") {
+TEST_CASE("A mesh is current once it is corrected, also if there is none") {
   Robot robot;
   MeshDeformationConfig config{.period_s = 0.01};
   MeshDeformationNode node(config, kSelf, robot.topics());

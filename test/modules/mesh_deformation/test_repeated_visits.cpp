@@ -85,8 +85,7 @@ double right_labels(const LabelledMesh& mesh) {
   return static_cast<double>(right) / static_cast<double>(mesh.vertices.size());
 }
 
-TEST_CASE("In a room circled repeatedly the map hardly grows and no surface is lost",
-          "[mesh_deformation][slow]") {
+TEST_CASE("In a room circled repeatedly the map hardly grows and no surface is lost") {
   Flight flight(1.0, 25), hoarding(0.0, kFramesPerLap);
   for (int lap = 0; lap < 2; ++lap) {
     flight.lap();

@@ -118,8 +118,7 @@ std::size_t vertices_in(const LabelledMesh& mesh, const Box& space) {
       mesh.vertices, [&](const Eigen::Vector3f& p) { return space.contains(p.cast<double>()); }));
 }
 
-TEST_CASE("A box that has gone loses its surface, and the wall behind it does not",
-          "[mesh_deformation]") {
+TEST_CASE("A box that has gone loses its surface, and the wall behind it does not") {
   const TwoPasses world({{kWall, kFloor, kParked}}, {{kWall, kFloor}});
   const MeshCorrection all = world.run(0), some = world.run(3);
   // The lowest 0.3 m are before the floor, which the cells around a vertex show behind it.
@@ -134,8 +133,7 @@ TEST_CASE("A box that has gone loses its surface, and the wall behind it does no
   CHECK(some.origin.mapped.size() == some.mesh.vertices.size());
 }
 
-TEST_CASE("The mapper may drop a box that two searches for copies find gone",
-          "[mesh_deformation]") {
+TEST_CASE("The mapper may drop a box that two searches for copies find gone") {
   auto recording = TwoPasses({{kWall, kFloor, kParked}}, {{kWall, kFloor}}).record();
   MeshDeformationConfig config{.duplicate_faces = 0};
   MeshCorrector corrector(config, {.share = 0.0});
@@ -166,7 +164,7 @@ TEST_CASE("The mapper may drop a box that two searches for copies find gone",
   CHECK(in_box > second->superseded.vertices.size() * 9 / 10);
 }
 
-TEST_CASE("Surface that is still there stays", "[mesh_deformation]") {
+TEST_CASE("Surface that is still there stays") {
   const BoxScene scene{{kWall, kFloor, kPole, kScreen}};
   SECTION("in voxels of 0.1 m") {
     CHECK(TwoPasses(scene, scene).removed() == 0);
@@ -186,14 +184,13 @@ TEST_CASE("Surface that is still there stays", "[mesh_deformation]") {
   }
 }
 
-TEST_CASE("Surface seen once stays", "[mesh_deformation]") {
+TEST_CASE("Surface seen once stays") {
   // In the second pass a wall before it hides the box.
   const Box near = box({-20.0, -20.0, 1.5}, {20.0, 20.0, 1.6});
   CHECK(TwoPasses({{kWall, kParked}}, {{kWall, kParked, near}}).removed() == 0);
 }
 
-TEST_CASE("Surface stays if the covariance of the poses explains the view through it",
-          "[mesh_deformation]") {
+TEST_CASE("Surface stays if the covariance of the poses explains the view through it") {
   TwoPasses world({{kWall, kScreen}}, {{kWall, kScreen}});
   world.drift.x() = 0.5;
   CHECK(world.removed() > 0);
@@ -201,7 +198,7 @@ TEST_CASE("Surface stays if the covariance of the poses explains the view throug
   CHECK(world.removed() == 0);
 }
 
-TEST_CASE("Errors of poses on a chain count from one to the other", "[mesh_deformation]") {
+TEST_CASE("Errors of poses on a chain count from one to the other") {
   std::vector<Matrix6> covariances;
   // Out along a chain, a closure at keyframe 4 to the first one, and out again.
   for (const double variance : {0.0, 1.0, 2.0, 3.0, 0.5, 1.5, 2.5}) {
@@ -222,7 +219,7 @@ TEST_CASE("Errors of poses on a chain count from one to the other", "[mesh_defor
   CHECK(relative_sigmas(covariances, 3)[6].translation_m == Approx(sigmas[3].translation_m));
 }
 
-TEST_CASE("Views that show surface again outweigh views through it", "[mesh_deformation]") {
+TEST_CASE("Views that show surface again outweigh views through it") {
   const BoxScene empty{{kWall}}, parked{{kWall, kParked}};
   CoarseViews views(small_camera(), {}, 0.3);
   const auto add = [&](const BoxScene& scene) {

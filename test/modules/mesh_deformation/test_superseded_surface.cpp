@@ -37,8 +37,7 @@ LabelledMesh cleaned(const MapMesh& map) {
       map.mesh, find_replacements(map.mesh, {map.seen_by, map.certainty}, kSameSurface));
 }
 
-TEST_CASE("The newer of two copies of a surface stays in any order of the mesh",
-          "[mesh_deformation]") {
+TEST_CASE("The newer of two copies of a surface stays in any order of the mesh") {
   const double height_m = GENERATE(0.9, -0.9, 0.0) * kVoxel_m;
   CAPTURE(height_m);
   const MapMesh older = sheet_at({0, 0, 0}), newer = sheet_at({0, 0, height_m});
@@ -53,7 +52,7 @@ TEST_CASE("The newer of two copies of a surface stays in any order of the mesh",
   CHECK(cleaned(other_order).vertices == older.mesh.vertices);
 }
 
-TEST_CASE("The more certain of two copies stays", "[mesh_deformation]") {
+TEST_CASE("The more certain of two copies stays") {
   const MapMesh older = sheet_at({0, 0, 0}), newer = sheet_at({0, 0, 0.1});
   MapMesh map = visits({older, newer});
   map.certainty.assign(map.ids.size(), 5);
@@ -76,7 +75,7 @@ TEST_CASE("The more certain of two copies stays", "[mesh_deformation]") {
   }
 }
 
-TEST_CASE("As many of the newest copies stay as are asked for", "[mesh_deformation]") {
+TEST_CASE("As many of the newest copies stay as are asked for") {
   std::vector<MapMesh> sheets;
   for (int i = 0; i < 5; ++i) sheets.push_back(sheet_at({0, 0, 0.02 * i}));
   const MapMesh map = visits(sheets);
@@ -95,8 +94,7 @@ TEST_CASE("As many of the newest copies stay as are asked for", "[mesh_deformati
 }
 
 // Noise lifts a scrap of the older copy off the newer one.
-TEST_CASE("A scrap of few faces goes with the copy around it, and a larger one stays",
-          "[mesh_deformation]") {
+TEST_CASE("A scrap of few faces goes with the copy around it, and a larger one stays") {
   const int lifted = GENERATE(1, 4);  // 6 and 30 faces have a lifted corner
   CAPTURE(lifted);
   MapMesh older = sheet_at({0, 0, 0});
@@ -114,7 +112,7 @@ TEST_CASE("A scrap of few faces goes with the copy around it, and a larger one s
   CHECK(stays == (lifted == 4));
 }
 
-TEST_CASE("The replacement of a vertex is its copy by id", "[mesh_deformation]") {
+TEST_CASE("The replacement of a vertex is its copy by id") {
   const MapMesh map = visits({sheet_at({0, 0, 0}), sheet_at({0.05, 0.03, 0.1})});
   const auto count = static_cast<std::uint32_t>(map.ids.size() / 2);
   const auto replacements = find_replacements(map.mesh, {map.seen_by, map.certainty}, kSameSurface);
@@ -129,7 +127,7 @@ TEST_CASE("The replacement of a vertex is its copy by id", "[mesh_deformation]")
   CHECK(surface.vertices[7].replacement == 10 * (7 + count) + 3);
 }
 
-TEST_CASE("Two different surfaces both stay", "[mesh_deformation]") {
+TEST_CASE("Two different surfaces both stay") {
   MapMesh second = sheet_at({0, 0, 0});
   KeyframeIndex later = kVisit;
   SECTION("more than the distance apart") {
@@ -150,7 +148,7 @@ TEST_CASE("Two different surfaces both stay", "[mesh_deformation]") {
   CHECK(result.vertices == map.mesh.vertices);
 }
 
-TEST_CASE("Surface that the newer visit did not see stays up to its rim", "[mesh_deformation]") {
+TEST_CASE("Surface that the newer visit did not see stays up to its rim") {
   // The sheet is 5 m long
   const MapMesh older = sheet_at({0, 0, 0}), newer = sheet_at({2.1, 0, 0.1});
   const LabelledMesh result = cleaned(visits({older, newer}));
@@ -166,7 +164,7 @@ TEST_CASE("Surface that the newer visit did not see stays up to its rim", "[mesh
 }
 
 // At the edge the normals of neither wall pass through points outside both.
-TEST_CASE("A copy of a convex edge is dropped as a whole", "[mesh_deformation]") {
+TEST_CASE("A copy of a convex edge is dropped as a whole") {
   const auto roof = [](double larger_m) {
     MapMesh result = sheet(kSheet);
     for (Eigen::Vector3f& p : result.mesh.vertices) {
@@ -182,8 +180,7 @@ TEST_CASE("A copy of a convex edge is dropped as a whole", "[mesh_deformation]")
 
 // The certainty of a vertex depends on few frames and differs between neighbours. No copy is then
 // the most certain one everywhere.
-TEST_CASE("About one of many copies stays if their certainties differ from vertex to vertex",
-          "[mesh_deformation]") {
+TEST_CASE("About one of many copies stays if their certainties differ from vertex to vertex") {
   const auto seed = GENERATE(range(0U, 3U));
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -205,8 +202,7 @@ TEST_CASE("About one of many copies stays if their certainties differ from verte
   CHECK(left < one * 3 / 2);  // a copy ends with a seam of whole faces where a better one begins
 }
 
-TEST_CASE("A mesh without faces and one with a face without area have no replacements",
-          "[mesh_deformation]") {
+TEST_CASE("A mesh without faces and one with a face without area have no replacements") {
   CHECK(find_replacements({}, {{}, {}}, kSameSurface).empty());
   LabelledMesh mesh;
   mesh.vertices.assign(6, Eigen::Vector3f::Zero());

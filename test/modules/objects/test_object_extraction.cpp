@@ -15,8 +15,7 @@ std::vector<MapObject> objects_in(const TestMap& map, const ObjectsConfig& confi
   return extract_objects(map.mesh, map.seen_by, kRobot, chairs_and_tables(), config);
 }
 
-TEST_CASE("Two boxes on a floor are two objects with their boxes, surfaces and views",
-          "[objects]") {
+TEST_CASE("Two boxes on a floor are two objects with their boxes, surfaces and views") {
   TestMap map;
   map.add_sheet({-5, -5, 0}, {10, 0, 0}, {0, 10, 0}, kGround, {0, 20});
   const ObjectBox chair{{1.0, 2.0, 0.5}, 0.3, {0.8, 0.5, 1.0}};
@@ -36,7 +35,7 @@ TEST_CASE("Two boxes on a floor are two objects with their boxes, surfaces and v
   CHECK(objects[1].views == 4);
 }
 
-TEST_CASE("A thin gap does not cut an object, and two close chairs stay two", "[objects]") {
+TEST_CASE("A thin gap does not cut an object, and two close chairs stay two") {
   const double gap_m = GENERATE(0.1, 0.3);
   TestMap map;
   map.add_box({{0.0, 0.0, 0.5}, 0.0, {0.6, 0.5, 1.0}}, kChair);
@@ -50,7 +49,7 @@ TEST_CASE("A thin gap does not cut an object, and two close chairs stay two", "[
   }
 }
 
-TEST_CASE("Small or hardly seen surfaces are no objects", "[objects]") {
+TEST_CASE("Small or hardly seen surfaces are no objects") {
   TestMap map;
   map.add_sheet({0, 0, 1}, {0.2, 0, 0}, {0, 0.2, 0}, kChair, {0, 9});  // 0.04 m^2
   map.add_box({{5.0, 0.0, 0.5}, 0.0, {1.0, 1.0, 1.0}}, kTable, {4, 4});
@@ -59,7 +58,7 @@ TEST_CASE("Small or hardly seen surfaces are no objects", "[objects]") {
   CHECK(objects_in(map, all).size() == 2);
 }
 
-TEST_CASE("Objects are the connected parts that a search over all pairs finds", "[objects]") {
+TEST_CASE("Objects are the connected parts that a search over all pairs finds") {
   const auto seed = GENERATE(1U, 2U);
   CAPTURE(seed);
   std::mt19937 random(seed);
@@ -96,7 +95,7 @@ TEST_CASE("Objects are the connected parts that a search over all pairs finds", 
   CHECK(objects_in(map, config).size() == static_cast<std::size_t>(parts));
 }
 
-TEST_CASE("The palette and a list of names decide which classes are objects", "[objects]") {
+TEST_CASE("The palette and a list of names decide which classes are objects") {
   const LabelPalette palette(
       {{0, "void", {0, 0, 0}}, {2, "Floor", {1, 0, 0}}, {7, "chair", {2, 0, 0}}});
   const std::vector<std::string> background = {"floor", "sky"};
@@ -104,8 +103,7 @@ TEST_CASE("The palette and a list of names decide which classes are objects", "[
   CHECK(object_labels(palette, {}) == ObjectLabels().set(7).set(2));
 }
 
-TEST_CASE("A mesh without labels has no objects, and lists of other lengths are refused",
-          "[objects]") {
+TEST_CASE("A mesh without labels has no objects, and lists of other lengths are refused") {
   TestMap map;
   map.add_box({{0.0, 0.0, 0.5}, 0.0, {1.0, 1.0, 1.0}}, kChair);
   map.seen_by.pop_back();

@@ -7,7 +7,7 @@
 namespace km {
 namespace {
 
-TEST_CASE("Objects are read as they were written", "[objects]") {
+TEST_CASE("Objects are read as they were written") {
   const TemporaryFolder folder;
   const auto file = folder.path() / "objects.json";
   const LabelPalette palette({{7, "chair", {1, 2, 3}}});
@@ -31,7 +31,7 @@ TEST_CASE("Objects are read as they were written", "[objects]") {
   CHECK(list.objects[0].robots == std::vector<RobotId>{0, 3});
 }
 
-TEST_CASE("Objects with an unusable entry are refused with its place", "[objects]") {
+TEST_CASE("Objects with an unusable entry are refused with its place") {
   const TemporaryFolder folder;
   const auto refuses = [&](const auto& read, const std::string& text, const std::string& place) {
     CAPTURE(text);
@@ -51,7 +51,7 @@ TEST_CASE("Objects with an unusable entry are refused with its place", "[objects
   refuses(read_objects, "[]", "");
 }
 
-TEST_CASE("The enclosing box of the corners of a box is that box", "[objects]") {
+TEST_CASE("The enclosing box of the corners of a box is that box") {
   const double yaw = GENERATE(-1.5, -0.3, 0.0, 0.7, 1.5);
   const ObjectBox box{{3.0, -4.0, 0.5}, yaw, {2.0, 0.7, 1.2}};
   const auto corners = corners_of(box);
@@ -61,7 +61,7 @@ TEST_CASE("The enclosing box of the corners of a box is that box", "[objects]") 
   CHECK(found.yaw_rad == Approx(yaw).margin(1e-9));
 }
 
-TEST_CASE("Shared volumes agree with counted points", "[objects]") {
+TEST_CASE("Shared volumes agree with counted points") {
   const auto seed = GENERATE(1U, 2U, 3U);
   CAPTURE(seed);
   std::mt19937 random(seed);

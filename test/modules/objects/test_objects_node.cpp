@@ -47,7 +47,7 @@ struct NodeTopics {
   Topic<ObjectList> joint;
 };
 
-TEST_CASE("Objects are sent after changes only, and no faster than configured", "[node]") {
+TEST_CASE("Objects are sent after changes only, and no faster than configured") {
   NodeTopics topics;
   Inbox<RobotObjects> sent(topics.own);
   Inbox<ObjectList> joint(topics.joint);
@@ -75,7 +75,7 @@ TEST_CASE("Objects are sent after changes only, and no faster than configured", 
   CHECK(sent.messages()[2].objects.size() == 1);
 }
 
-TEST_CASE("Messages state the odometry of keyframes that the node has learned", "[node]") {
+TEST_CASE("Messages state the odometry of keyframes that the node has learned") {
   NodeTopics topics;
   Inbox<RobotObjects> sent(topics.own);
   ObjectsNode node({}, 4, palette(), topics.ends());
@@ -94,7 +94,7 @@ TEST_CASE("Messages state the odometry of keyframes that the node has learned", 
   CHECK(sent.messages()[0].keyframes[0].odometry.T_odom_kf.translation().x() == 7.0);
 }
 
-TEST_CASE("Objects of other robots join those of this one, but not in its name", "[node]") {
+TEST_CASE("Objects of other robots join those of this one, but not in its name") {
   NodeTopics topics;
   Inbox<ObjectList> joint(topics.joint);
   ObjectsNode node({}, 4, palette(), topics.ends());
@@ -154,8 +154,7 @@ struct ObjectRobot {
   ObjectsNode node;
 };
 
-TEST_CASE("An object that two robots saw is one at both, also at a robot that joins later",
-          "[node][dds]") {
+TEST_CASE("An object that two robots saw is one at both, also at a robot that joins later") {
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
   ObjectRobot a(domain, 3), b(domain, 4);
   a.start();
@@ -185,7 +184,7 @@ Arrived<RobotObjects> arrived(const RobotObjects& message) {
   return encoded_by(TeamPeer{message.robot, message.boot}, message);
 }
 
-TEST_CASE("Objects are equal after encoding and decoding, with 150 bytes each", "[codec]") {
+TEST_CASE("Objects are equal after encoding and decoding, with 150 bytes each") {
   const RobotObjects message = two_objects();
   const auto encoded = arrived(message);
   const auto result = decoded(encoded);
@@ -200,14 +199,14 @@ TEST_CASE("Objects are equal after encoding and decoding, with 150 bytes each", 
   CHECK(result.value->keyframes == message.keyframes);
 }
 
-TEST_CASE("Entries of unknown layers are left out", "[codec]") {
+TEST_CASE("Entries of unknown layers are left out") {
   auto message = arrived(two_objects());
   message.objects[0].layer = 1;
   REQUIRE(decoded(message).value);
   CHECK(decoded(message).value->objects.size() == 1);
 }
 
-TEST_CASE("The largest message of objects is accepted by size", "[codec]") {
+TEST_CASE("The largest message of objects is accepted by size") {
   RobotObjects message = two_objects();
   message.objects.resize(kMaxObjects, message.objects[0]);
   message.keyframes.resize(kMaxObjectKeyframes, message.keyframes[0]);
@@ -217,7 +216,7 @@ TEST_CASE("The largest message of objects is accepted by size", "[codec]") {
   CHECK(decoded(encoded).value);
 }
 
-TEST_CASE("Impossible objects are refused", "[codec]") {
+TEST_CASE("Impossible objects are refused") {
   const char* const missing = "objects are missing or too many";
   const char* const pose = "a pose of an object is none";
   const char* const size = "an object has no usable size";

@@ -27,8 +27,7 @@ Trajectory trajectory(RobotId robot) {
   return {.robot = robot, .anchor = 0, .T_world_kf = {any_pose(0), any_pose(1), any_pose(2)}};
 }
 
-TEST_CASE("A message states the first known keyframe of every ten that have an object",
-          "[objects]") {
+TEST_CASE("A message states the first known keyframe of every ten that have an object") {
   RobotObjects message{.robot = 3, .objects = {}};
   for (const KeyframeIndex k : {17U, 12U, 5U, 11U, 40U})
     message.objects.push_back({.keyframe = k, .T_world_kf = any_pose(k)});
@@ -48,7 +47,7 @@ TEST_CASE("A message states the first known keyframe of every ten that have an o
   CHECK(keyframes_of(message, odometry)[0].odometry.id.index == 50);
 }
 
-TEST_CASE("Noisy copies of an object are one, whatever their order", "[objects]") {
+TEST_CASE("Noisy copies of an object are one, whatever their order") {
   const auto seed = GENERATE(1U, 2U, 3U);
   CAPTURE(seed);
   std::mt19937 random(seed);
@@ -72,8 +71,7 @@ TEST_CASE("Noisy copies of an object are one, whatever their order", "[objects]"
   CHECK(merged[1].keyframe == KeyframeId{3, 1});
 }
 
-TEST_CASE("Objects of a team are merged in the joint frame and move with their keyframes",
-          "[objects]") {
+TEST_CASE("Objects of a team are merged in the joint frame and move with their keyframes") {
   const ObjectsConfig config;
   TeamObjects team(0, config);
   const Trajectory own = trajectory(0), peer = trajectory(7);
@@ -106,7 +104,7 @@ TEST_CASE("Objects of a team are merged in the joint frame and move with their k
   }
 }
 
-TEST_CASE("The newest message of a robot counts, and none of an earlier incarnation", "[objects]") {
+TEST_CASE("The newest message of a robot counts, and none of an earlier incarnation") {
   TeamObjects team(0, {});
   RobotObjects first = anchored(std::vector{object(kBox, 7)}, trajectory(7));
   first.boot = 5;
@@ -120,7 +118,7 @@ TEST_CASE("The newest message of a robot counts, and none of an earlier incarnat
   CHECK(team.joint(trajectory(0)).objects.empty());
 }
 
-TEST_CASE("Only changes that matter differ, and the largest objects are sent", "[objects]") {
+TEST_CASE("Only changes that matter differ, and the largest objects are sent") {
   const RobotObjects sent = anchored(std::vector{object(kBox, 7)}, trajectory(7));
   const auto shifted = [](double by_m) {
     Trajectory t = trajectory(7);
@@ -141,8 +139,7 @@ TEST_CASE("Only changes that matter differ, and the largest objects are sent", "
   CHECK(most.objects.back().surface_m2 == 3.0);
 }
 
-TEST_CASE("A keyframe without an optimised pose is replaced by the last that has one",
-          "[objects]") {
+TEST_CASE("A keyframe without an optimised pose is replaced by the last that has one") {
   MapObject late = object(kBox, 7);
   late.keyframe.index = 90;
   const RobotObjects sent = anchored(std::vector{late}, trajectory(7));

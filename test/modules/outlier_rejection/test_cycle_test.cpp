@@ -6,13 +6,13 @@
 namespace km {
 namespace {
 
-TEST_CASE("Chi-squared with 6 degrees of freedom has its tabulated quantiles", "[pcm]") {
+TEST_CASE("Chi-squared with 6 degrees of freedom has its tabulated quantiles") {
   CHECK(chi_squared_6_quantile(0.95) == Approx(12.5916).epsilon(1e-5));
   CHECK(chi_squared_6_quantile(0.99) == Approx(16.8119).epsilon(1e-5));
   CHECK(chi_squared_6(chi_squared_6_quantile(0.3)) == Approx(0.3));
 }
 
-TEST_CASE("The distance of true cycles is chi-squared", "[pcm]") {
+TEST_CASE("The distance of true cycles is chi-squared") {
   // Small noise: covariances are first order. 4000 samples: the standard error of the share below
   // a quantile q is sqrt(q (1 - q) / 4000) < 0.0080; four of them are allowed.
   std::mt19937 rng(7);
@@ -31,7 +31,7 @@ TEST_CASE("The distance of true cycles is chi-squared", "[pcm]") {
   CHECK(below_95 / double{kSamples} == Approx(0.95).margin(4 * 0.0035));
 }
 
-TEST_CASE("Consistency depends neither on direction, order nor odometry frames", "[pcm]") {
+TEST_CASE("Consistency depends neither on direction, order nor odometry frames") {
   const unsigned seed = GENERATE(range(0U, 20U));
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -53,7 +53,7 @@ TEST_CASE("Consistency depends neither on direction, order nor odometry frames",
   CHECK(test.consistent(prepared(i), prepared(k)) == expected);
 }
 
-TEST_CASE("Noise scales widen the test as covariances would", "[pcm]") {
+TEST_CASE("Noise scales widen the test as covariances would") {
   std::mt19937 rng(3);
   const TwoRobots robots(0, 1, 8, 0.05, rng);
   const Closure i = robots.measure(2, 6, 0.1, rng), k = robots.measure(7, 1, 0.1, rng);
@@ -94,7 +94,7 @@ Pair random_pair(std::mt19937& rng, const CycleTest& test, bool wrong) {
   return {test.orient(i), test.orient(k)};
 }
 
-TEST_CASE("The distance of a pair is that of its cycle, link by link", "[pcm]") {
+TEST_CASE("The distance of a pair is that of its cycle, link by link") {
   const unsigned seed = GENERATE(range(0U, 200U));
   const bool wrong = GENERATE(false, true);
   CAPTURE(seed, wrong);
@@ -107,7 +107,7 @@ TEST_CASE("The distance of a pair is that of its cycle, link by link", "[pcm]") 
   CHECK_FALSE(closes_within(i, k, expected * (1.0 - 1e-7)));
 }
 
-TEST_CASE("Exact pairs without any covariance are consistent, wrong ones are not", "[pcm]") {
+TEST_CASE("Exact pairs without any covariance are consistent, wrong ones are not") {
   std::mt19937 rng(4);
   const TwoRobots robots(0, 1, 10, 0.0, rng);
   const CycleTest test(PcmConfig{});
@@ -119,7 +119,7 @@ TEST_CASE("Exact pairs without any covariance are consistent, wrong ones are not
   CHECK_FALSE(test.consistent(prepared(i), prepared(k)));
 }
 
-TEST_CASE("Odometry that grows more certain along the way makes no pair consistent", "[pcm]") {
+TEST_CASE("Odometry that grows more certain along the way makes no pair consistent") {
   std::mt19937 rng(4);
   const TwoRobots robots(0, 1, 10, 0.01, rng);
   Closure i = robots.measure(3, 5, 0.1, rng), k = robots.measure(7, 2, 0.1, rng);

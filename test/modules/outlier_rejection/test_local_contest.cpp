@@ -33,7 +33,7 @@ LocalContest contest_of(const std::vector<Closure>& closures) {
   return contest;
 }
 
-TEST_CASE("A closure that is shifted by one tent is overruled by those beside it", "[contest]") {
+TEST_CASE("A closure that is shifted by one tent is overruled by those beside it") {
   const TentRow row;
   std::vector<Closure> closures = {row.at(10, 10, 0.0, 60), row.at(11, 12, 0.0, 60),
                                    row.at(12, 12, 6.0, 30), row.at(13, 11, 6.0, 29)};
@@ -46,7 +46,7 @@ TEST_CASE("A closure that is shifted by one tent is overruled by those beside it
   }
 }
 
-TEST_CASE("Half the support overrules nothing, and neither do closures far away", "[contest]") {
+TEST_CASE("Half the support overrules nothing, and neither do closures far away") {
   const TentRow row;
   const Closure weak = row.at(10, 10, 6.0, 31);
   SECTION("half the support") {
@@ -70,14 +70,14 @@ TEST_CASE("Half the support overrules nothing, and neither do closures far away"
   }
 }
 
-TEST_CASE("Errors that stated covariances allow threefold overrule nothing", "[contest]") {
+TEST_CASE("Errors that stated covariances allow threefold overrule nothing") {
   const TentRow row;
   // Both closures have a standard deviation of 1 cm an axis; 5 cm are five sigmas of one.
   const Closure close = row.at(10, 10, 0.05, 20);
   CHECK_FALSE(contest_of({close, row.at(10, 11, 0.0, 100)}).is_overruled(close.id()));
 }
 
-TEST_CASE("The support is the inliers of closures at one place that agree", "[contest][witness]") {
+TEST_CASE("The support is the inliers of closures at one place that agree") {
   const TentRow row;
   // Two agree, a third beside them is shifted by a tent, and a fourth is at another place.
   std::vector<Closure> closures = {row.at(10, 10, 0.0, 70), row.at(12, 12, 0.0, 79),
@@ -96,8 +96,7 @@ TEST_CASE("The support is the inliers of closures at one place that agree", "[co
   CHECK(pair.is_strong());
 }
 
-TEST_CASE("A closure whose stronger neighbours are dropped is not overruled any more",
-          "[contest]") {
+TEST_CASE("A closure whose stronger neighbours are dropped is not overruled any more") {
   const TentRow row;
   const Closure weak = row.at(10, 10, 6.0, 31), strong = row.at(11, 11, 0.0, 90);
   LocalContest contest = contest_of({weak, strong});
@@ -106,7 +105,7 @@ TEST_CASE("A closure whose stronger neighbours are dropped is not overruled any 
   CHECK_FALSE(contest.is_overruled(weak.id()));
 }
 
-TEST_CASE("A pair does not publish overruled closures", "[contest]") {
+TEST_CASE("A pair does not publish overruled closures") {
   const TentRow row;
   WitnessedPair pair(0, 1, PcmConfig{});
   const Closure weak = row.at(10, 10, 6.0, 31), strong = row.at(11, 11, 0.0, 90),

@@ -39,7 +39,7 @@ std::size_t from_scratch(const Rows& rows, std::size_t n) {
       .clique.size();
 }
 
-TEST_CASE("The clique is a maximum after every insertion, by brute force", "[clique]") {
+TEST_CASE("The clique is a maximum after every insertion, by brute force") {
   const double density = GENERATE(0.1, 0.3, 0.5, 0.7, 0.9);
   CAPTURE(density);
   for (unsigned seed = 0; seed < 500; ++seed) {
@@ -58,7 +58,7 @@ TEST_CASE("The clique is a maximum after every insertion, by brute force", "[cli
   }
 }
 
-TEST_CASE("The bound is valid and the result a clique for all limits", "[clique]") {
+TEST_CASE("The bound is valid and the result a clique for all limits") {
   const std::uint64_t limit = GENERATE(1U, 3U, 10U);
   const double density = GENERATE(0.3, 0.6, 0.9);
   CAPTURE(limit, density);
@@ -82,7 +82,7 @@ TEST_CASE("The bound is valid and the result a clique for all limits", "[clique]
   }
 }
 
-TEST_CASE("The older of equally large cliques is kept", "[clique]") {
+TEST_CASE("The older of equally large cliques is kept") {
   MaxClique clique(kNoLimit);  // 0-1, then 1-2, then 2-3
   CHECK(clique.add({}));
   for (const std::size_t v : {0U, 1U, 2U}) clique.add(std::vector<std::size_t>{v});
@@ -90,7 +90,7 @@ TEST_CASE("The older of equally large cliques is kept", "[clique]") {
         std::vector<std::size_t>{0, 1});
 }
 
-TEST_CASE("A clique as large as the bound is proven again", "[clique]") {
+TEST_CASE("A clique as large as the bound is proven again") {
   std::mt19937 rng(5);
   const Rows rows = random_graph(60, 0.8, rng);
   MaxClique clique(1);
@@ -106,7 +106,7 @@ TEST_CASE("A clique as large as the bound is proven again", "[clique]") {
   CHECK(std::ranges::equal(clique.clique(), planted));
 }
 
-TEST_CASE("Invalid neighbours are refused and change nothing", "[clique]") {
+TEST_CASE("Invalid neighbours are refused and change nothing") {
   MaxClique clique(kNoLimit);
   clique.add({});
   CHECK_THROWS_WITH(clique.add(std::vector<std::size_t>{1}), Contains("1 does not exist"));
@@ -115,7 +115,7 @@ TEST_CASE("Invalid neighbours are refused and change nothing", "[clique]") {
   CHECK(clique.add(std::vector<std::size_t>{0}));
 }
 
-TEST_CASE("The consistency graph of Manhattan has the clique numbers PMC proves", "[clique]") {
+TEST_CASE("The consistency graph of Manhattan has the clique numbers PMC proves") {
   const auto file = shared_data("pose_graphs/outliers/consistency_1500.adjacency.txt");
   if (!file) return;
   const Rows rows = read_adjacency(*file);
@@ -130,7 +130,7 @@ TEST_CASE("The consistency graph of Manhattan has the clique numbers PMC proves"
   CHECK(is_clique(rows, clique.clique()));
 }
 
-TEST_CASE("The greedy clique follows the degrees", "[clique]") {
+TEST_CASE("The greedy clique follows the degrees") {
   // A triangle 0 1 2 and a clique 0 3 4 5; 1 has the higher degree by its leaves 6 to 9.
   const BitGraph graph =
       bit_graph({{}, {0}, {0, 1}, {0}, {0, 3}, {0, 3, 4}, {1}, {1}, {1}, {1}}, 10);

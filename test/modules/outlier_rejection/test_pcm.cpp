@@ -18,7 +18,7 @@ std::vector<Closure> mixed_closures(const TwoRobots& robots, std::size_t count, 
   return closures;
 }
 
-TEST_CASE("PCM keeps the true closures among as many random ones", "[pcm]") {
+TEST_CASE("PCM keeps the true closures among as many random ones") {
   const unsigned seed = GENERATE(range(0U, 10U));
   const bool reverse_some = GENERATE(false, true);
   CAPTURE(seed, reverse_some);
@@ -39,7 +39,7 @@ TEST_CASE("PCM keeps the true closures among as many random ones", "[pcm]") {
   CHECK(pcm.clique().proven());
 }
 
-TEST_CASE("A pair of keyframes counts once, from whichever side it is measured", "[pcm]") {
+TEST_CASE("A pair of keyframes counts once, from whichever side it is measured") {
   std::mt19937 rng(1);
   const TwoRobots robots(0, 1, 5, 0.01, rng);
   PcmConfig config{.min_inliers = 1};
@@ -51,7 +51,7 @@ TEST_CASE("A pair of keyframes counts once, from whichever side it is measured",
   CHECK(pcm.inliers() == std::vector<ClosureId>{measured.id()});
 }
 
-TEST_CASE("Fewer closures than min_inliers are not published", "[pcm]") {
+TEST_CASE("Fewer closures than min_inliers are not published") {
   std::mt19937 rng(1);
   const TwoRobots robots(0, 1, 5, 0.001, rng);
   PcmConfig config{.confidence = 0.9999, .min_inliers = 3};
@@ -63,7 +63,7 @@ TEST_CASE("Fewer closures than min_inliers are not published", "[pcm]") {
   CHECK(pcm.inliers().size() == 3);
 }
 
-TEST_CASE("PCM refuses closures it cannot weigh and keeps its state", "[pcm]") {
+TEST_CASE("PCM refuses closures it cannot weigh and keeps its state") {
   std::mt19937 rng(1);
   const TwoRobots robots(0, 1, 5, 0.01, rng);
   Pcm pcm(0, 1, PcmConfig{});

@@ -75,8 +75,7 @@ PcmConfig tolerant() {
   return config;
 }
 
-TEST_CASE("The PCM node publishes sets that grew, with versions above those of a former process",
-          "[node]") {
+TEST_CASE("The PCM node publishes sets that grew, with versions above those of a former process") {
   constexpr std::uint32_t kFirst = 3U << 16U;
   Team team(2, tolerant(), kFirst);
   const auto closures = team.agreeing(2, 5, 5);
@@ -95,7 +94,7 @@ TEST_CASE("The PCM node publishes sets that grew, with versions above those of a
   for (const InlierSet& set : team.sets) CHECK((set.a == 2 && set.b == 5));
 }
 
-TEST_CASE("The PCM node decides for the pairs in which it is the lower, and for itself", "[node]") {
+TEST_CASE("The PCM node decides for the pairs in which it is the lower, and for itself") {
   Team team(4, tolerant());
   team.give(team.agreeing_inside(4, 4));
   for (const auto& [a, b] : {std::pair<RobotId, RobotId>{9, 4}, {3, 4}, {5, 6}})
@@ -105,7 +104,7 @@ TEST_CASE("The PCM node decides for the pairs in which it is the lower, and for 
   CHECK((team.sets[1].a == 4 && team.sets[1].b == 9));
 }
 
-TEST_CASE("All closures of two robots are published once independent ones agree", "[node]") {
+TEST_CASE("All closures of two robots are published once independent ones agree") {
   Team team(2);
   auto closures = team.agreeing(2, 5, 20);
   closures[1].T_from_to = random_pose(team.rng);  // false, and a neighbour of the first
@@ -120,7 +119,7 @@ TEST_CASE("All closures of two robots are published once independent ones agree"
   CHECK(team.sets[0].version < team.sets[1].version);
 }
 
-TEST_CASE("Robots joined by one place wait for a second one, and it is said", "[node]") {
+TEST_CASE("Robots joined by one place wait for a second one, and it is said") {
   PcmConfig config{.witness_wait_s = 30.0};
   Team team(2, config);
   const CapturedLog log;
@@ -140,8 +139,7 @@ TEST_CASE("Robots joined by one place wait for a second one, and it is said", "[
   CHECK(team.publish() == Sizes{3});  // the wait is over permanently
 }
 
-TEST_CASE("Weak closures at one place join two robots only if one at another place agrees",
-          "[node]") {
+TEST_CASE("Weak closures at one place join two robots only if one at another place agrees") {
   const bool is_strong = GENERATE(false, true);
   const RobotId other = is_strong ? 21 : 22;  // a warning for each pair
   Team team(2);
@@ -160,7 +158,7 @@ TEST_CASE("Weak closures at one place join two robots only if one at another pla
   CHECK((log.text().find("the join is tentative") != std::string::npos) == is_strong);
 }
 
-TEST_CASE("Robots that a former process joined by one place remain joined", "[node]") {
+TEST_CASE("Robots that a former process joined by one place remain joined") {
   Team team(2);
   const auto closures = team.agreeing(2, 5, 2);
   team.give({closures[0]});
@@ -171,7 +169,7 @@ TEST_CASE("Robots that a former process joined by one place remain joined", "[no
   CHECK(team.sets[0].closures[0] == closures[0].id());
 }
 
-TEST_CASE("At the end of all runs no pair waits for a witness", "[node]") {
+TEST_CASE("At the end of all runs no pair waits for a witness") {
   Team team(2);
   const CapturedLog log;
   team.keyframe_at(10.0);
@@ -184,13 +182,13 @@ TEST_CASE("At the end of all runs no pair waits for a witness", "[node]") {
   CHECK_THAT(log.text(), Contains("no other place has agreed within 2 s"));
 }
 
-TEST_CASE("Closures inside the robot need no witness", "[node]") {
+TEST_CASE("Closures inside the robot need no witness") {
   Team team(4);
   team.give({team.agreeing_inside(4, 4)[0]});
   CHECK(team.publish() == Sizes{1});
 }
 
-TEST_CASE("The closures of a restarted peer are removed, and its pair waits again", "[node]") {
+TEST_CASE("The closures of a restarted peer are removed, and its pair waits again") {
   Team team(2);
   const auto before = team.agreeing(2, 5, 20), after = team.agreeing(2, 5, 20);
   team.give(before);
@@ -209,7 +207,7 @@ const InlierSet kSet{.a = 3,
                      .version = 12,
                      .closures = {{{3, 0}, {700, 9}}, {{3, 5}, {700, 1}}, {{3, 5}, {700, 4}}}};
 
-TEST_CASE("An inlier set survives the wire", "[codec]") {
+TEST_CASE("An inlier set survives the wire") {
   const auto encoded = encoded_by(kSet.a, kSet);
   const Decoded<InlierSet> result = decoded(encoded);
   REQUIRE(result.value);
@@ -221,7 +219,7 @@ TEST_CASE("An inlier set survives the wire", "[codec]") {
   CHECK(decoded(encoded_by(5, empty)).value);
 }
 
-TEST_CASE("An inlier set that cannot be is refused", "[codec]") {
+TEST_CASE("An inlier set that cannot be is refused") {
   check_refusals<InlierSet>(
       [] { return encoded_by(kSet.a, kSet); },
       {{"descending pair", "the pair is not in ascending order",

@@ -59,7 +59,7 @@ std::vector<fs::path> team(const std::string& prefix, int robots, const std::str
   return files;
 }
 
-TEST_CASE("PCM keeps exactly the true half of DOOR-SLAM's simulated closures", "[recorded]") {
+TEST_CASE("PCM keeps exactly the true half of DOOR-SLAM's simulated closures") {
   const auto [name, robots, true_per_pair] = GENERATE(table<std::string, int, std::size_t>({
       {"spoiled/simulation_not_in_order/example_2robots/", 2, 10},
       {"spoiled/simulation/example_4robots/", 4, 4},
@@ -85,7 +85,7 @@ PcmConfig tunnels_config() {
   return layers.load<PcmConfig>();
 }
 
-TEST_CASE("Every two robots in tunnels are joined by witnesses", "[recorded]") {
+TEST_CASE("Every two robots in tunnels are joined by witnesses") {
   const auto files = team("multi_robot/tunnels_8robots/robot", 8, ".csv");
   if (files.empty()) return;
   const auto config = tunnels_config();

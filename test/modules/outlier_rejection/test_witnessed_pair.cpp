@@ -23,7 +23,7 @@ struct Aisles {
   }
 };
 
-TEST_CASE("Aliased neighbours seen from both sides are one witness", "[witness]") {
+TEST_CASE("Aliased neighbours seen from both sides are one witness") {
   const Aisles aisles(40);
   WitnessedPair pair(0, 1, PcmConfig{});
   for (const std::size_t i : {10U, 11U}) {
@@ -36,8 +36,7 @@ TEST_CASE("Aliased neighbours seen from both sides are one witness", "[witness]"
   CHECK_FALSE(pair.is_witnessed());
 }
 
-TEST_CASE("A cluster of aliased keyframes does not join two robots, a second place does",
-          "[witness]") {
+TEST_CASE("A cluster of aliased keyframes does not join two robots, a second place does") {
   const Aisles aisles(60);
   WitnessedPair pair(0, 1, PcmConfig{});
   for (std::size_t i = 10; i <= 13; ++i)
@@ -51,7 +50,7 @@ TEST_CASE("A cluster of aliased keyframes does not join two robots, a second pla
   CHECK(pair.closures().size() == 18);  // the optimiser weighs the one that contradicts
 }
 
-TEST_CASE("Along a common stretch there is a witness every fourth keyframe", "[witness]") {
+TEST_CASE("Along a common stretch there is a witness every fourth keyframe") {
   const Aisles aisles(40);
   PcmConfig config{.min_witnesses = 1000};
   WitnessedPair pair(0, 1, config);
@@ -59,7 +58,7 @@ TEST_CASE("Along a common stretch there is a witness every fourth keyframe", "[w
   CHECK(pair.witnesses() == 3);
 }
 
-TEST_CASE("A pair of robots refuses closures beyond those that both keep", "[witness]") {
+TEST_CASE("A pair of robots refuses closures beyond those that both keep") {
   const Aisles aisles(200);
   WitnessedPair pair(0, 1, PcmConfig{});
   for (std::size_t k = 0; k < Pcm::kMaxClosures; ++k)
@@ -69,8 +68,7 @@ TEST_CASE("A pair of robots refuses closures beyond those that both keep", "[wit
   CHECK(pair.closures().size() == Pcm::kMaxClosures);
 }
 
-TEST_CASE("A robot that moves for hours in a known place has room for its newest closure",
-          "[witness]") {
+TEST_CASE("A robot that moves for hours in a known place has room for its newest closure") {
   constexpr std::size_t kLap = 100, kKeyframes = 3000;
   Chain robot(0);
   for (std::size_t i = 1; i < kKeyframes; ++i) robot.step(rotz(0.0, i % kLap == 0 ? -99.0 : 1.0));

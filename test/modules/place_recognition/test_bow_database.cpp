@@ -45,7 +45,7 @@ double score_by_definition(const BowVector& v, const BowVector& w, std::size_t w
   return 1.0 - 0.5 * difference;
 }
 
-TEST_CASE("The score is 1 - half the L1 distance of the unit vectors", "[place_recognition]") {
+TEST_CASE("The score is 1 - half the L1 distance of the unit vectors") {
   CHECK(score(toy_vector({1, 2, 3, 4}), toy_vector({3, 4, 5, 6})) == Approx(0.5));
   CHECK(score(toy_vector({1, 2}), toy_vector({3})) == 0.0);
   CHECK(score({}, toy_vector({3})) == 0.0);
@@ -58,8 +58,7 @@ TEST_CASE("The score is 1 - half the L1 distance of the unit vectors", "[place_r
   }
 }
 
-TEST_CASE("The inverted index finds the same images as comparing every pair",
-          "[place_recognition]") {
+TEST_CASE("The inverted index finds the same images as comparing every pair") {
   const auto seed = GENERATE(range(0U, 5U));
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -93,7 +92,7 @@ TEST_CASE("The inverted index finds the same images as comparing every pair",
   CHECK(std::equal(few.begin(), few.end(), found.begin()));
 }
 
-TEST_CASE("An invalid vector is refused and changes nothing", "[place_recognition]") {
+TEST_CASE("An invalid vector is refused and changes nothing") {
   BowDatabase database(10);
   const auto check_refused = [&](const BowVector& vector, const char* reason) {
     CHECK_THROWS_WITH(database.add(vector), Contains(reason));
@@ -113,7 +112,7 @@ Stamp at_s(double seconds) {
   return nanoseconds(1000.0 + seconds);
 }
 
-TEST_CASE("The threshold applies to the ratio of scores", "[place_recognition]") {
+TEST_CASE("The threshold applies to the ratio of scores") {
   PlaceDatabase filter({.similarity_threshold = 0.5}, kWords);
   filter.add(toy_vector({1, 2, 50, 51, 52, 53, 54, 55}), at_s(0));   // score 0.25
   filter.add(toy_vector({1, 50, 51, 52, 53, 54, 55, 56}), at_s(1));  // score 0.125
@@ -126,7 +125,7 @@ TEST_CASE("The threshold applies to the ratio of scores", "[place_recognition]")
   CHECK(search.candidates[0].similarity == Approx(0.5));
 }
 
-TEST_CASE("A query unlike the keyframe before it is not used", "[place_recognition]") {
+TEST_CASE("A query unlike the keyframe before it is not used") {
   const double normalizer = GENERATE(0.0, 0.049, std::nan(""));
   PlaceDatabase filter({}, kWords);
   const BowVector query = toy_vector({1, 2, 3, 4});
@@ -135,7 +134,7 @@ TEST_CASE("A query unlike the keyframe before it is not used", "[place_recogniti
   CHECK(filter.search(query, PlaceDatabase::kMinNormalizer).candidates.size() == 1);
 }
 
-TEST_CASE("Neighbours in time inside one robot are no candidates", "[place_recognition]") {
+TEST_CASE("Neighbours in time inside one robot are no candidates") {
   PlaceDatabase filter({.max_candidates = 100}, kWords);
   const BowVector view = toy_vector({1, 2, 3});
   CHECK(filter.search_own(view, at_s(0)).normalizer == 0.0);
@@ -150,7 +149,7 @@ TEST_CASE("Neighbours in time inside one robot are no candidates", "[place_recog
   CHECK(filter.search_own(view, at_s(14)).candidates.size() == 13);
 }
 
-TEST_CASE("The best candidates are kept", "[place_recognition]") {
+TEST_CASE("The best candidates are kept") {
   PlaceDatabase filter({.max_candidates = 3}, kWords);
   const BowVector view = toy_vector({1, 2, 3, 4});
   const BowVector part = toy_vector({1, 2, 3, 9});
@@ -161,7 +160,7 @@ TEST_CASE("The best candidates are kept", "[place_recognition]") {
   CHECK(indices == std::vector<std::size_t>{1, 0, 2});
 }
 
-TEST_CASE("Candidates support each other when they are neighbours", "[place_recognition]") {
+TEST_CASE("Candidates support each other when they are neighbours") {
   PlaceDatabase filter({}, kWords);
   const BowVector view = toy_vector({1, 2, 3, 4});
   const BowVector other = toy_vector({7, 8});
@@ -172,7 +171,7 @@ TEST_CASE("Candidates support each other when they are neighbours", "[place_reco
   CHECK(support == std::map<std::size_t, int>{{1, 1}, {7, 2}, {10, 2}});
 }
 
-TEST_CASE("A keyframe is a view if it differs from the view before it", "[place_recognition]") {
+TEST_CASE("A keyframe is a view if it differs from the view before it") {
   PlaceDatabase views({.new_view_score = 0.2}, kWords);
   const BowVector view = toy_vector({1, 2, 3, 4});
   const BowVector quarter = toy_vector({1, 5, 6, 7});  // score 0.25 with the view
@@ -188,7 +187,7 @@ TEST_CASE("A keyframe is a view if it differs from the view before it", "[place_
   CHECK(views.is_view(view));
 }
 
-TEST_CASE("The filter refuses invalid input and is unchanged", "[place_recognition]") {
+TEST_CASE("The filter refuses invalid input and is unchanged") {
   CHECK_THROWS_AS(PlaceDatabase({.similarity_threshold = -1.0}, kWords), ConfigError);
   PlaceDatabase filter({}, kWords);
   filter.add(toy_vector({1}), at_s(5));

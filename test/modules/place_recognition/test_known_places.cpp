@@ -39,8 +39,7 @@ PlaceNovelty novelty(const KnownPlaces& places, KeyframeIndex index,
 
 }  // namespace
 
-TEST_CASE("A closure with a finished map does not replace one inside the run",
-          "[place_recognition]") {
+TEST_CASE("A closure with a finished map does not replace one inside the run") {
   KnownPlaces places = first_lap();
   places.add_view(keyframe(0), 0.0);  // keyframe 0 is that of the map
   places.add_closure(closure(2, 22));
@@ -48,8 +47,7 @@ TEST_CASE("A closure with a finished map does not replace one inside the run",
   CHECK(novelty(places, 23, {3}) == PlaceNovelty::kCovered);
 }
 
-TEST_CASE("A lap flown again is known from the first closure on, while closures are repeated",
-          "[place_recognition]") {
+TEST_CASE("A lap flown again is known from the first closure on, while closures are repeated") {
   KnownPlaces places = first_lap();
   CHECK(novelty(places, 22, {2}) == PlaceNovelty::kNew);  // similar words alone do not suffice
   places.add_closure(closure(2, 22, 0.5));
@@ -67,7 +65,7 @@ TEST_CASE("A lap flown again is known from the first closure on, while closures 
   CHECK(novelty(places, 39, {19}) == PlaceNovelty::kCovered);
 }
 
-TEST_CASE("Without a closure of late a place is new", "[place_recognition]") {
+TEST_CASE("Without a closure of late a place is new") {
   KnownPlaces places;
   for (KeyframeIndex i = 0; i < 3 * kLap; ++i) places.add_view(keyframe(i), kDepth_m);
   places.add_closure(closure(2, 102));
@@ -77,8 +75,7 @@ TEST_CASE("Without a closure of late a place is new", "[place_recognition]") {
   CHECK(novelty(places, 101, {1}) == PlaceNovelty::kNew);  // before the closure
 }
 
-TEST_CASE("A place is new if its pose is far, turned, uncertain or of unknown depth",
-          "[place_recognition]") {
+TEST_CASE("A place is new if its pose is far, turned, uncertain or of unknown depth") {
   KnownPlaces places = first_lap();
   places.add_closure(closure(2, 22, 0.59));
   CHECK(novelty(places, 25, {5}) == PlaceNovelty::kCovered);
@@ -103,7 +100,7 @@ TEST_CASE("A place is new if its pose is far, turned, uncertain or of unknown de
   }
 }
 
-TEST_CASE("A closure holds in either direction", "[place_recognition]") {
+TEST_CASE("A closure holds in either direction") {
   KnownPlaces places = first_lap();
   places.add_closure(closure(22, 2, -0.5));
   CHECK(novelty(places, 25, {5}) == PlaceNovelty::kCovered);

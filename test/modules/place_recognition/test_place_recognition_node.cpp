@@ -67,8 +67,7 @@ KeyframeBow bow(KeyframeId id, std::initializer_list<std::uint32_t> words,
   return message;
 }
 
-TEST_CASE("Keyframes that differ from the one sent before are sent with words and a normaliser",
-          "[place_recognition][node]") {
+TEST_CASE("Keyframes that differ from the one sent before are sent with words and a normaliser") {
   Robot robot(kSelf, {.new_view_score = 0.6});
   robot.node.step(keyframe({kSelf, 0}, {1, 2, 3, 4}, 10.0));
   robot.node.step(keyframe({kSelf, 1}, {1, 2, 3, 5}, 10.0));  // score 0.75 with the one before
@@ -87,8 +86,7 @@ TEST_CASE("Keyframes that differ from the one sent before are sent with words an
                      {{kSelf, 1}, 0}, {{kSelf, 2}, 0}, {{kPeer, 7}, 2}, {{kPeer, 7}, 0}});
 }
 
-TEST_CASE("The words of the strongest keypoints are published and compared",
-          "[place_recognition][node]") {
+TEST_CASE("The words of the strongest keypoints are published and compared") {
   Robot robot(kSelf, {.word_keypoints = 50});
   std::vector<std::uint32_t> words(50, 5);  // that of the strongest keypoint first
   words[10] = 7;
@@ -105,8 +103,7 @@ TEST_CASE("The words of the strongest keypoints are published and compared",
   CHECK(robot.candidates.received.size() == 1);
 }
 
-TEST_CASE("A peer's view of a known place is a candidate, through the thread",
-          "[place_recognition][node]") {
+TEST_CASE("A peer's view of a known place is a candidate, through the thread") {
   Robot robot(kSelf);
   robot.node.start();
   robot.keyframes.publish(keyframe({kSelf, 0}, {1, 2, 3, 4}));
@@ -122,8 +119,8 @@ TEST_CASE("A peer's view of a known place is a candidate, through the thread",
   CHECK(robot.queries.received.size() == 4);
 }
 
-TEST_CASE("The keyframes of a restarted peer are searched again and those of a resumed one are not",
-          "[place_recognition][node]") {
+TEST_CASE(
+    "The keyframes of a restarted peer are searched again and those of a resumed one are not") {
   const auto kind = GENERATE(PeerEventKind::kRestarted, PeerEventKind::kResumed);
   Robot robot(kSelf);
   robot.node.step(keyframe({kSelf, 0}, {1, 2, 3, 4}));
@@ -149,8 +146,7 @@ Keyframe view(KeyframeIndex index) {
   return result;
 }
 
-TEST_CASE("A keyframe at a known place has no words for the peers and is no match",
-          "[place_recognition][node]") {
+TEST_CASE("A keyframe at a known place has no words for the peers and is no match") {
   Robot robot(kSelf, {.new_view_score = 2.0});
   robot.node.step(view(0));
   robot.node.step(view(1));
@@ -173,8 +169,8 @@ TEST_CASE("A keyframe at a known place has no words for the peers and is no matc
   CHECK(robot.candidates.received.size() == 3);
 }
 
-TEST_CASE("A keyframe at a known place has two candidates if a closure is due, and otherwise none",
-          "[place_recognition][node]") {
+TEST_CASE(
+    "A keyframe at a known place has two candidates if a closure is due, and otherwise none") {
   Robot robot(kSelf, {.new_view_score = 2.0});
   for (std::uint32_t index = 0; index < 5; ++index) robot.node.step(view(index));
   CHECK(robot.candidates.received.back().query.index == 4);
@@ -188,8 +184,7 @@ TEST_CASE("A keyframe at a known place has two candidates if a closure is due, a
   }
 }
 
-TEST_CASE("Keyframes before a loss of odometry are candidates at once",
-          "[place_recognition][node]") {
+TEST_CASE("Keyframes before a loss of odometry are candidates at once") {
   Robot robot(kSelf, {.new_view_score = 2.0});
   for (std::uint32_t i = 0; i < 3; ++i) robot.node.step(keyframe({kSelf, i}, {1, 2, 3, 4}));
   CHECK(robot.candidates.received.empty());
@@ -205,8 +200,7 @@ TEST_CASE("Keyframes before a loss of odometry are candidates at once",
     CHECK(robot.candidates.received[k].match.index < 3);
 }
 
-TEST_CASE("Keyframes that cannot be compared are reported and change nothing",
-          "[place_recognition][node]") {
+TEST_CASE("Keyframes that cannot be compared are reported and change nothing") {
   Robot robot(kSelf);
   robot.node.step(keyframe({kSelf, 0}, {1, 2, 3, 4}));
   robot.queries.received.clear();
@@ -231,8 +225,7 @@ TEST_CASE("Keyframes that cannot be compared are reported and change nothing",
 }
 
 // Tests the claim of the class comment: the pair is found in either order of the messages.
-TEST_CASE("No pair of keyframes of two robots is missed in any order of delivery",
-          "[place_recognition][node]") {
+TEST_CASE("No pair of keyframes of two robots is missed in any order of delivery") {
   const auto seed = GENERATE(range(0U, 25U));
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -276,7 +269,7 @@ TEST_CASE("No pair of keyframes of two robots is missed in any order of delivery
 
 constexpr std::uint32_t kMax = ~0U;
 
-TEST_CASE("Bags survive packing, at about six bits a word", "[place_recognition]") {
+TEST_CASE("Bags survive packing, at about six bits a word") {
   for (const BagOfWords& bag :
        std::vector<BagOfWords>{{}, {{0, 2}, {1, 1}, {2, 3}}, {{0, kMax}, {kMax - 1, 1}, {kMax, 2}}})
     CHECK(unpack(pack(bag)) == bag);
@@ -299,7 +292,7 @@ TEST_CASE("Bags survive packing, at about six bits a word", "[place_recognition]
   CHECK(8.0 * static_cast<double>(bytes.size()) < 1000.0 * bits);
 }
 
-TEST_CASE("Bytes that are no bag are refused", "[place_recognition]") {
+TEST_CASE("Bytes that are no bag are refused") {
   using Bytes = std::vector<std::uint8_t>;
   const Bytes good = pack({{3, 1}, {900, 4}, {70000, 1}});
   REQUIRE(unpack(good));
@@ -334,7 +327,7 @@ TEST_CASE("Bytes that are no bag are refused", "[place_recognition]") {
   CHECK_FALSE(unpack(bag_of(kMaxBagWords + 1, 0, 0, 1)));
 }
 
-TEST_CASE("A keyframe's words survive the wire", "[place_recognition]") {
+TEST_CASE("A keyframe's words survive the wire") {
   const KeyframeBow message{.id = {700, 41},
                             .stamp = 1403636584763555584,
                             .vocabulary = 0xFEDCBA9876543210ULL,
@@ -350,7 +343,7 @@ TEST_CASE("A keyframe's words survive the wire", "[place_recognition]") {
   CHECK(result.value->normalizer == message.normalizer);
 }
 
-TEST_CASE("A message that contradicts itself is refused with the reason", "[place_recognition]") {
+TEST_CASE("A message that contradicts itself is refused with the reason") {
   using Message = Arrived<KeyframeBow>;
   const auto make = [] { return encoded_by<KeyframeBow>(7, {.id = {7, 1}, .words = {{3, 1}}}); };
   constexpr const char* kReason = "the normaliser is no score";

@@ -90,7 +90,7 @@ std::uint32_t word_of_leaf(const VocabularyData& data, std::size_t leaf) {
   return static_cast<std::uint32_t>(std::count(data.children.begin(), end, std::uint8_t{0}));
 }
 
-TEST_CASE("A descriptor gets the word that plain descent finds", "[place_recognition]") {
+TEST_CASE("A descriptor gets the word that plain descent finds") {
   const auto seed = GENERATE(1U, 2U, 3U);
   const int branching = GENERATE(2, 7, 10, 40);
   CAPTURE(seed, branching);
@@ -104,7 +104,7 @@ TEST_CASE("A descriptor gets the word that plain descent finds", "[place_recogni
     CHECK(words[i] == word_of_leaf(vocabulary.data(), leaf_of(vocabulary.data(), image[i])));
 }
 
-TEST_CASE("Few different descriptors become one word each", "[place_recognition]") {
+TEST_CASE("Few different descriptors become one word each") {
   const Images images = {{ladder(0), ladder(100), ladder(200), ladder(100), ladder(200)}};
   const VocabularyData data = train_vocabulary(images, {.branching = 5, .depth = 4});
   CHECK(data.children == std::vector<std::uint8_t>{3, 0, 0, 0});
@@ -112,7 +112,7 @@ TEST_CASE("Few different descriptors become one word each", "[place_recognition]
   CHECK(centers == std::set{ladder(0), ladder(100), ladder(200)});
 }
 
-TEST_CASE("A centre is the bitwise majority of its cluster", "[place_recognition]") {
+TEST_CASE("A centre is the bitwise majority of its cluster") {
   // Two far groups; in the first, bits 0-9 are set in 2 of 3 descriptors, bits 10-19 in 1 of 3.
   const Images images = {
       {ladder(0), ladder(10), ladder(20), ladder(240), ladder(250), ladder(256)}};
@@ -122,7 +122,7 @@ TEST_CASE("A centre is the bitwise majority of its cluster", "[place_recognition
         std::set{ladder(10), ladder(250)});
 }
 
-TEST_CASE("Weights are term counts times ln(N / n), scaled to norm 1", "[place_recognition]") {
+TEST_CASE("Weights are term counts times ln(N / n), scaled to norm 1") {
   const BinaryDescriptor everywhere = ladder(0);
   const BinaryDescriptor in_two = ladder(100);
   const BinaryDescriptor in_one = ladder(200);
@@ -143,7 +143,7 @@ TEST_CASE("Weights are term counts times ln(N / n), scaled to norm 1", "[place_r
   CHECK(vector.weights[1 - at] == Approx(std::log(3.0) / total).epsilon(kFloatTolerance));
 }
 
-TEST_CASE("Training depends only on input and seed", "[place_recognition]") {
+TEST_CASE("Training depends only on input and seed") {
   World world(5);
   const Images images = world.images(10, 200);
   const VocabularyTrainingConfig config{.branching = 6, .depth = 3, .seed = 11};
@@ -153,7 +153,7 @@ TEST_CASE("Training depends only on input and seed", "[place_recognition]") {
   CHECK(problem_of(first).empty());
 }
 
-TEST_CASE("An invalid vocabulary is refused with the reason", "[place_recognition]") {
+TEST_CASE("An invalid vocabulary is refused with the reason") {
   CHECK_THROWS_WITH(train_vocabulary(Images{{}, {}}, {}), Contains("no descriptors"));
   CHECK_THROWS_WITH(train_vocabulary(Images{{ladder(3), ladder(3)}}, {}), Contains("are equal"));
   CHECK_THROWS_AS(train_vocabulary(Images{{ladder(3)}}, {.branching = 1}), ConfigError);
@@ -191,7 +191,7 @@ VocabularyData small_vocabulary() {
   return train_vocabulary(world.images(5, 40), {.branching = 4, .depth = 2});
 }
 
-TEST_CASE("A vocabulary survives its file, identity and scores included", "[place_recognition]") {
+TEST_CASE("A vocabulary survives its file, identity and scores included") {
   const VocabularyData data = small_vocabulary();
   const Vocabulary before(data);
   const TemporaryFolder folder;
@@ -204,7 +204,7 @@ TEST_CASE("A vocabulary survives its file, identity and scores included", "[plac
   CHECK(after.transform(image) == before.transform(image));
 }
 
-TEST_CASE("A truncated or overlong vocabulary is refused at every length", "[place_recognition]") {
+TEST_CASE("A truncated or overlong vocabulary is refused at every length") {
   const std::string bytes = serialize(small_vocabulary());
   for (std::size_t size = 0; size < bytes.size(); ++size)
     CHECK_THROWS_AS(deserialize(bytes.substr(0, size), "cut"), std::runtime_error);
@@ -214,7 +214,7 @@ TEST_CASE("A truncated or overlong vocabulary is refused at every length", "[pla
                     Contains("the header states " + std::to_string(bytes.size())));
 }
 
-TEST_CASE("A vocabulary with any byte changed is refused", "[place_recognition]") {
+TEST_CASE("A vocabulary with any byte changed is refused") {
   const std::string bytes = serialize(small_vocabulary());
   for (std::size_t i = 0; i < bytes.size(); ++i) {
     if (28 <= i && i < 32) continue;  // reserved
@@ -225,7 +225,7 @@ TEST_CASE("A vocabulary with any byte changed is refused", "[place_recognition]"
   }
 }
 
-TEST_CASE("A refusal names the file, the offset and what is wrong there", "[place_recognition]") {
+TEST_CASE("A refusal names the file, the offset and what is wrong there") {
   const auto [offset, value, reason] = GENERATE(table<std::size_t, std::uint32_t, std::string>(
       {{0, 88, "offset 0: not a"},
        {8, 7, "offset 8: format version 7, known is 1"},
@@ -243,15 +243,14 @@ TEST_CASE("A refusal names the file, the offset and what is wrong there", "[plac
                     Contains("offset 40: node 0 has 5 children, branching is 4"));
 }
 
-TEST_CASE("A missing file is named", "[place_recognition]") {
+TEST_CASE("A missing file is named") {
   CHECK_THROWS_WITH(load_vocabulary("/nowhere/at.all"), Contains("/nowhere/at.all"));
   CHECK_THROWS_WITH(load_vocabulary("config"), Contains("config: a folder, not a file"));
   CHECK_THROWS_WITH(save_vocabulary(small_vocabulary(), "/nowhere/at.all"),
                     Contains("cannot be written"));
 }
 
-TEST_CASE("The shipped vocabulary loads, is the documented one, and is small",
-          "[place_recognition]") {
+TEST_CASE("The shipped vocabulary loads, is the documented one, and is small") {
   constexpr std::size_t kMaxShippedBytes = 1'500'000;
   const fs::path file = "config/vocabulary/indoor.kmvoc";
   const Vocabulary vocabulary = load_vocabulary(file);
@@ -270,8 +269,7 @@ CommandResult run_tool(const std::string& arguments) {
 }
 
 // On real images, through the tool.
-TEST_CASE("The tool trains on real images and distinguishes the two places",
-          "[place_recognition]") {
+TEST_CASE("The tool trains on real images and distinguishes the two places") {
   const auto images = shared_data("kimera_vio_lcd");
   if (!images) return;
   const TemporaryFolder folder;
@@ -300,7 +298,7 @@ TEST_CASE("The tool trains on real images and distinguishes the two places",
   CHECK(score_of(2, 3) > score_of(1, 3));
 }
 
-TEST_CASE("The tool names unusable input and fails", "[place_recognition]") {
+TEST_CASE("The tool names unusable input and fails") {
   const TemporaryFolder folder;
   const auto check_fails = [&](const std::string& arguments, const char* reason) {
     const CommandResult run = run_tool(arguments);

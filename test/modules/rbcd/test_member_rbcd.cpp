@@ -33,7 +33,7 @@ double gap_of(const TeamProblem& problem, const TeamPoses& poses) {
 
 }  // namespace
 
-TEST_CASE("Block descent of a team ends at the optimum of the whole graph", "[rbcd]") {
+TEST_CASE("Block descent of a team ends at the optimum of the whole graph") {
   const auto [name, robots] = GENERATE(table<std::string, std::size_t>({{"tinyGrid3D", 2},
                                                                         {"tinyGrid3D", 3},
                                                                         {"smallGrid3D", 2},
@@ -55,7 +55,7 @@ TEST_CASE("Block descent of a team ends at the optimum of the whole graph", "[rb
   CHECK(state.round < 200);
 }
 
-TEST_CASE("The result depends neither on the order of messages nor on the tree", "[rbcd]") {
+TEST_CASE("The result depends neither on the order of messages nor on the tree") {
   const TeamProblem problem = three_robots();
   SolverTeam calm = rbcd_team(problem, star(problem.members(), 1));
   SolverTeam rough = rbcd_team(problem, chain(problem.members()), {}, kRoughTransport);
@@ -66,14 +66,14 @@ TEST_CASE("The result depends neither on the order of messages nor on the tree",
       CHECK(calm.member(robot).poses()[i].matrix() == rough.member(robot).poses()[i].matrix());
 }
 
-TEST_CASE("Block descent ends upright if the robots have verticals", "[rbcd]") {
+TEST_CASE("Block descent ends upright if the robots have verticals") {
   const TeamProblem problem = three_robots(0.01);
   SolverTeam team = rbcd_team(problem, star(problem.members()));
   REQUIRE(team.run());
   CHECK(gap_of(problem, team.poses()) < kGap);
 }
 
-TEST_CASE("Poses of an absent robot hold the frame and do not move", "[rbcd]") {
+TEST_CASE("Poses of an absent robot hold the frame and do not move") {
   TeamProblem problem = three_robots();
   problem.absent = {2};
   // The root has no edge to the absent robot. The held poses fit badly, so that descent takes long.
@@ -82,7 +82,7 @@ TEST_CASE("Poses of an absent robot hold the frame and do not move", "[rbcd]") {
   CHECK(gap_of(problem, team.poses()) < kGap);
 }
 
-TEST_CASE("A rejected closure has no influence", "[rbcd]") {
+TEST_CASE("A rejected closure has no influence") {
   TeamProblem problem = three_robots();
   const double optimum = CentralProblem(problem).optimum(problem.start);
   for (const KeyframeId& to : {KeyframeId{5, 14}, KeyframeId{2, 11}}) {
@@ -98,7 +98,7 @@ TEST_CASE("A rejected closure has no influence", "[rbcd]") {
   CHECK(CentralProblem(problem).cost(team.poses()) < optimum + 40.0);
 }
 
-TEST_CASE("Descent stops after the rounds it is given, with a better state", "[rbcd]") {
+TEST_CASE("Descent stops after the rounds it is given, with a better state") {
   const TeamProblem problem = three_robots();
   const CentralProblem central(problem);
   SolverTeam team = rbcd_team(problem, star(problem.members()), {.max_rounds = 3});
@@ -107,7 +107,7 @@ TEST_CASE("Descent stops after the rounds it is given, with a better state", "[r
   CHECK(central.cost(team.poses()) < 0.1 * central.cost(problem.start));
 }
 
-TEST_CASE("Every member passes through every state that the root reports, in order", "[rbcd]") {
+TEST_CASE("Every member passes through every state that the root reports, in order") {
   constexpr int kShare = 1, kProgress = 2;  // first bytes of messages
   const int held_back = GENERATE_COPY(kShare, kProgress);
   CAPTURE(held_back);
@@ -151,7 +151,7 @@ TEST_CASE("Every member passes through every state that the root reports, in ord
   CHECK(rounds == std::vector<std::uint32_t>{0, 5, 10, 15});
 }
 
-TEST_CASE("Impossible messages are refused", "[rbcd]") {
+TEST_CASE("Impossible messages are refused") {
   const TeamProblem problem = three_robots();
   const TeamTree tree = star(problem.members(), 1);
   MemberRbcd root(session_graph(problem, 5), tree.at(5), {});

@@ -35,7 +35,7 @@ LiftedPoses random_direction(std::mt19937& rng, const LiftedPoses& X) {
 
 }  // namespace
 
-TEST_CASE("the cost is the sum of squared residuals", "[rbcd]") {
+TEST_CASE("the cost is the sum of squared residuals") {
   std::mt19937 rng(1);
   const QuadraticProblem problem = random_problem(rng, 3);
   const LiftedPoses X = random_lifted_poses(rng, 3, kPoses);
@@ -55,7 +55,7 @@ TEST_CASE("the cost is the sum of squared residuals", "[rbcd]") {
   CHECK(problem.cost(X) == Approx(expected).epsilon(1e-12));
 }
 
-TEST_CASE("gradient and Hessian agree with finite differences along retractions", "[rbcd]") {
+TEST_CASE("gradient and Hessian agree with finite differences along retractions") {
   const Eigen::Index rank = GENERATE(3, 4, 5);
   const unsigned seed = GENERATE(1U, 2U, 3U);
   CAPTURE(rank, seed);
@@ -74,7 +74,7 @@ TEST_CASE("gradient and Hessian agree with finite differences along retractions"
   CHECK(std::abs((plus - 2.0 * problem.cost(X) + minus) / (h * h) - curvature) < 1e-4 * scale);
 }
 
-TEST_CASE("the Hessian is symmetric and the preconditioner positive definite", "[rbcd]") {
+TEST_CASE("the Hessian is symmetric and the preconditioner positive definite") {
   std::mt19937 rng(7);
   const QuadraticProblem problem = random_problem(rng, 5);
   const LiftedPoses X = random_lifted_poses(rng, 5, kPoses);
@@ -89,7 +89,7 @@ TEST_CASE("the Hessian is symmetric and the preconditioner positive definite", "
         Approx(problem.precondition(X, U).cwiseProduct(V).sum()).epsilon(1e-10));
 }
 
-TEST_CASE("a problem refuses edges without poses, infinite ones and missing poses", "[rbcd]") {
+TEST_CASE("a problem refuses edges without poses, infinite ones and missing poses") {
   const double inf = std::numeric_limits<double>::infinity();
   const auto make = [](std::vector<BlockEdge> edges, std::vector<PublicEdge> public_edges) {
     return QuadraticProblem(5, 2, std::move(edges), std::move(public_edges));
@@ -107,8 +107,7 @@ TEST_CASE("a problem refuses edges without poses, infinite ones and missing pose
   CHECK_THROWS_AS(problem.set_fixed(LiftedPoses::Zero(3, 16)), std::invalid_argument);
 }
 
-TEST_CASE("vertical priors of a block are part of its cost, gradient and Hessian",
-          "[rbcd][vertical]") {
+TEST_CASE("vertical priors of a block are part of its cost, gradient and Hessian") {
   const Eigen::Index rank = GENERATE(3, 5);
   std::mt19937 rng(2);
   const std::vector<BlockEdge> edges{{0, 1, random_pose(rng), 2.0, 3.0},

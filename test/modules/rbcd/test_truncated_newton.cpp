@@ -15,7 +15,7 @@ WholeGraph exact_triangle(const std::vector<SE3>& truth) {
   return graph;
 }
 
-TEST_CASE("a block with exact measurements converges from any start", "[rbcd]") {
+TEST_CASE("a block with exact measurements converges from any start") {
   const unsigned seed = GENERATE(1U, 2U, 3U, 4U);
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -30,7 +30,7 @@ TEST_CASE("a block with exact measurements converges from any start", "[rbcd]") 
   for (std::size_t i = 0; i < 3; ++i) CHECK(poses[i].isApprox(truth[i], 1e-6));
 }
 
-TEST_CASE("steps never increase the cost and keep the poses feasible", "[rbcd]") {
+TEST_CASE("steps never increase the cost and keep the poses feasible") {
   const unsigned seed = GENERATE(1U, 2U, 3U);
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -52,7 +52,7 @@ TEST_CASE("steps never increase the cost and keep the poses feasible", "[rbcd]")
   }
 }
 
-TEST_CASE("the relaxation unwinds a ring that rigid poses cannot unwind", "[rbcd]") {
+TEST_CASE("the relaxation unwinds a ring that rigid poses cannot unwind") {
   // Equal poses on a ring, with one full turn at the start. This closed geodesic cannot be
   // contracted in SO(3), but St(3, 5) is simply connected.
   constexpr Eigen::Index kPoses = 24;
@@ -80,7 +80,7 @@ TEST_CASE("the relaxation unwinds a ring that rigid poses cannot unwind", "[rbcd
 
 constexpr double kRounding = 1e-12;
 
-TEST_CASE("nearest_stiefel has orthonormal columns and is the nearest", "[rbcd]") {
+TEST_CASE("nearest_stiefel has orthonormal columns and is the nearest") {
   const unsigned seed = GENERATE(1U, 2U, 3U);
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -113,7 +113,7 @@ Eigen::SparseMatrix<double> random_definite(int size, int block, std::mt19937& r
   return A.sparseView();
 }
 
-TEST_CASE("The factor solves for rows of the right-hand side with any pattern", "[rbcd]") {
+TEST_CASE("The factor solves for rows of the right-hand side with any pattern") {
   const int block = GENERATE(1, 2, 4);
   const int poses = GENERATE(1, 2, 7, 40);
   const Eigen::Index rank = GENERATE(1, 3, 4, 5);
@@ -129,7 +129,7 @@ TEST_CASE("The factor solves for rows of the right-hand side with any pattern", 
   CHECK((X * A - B).norm() < 1e-10 * B.norm());
 }
 
-TEST_CASE("An indefinite matrix is not factorised", "[rbcd]") {
+TEST_CASE("An indefinite matrix is not factorised") {
   Eigen::SparseMatrix<double> A(4, 4);
   A.setIdentity();
   A.coeffRef(2, 2) = -1.0;

@@ -16,7 +16,7 @@ const std::string kVertex = "VERTEX_SE3:QUAT 0 1 2 3 0 0 0 1\n";
 const std::string kPose = " 1 2 3 0 0 0.6 0.8";
 const std::string kUnit = " 1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 1 0 0 1 0 1";
 
-TEST_CASE("g2o's translation-first information becomes a rotation-first covariance", "[g2o]") {
+TEST_CASE("g2o's translation-first information becomes a rotation-first covariance") {
   // Diagonal 1..6 and one cross term between x (row 0) and roll (row 3).
   const auto graph =
       read_graph("EDGE_SE3:QUAT 0 1" + kPose + " 1 0 0 0.5 0 0 2 0 0 0 0 3 0 0 0 4 0 0 5 0 6\n");
@@ -27,7 +27,7 @@ TEST_CASE("g2o's translation-first information becomes a rotation-first covarian
   CHECK((graph.edges[0].covariance * expected).isApprox(Matrix6::Identity(), 1e-12));
 }
 
-TEST_CASE("g2o poses are read in the order t, x y z w and normalised", "[g2o]") {
+TEST_CASE("g2o poses are read in the order t, x y z w and normalised") {
   const auto graph = read_graph("VERTEX_SE3:QUAT 7 1 2 3 0 0 0.60006 0.80008\n");
   REQUIRE(graph.vertices.size() == 1);
   const SE3& T = graph.vertices[0].T_world_kf;
@@ -36,7 +36,7 @@ TEST_CASE("g2o poses are read in the order t, x y z w and normalised", "[g2o]") 
   CHECK((T.linear() * T.linear().transpose()).isIdentity(1e-14));
 }
 
-TEST_CASE("A key is a gtsam symbol, a plain number, or robot and index", "[g2o]") {
+TEST_CASE("A key is a gtsam symbol, a plain number, or robot and index") {
   CHECK(keyframe_of_key(6989586621679009792U) == KeyframeId{0, 0});  // a0
   CHECK(keyframe_of_key(7061644215716937729U) == KeyframeId{1, 1});  // b1
   CHECK(keyframe_of_key((std::uint64_t{'A'} << 56U) | 5U) == KeyframeId{26, 5});
@@ -52,7 +52,7 @@ TEST_CASE("A key is a gtsam symbol, a plain number, or robot and index", "[g2o]"
     }
 }
 
-TEST_CASE("A graph is unchanged after writing and reading it", "[g2o]") {
+TEST_CASE("A graph is unchanged after writing and reading it") {
   const unsigned seed = GENERATE(range(0U, 5U));
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -81,7 +81,7 @@ TEST_CASE("A graph is unchanged after writing and reading it", "[g2o]") {
   }
 }
 
-TEST_CASE("Verticals are unchanged after writing and reading them", "[g2o][vertical]") {
+TEST_CASE("Verticals are unchanged after writing and reading them") {
   const unsigned seed = GENERATE(range(0U, 5U));
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -105,7 +105,7 @@ TEST_CASE("Verticals are unchanged after writing and reading them", "[g2o][verti
 
 const std::string kOffset = "PARAMS_SE3OFFSET 4 0 0 0 0 0 0 1\n";
 
-TEST_CASE("A prior on the tilt of a pose is its vertical, for any heading", "[g2o][vertical]") {
+TEST_CASE("A prior on the tilt of a pose is its vertical, for any heading") {
   // Rotated by 90 degrees about x: z of the world is y of the pose. Heading and position are
   // arbitrary.
   const std::string information = " 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 25 0 0 0 0 25";
@@ -117,8 +117,7 @@ TEST_CASE("A prior on the tilt of a pose is its vertical, for any heading", "[g2
   CHECK(graph.verticals[0].vertical.sigma_rad == Approx(0.2));
 }
 
-TEST_CASE("Other priors than verticals are refused with the line and the reason",
-          "[g2o][vertical]") {
+TEST_CASE("Other priors than verticals are refused with the line and the reason") {
   const std::string pose = " 0 0 0 0 0 0 1";
   const std::string level = " 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 9 0 0 9 0 0\n";
   const auto [lines, reason] = GENERATE_COPY(table<std::string, std::string>({
@@ -149,7 +148,7 @@ TEST_CASE("Other priors than verticals are refused with the line and the reason"
                     "test.g2o:2: 2D and 3D in one file");
 }
 
-TEST_CASE("A vertical that is not a unit vector is not written", "[g2o][vertical]") {
+TEST_CASE("A vertical that is not a unit vector is not written") {
   const auto [up, sigma] = GENERATE(table<Eigen::Vector3d, double>({{{0, 0, 2}, 0.1},
                                                                     {{0, 0, 0}, 0.1},
                                                                     {{0, 0, 1}, 0.0},
@@ -161,7 +160,7 @@ TEST_CASE("A vertical that is not a unit vector is not written", "[g2o][vertical
   CHECK_THROWS_WITH(write_g2o(out, graph), Contains("vertical of 2:5"));
 }
 
-TEST_CASE("2D g2o is lifted to the plane z = 0", "[g2o]") {
+TEST_CASE("2D g2o is lifted to the plane z = 0") {
   const auto graph = read_graph("VERTEX_SE2 0 1 2 0.5\nEDGE_SE2 0 1 3 4 -0.25 2 0 0 4 0 8\n");
   CHECK(graph.dimension == 2);
   CHECK(graph.vertices.at(0).T_world_kf.translation() == Eigen::Vector3d(1, 2, 0));
@@ -174,7 +173,7 @@ TEST_CASE("2D g2o is lifted to the plane z = 0", "[g2o]") {
   CHECK_THROWS_AS(write_g2o(out, graph), std::invalid_argument);
 }
 
-TEST_CASE("A bad g2o file is refused with its line and the reason", "[g2o]") {
+TEST_CASE("A bad g2o file is refused with its line and the reason") {
   const auto [line, reason] = GENERATE(table<std::string, std::string>({
       {"VERTEX_XYZ 1 0 0 0", "unknown tag 'VERTEX_XYZ'"},
       {"0410268 0.7588833", "unknown tag '0410268'"},
@@ -212,7 +211,7 @@ TEST_CASE("A bad g2o file is refused with its line and the reason", "[g2o]") {
                     StartsWith("test.g2o:5: ") && Contains(reason));
 }
 
-TEST_CASE("An edge with indefinite information has the weights of its blocks", "[g2o]") {
+TEST_CASE("An edge with indefinite information has the weights of its blocks") {
   // As in cubicle.g2o: definite blocks with cross terms that are impossible in a covariance.
   const G2oGraph graph = read_graph("EDGE_SE3:QUAT 1 2" + kPose +
                                     " 4 2 0 0 0 0 4 0 0 0 0 10 70 100 0 10 0 0 10 0 5\n" +
@@ -231,12 +230,12 @@ TEST_CASE("An edge with indefinite information has the weights of its blocks", "
   CHECK(planar.edges[0].covariance.isApprox(Matrix6(variances.asDiagonal()), 1e-14));
 }
 
-TEST_CASE("An empty or missing g2o file is refused", "[g2o]") {
+TEST_CASE("An empty or missing g2o file is refused") {
   CHECK_THROWS_WITH(read_graph("# nothing\n"), "test.g2o: no vertex and no edge");
   CHECK_THROWS_WITH(read_g2o(fs::path("no/such.g2o")), "no/such.g2o: no such file");
 }
 
-TEST_CASE("The public benchmark graphs have the sizes their sources state", "[g2o]") {
+TEST_CASE("The public benchmark graphs have the sizes their sources state") {
   const auto [name, dimension, poses, edges] =
       GENERATE(table<std::string, int, std::size_t, std::size_t>({
           {"3d/tinyGrid3D.g2o", 3, 9, 11},

@@ -52,7 +52,7 @@ void play_all(GraphPlaybackNode& node, const RecordedGraph& graph) {
   for (std::size_t i = 0; i < graph.poses(); ++i) node.step(i);
 }
 
-TEST_CASE("A played graph chains its odometry with the covariance of the chain", "[playback]") {
+TEST_CASE("A played graph chains its odometry with the covariance of the chain") {
   std::mt19937 rng(1);
   const RecordedGraph graph = recording(rng);
   Played played;
@@ -81,7 +81,7 @@ TEST_CASE("A played graph chains its odometry with the covariance of the chain",
   CHECK(played.odometry[0].covariance.isZero());
 }
 
-TEST_CASE("Keyframes of a graph with times have these times", "[playback]") {
+TEST_CASE("Keyframes of a graph with times have these times") {
   std::mt19937 rng(1);
   RecordedGraph graph = recording(rng);
   graph.stamps = {100, 250, 251, 1'000'000, 2'000'000};
@@ -95,8 +95,7 @@ TEST_CASE("Keyframes of a graph with times have these times", "[playback]") {
   }
 }
 
-TEST_CASE("Verticals are played with their keyframes, and odometry starts upright",
-          "[playback][vertical]") {
+TEST_CASE("Verticals are played with their keyframes, and odometry starts upright") {
   std::mt19937 rng(2);
   RecordedGraph graph = recording(rng);
   const bool at_first = GENERATE(true, false);
@@ -123,7 +122,7 @@ TEST_CASE("Verticals are played with their keyframes, and odometry starts uprigh
     CHECK(played.keyframes[i].odometry.T_odom_kf.isApprox(poses[i].T_odom_kf, 1e-12));
 }
 
-TEST_CASE("One robot plays a closure with the keyframe that makes it known", "[playback]") {
+TEST_CASE("One robot plays a closure with the keyframe that makes it known") {
   std::mt19937 rng(1);
   const RecordedGraph graph = recording(rng);
   Played played;
@@ -142,7 +141,7 @@ TEST_CASE("One robot plays a closure with the keyframe that makes it known", "[p
   CHECK(played.ends[0].closures == 4);
 }
 
-TEST_CASE("The playback thread plays to the end at any rate", "[playback]") {
+TEST_CASE("The playback thread plays to the end at any rate") {
   const double rate = GENERATE(as<double>{}, kMax, 1e4);
   std::mt19937 rng(1);
   const RecordedGraph graph = recording(rng);
@@ -162,7 +161,7 @@ TEST_CASE("The playback thread plays to the end at any rate", "[playback]") {
   CHECK(played.ends.size() == 1);
 }
 
-TEST_CASE("A stopped playback does not publish its end", "[playback]") {
+TEST_CASE("A stopped playback does not publish its end") {
   std::mt19937 rng(1);
   Played played;
   std::promise<void> first;
@@ -177,7 +176,7 @@ TEST_CASE("A stopped playback does not publish its end", "[playback]") {
   CHECK(played.ends.empty());
 }
 
-TEST_CASE("A playback rate that is not positive is refused", "[playback]") {
+TEST_CASE("A playback rate that is not positive is refused") {
   std::mt19937 rng(1);
   Played played;
   const RecordedGraph graph = recording(rng);

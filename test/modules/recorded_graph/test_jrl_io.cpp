@@ -21,7 +21,7 @@ Eigen::Vector3d translation(const JrlMeasurement& measured) {
   return measured.edge.T_from_to.translation();
 }
 
-TEST_CASE("Every field of a JRL file is read", "[jrl]") {
+TEST_CASE("Every field of a JRL file is read") {
   const JrlGraph graph = parse_jrl(SmallJrl().text(), "team.jrl");
   CHECK(graph.robots == std::vector<RobotId>{0, 1});
   CHECK(graph.priors == 2);
@@ -59,7 +59,7 @@ TEST_CASE("Every field of a JRL file is read", "[jrl]") {
   CHECK(graph.truth.at({1, 1}).translation() == Eigen::Vector3d(1, 2, 0));
 }
 
-TEST_CASE("Rotations are w x y z, and covariances have the rotation first", "[jrl]") {
+TEST_CASE("Rotations are w x y z, and covariances have the rotation first") {
   SmallJrl small;
   json& step = small.document["measurements"]["a"][1]["measurements"][0];
   step["measurement"]["rotation"] = {0.8, 0.0, 0.0, 0.6};  // about z by 2 atan(0.6 / 0.8)
@@ -89,7 +89,7 @@ TEST_CASE("Rotations are w x y z, and covariances have the rotation first", "[jr
   CHECK(same.T_from_to.isApprox(edge.T_from_to, 1e-12));
 }
 
-TEST_CASE("Robots as characters, and lists instead of maps, give an equal graph", "[jrl]") {
+TEST_CASE("Robots as characters, and lists instead of maps, give an equal graph") {
   const JrlGraph expected = parse_jrl(SmallJrl().text(), "team.jrl");
   SmallJrl small;
   json& document = small.document;
@@ -118,7 +118,7 @@ TEST_CASE("Robots as characters, and lists instead of maps, give an equal graph"
   for (const auto& [id, T] : expected.truth) CHECK(graph.truth.at(id).matrix() == T.matrix());
 }
 
-TEST_CASE("Labels of a single robot may be one list", "[jrl]") {
+TEST_CASE("Labels of a single robot may be one list") {
   SmallJrl small;
   json& document = small.document;
   document["robots"] = {"a"};
@@ -136,7 +136,7 @@ TEST_CASE("Labels of a single robot may be one list", "[jrl]") {
   CHECK(parsed(document).truth.empty());
 }
 
-TEST_CASE("Different measurements of one pair all count", "[jrl]") {
+TEST_CASE("Different measurements of one pair all count") {
   SmallJrl small;
   json& copy = small.document["measurements"]["a"][3]["measurements"][0];
   SECTION("in the pose") {
@@ -153,7 +153,7 @@ TEST_CASE("Different measurements of one pair all count", "[jrl]") {
   CHECK(graph.measurements.size() == 7);
 }
 
-TEST_CASE("A label on either copy of a measurement counts", "[jrl]") {
+TEST_CASE("A label on either copy of a measurement counts") {
   SmallJrl small;
   const auto [robot, label] =
       GENERATE(table<std::string, json>({{"a", json::array({3, 0})}, {"b", json::array({1, 1})}}));
@@ -161,7 +161,7 @@ TEST_CASE("A label on either copy of a measurement counts", "[jrl]") {
   CHECK(parsed(small.document).measurements[3].is_false);
 }
 
-TEST_CASE("The part of a robot of a JRL file has its odometry, closures and times", "[jrl]") {
+TEST_CASE("The part of a robot of a JRL file has its odometry, closures and times") {
   const TemporaryFolder folder;
   const auto file = folder.write("team.jrl", SmallJrl().text());
   const RecordedGraph a = read_recorded_graph(file, RobotId{0});
@@ -177,7 +177,7 @@ TEST_CASE("The part of a robot of a JRL file has its odometry, closures and time
   CHECK_THROWS_WITH(read_recorded_graph(file), Contains("team.jrl: holds several robots"));
 }
 
-TEST_CASE("Invalid content of a JRL file is refused with its place and value", "[jrl]") {
+TEST_CASE("Invalid content of a JRL file is refused with its place and value") {
   using Edit = std::function<void(json&)>;
   struct Fault {
     const char* message;
@@ -273,7 +273,7 @@ TEST_CASE("Invalid content of a JRL file is refused with its place and value", "
   CHECK_THROWS_WITH(parsed(small.document), Contains(at));
 }
 
-TEST_CASE("A file that is not JSON is refused with its name", "[jrl]") {
+TEST_CASE("A file that is not JSON is refused with its name") {
   const std::string good = SmallJrl().text();
   const auto [text, message] = GENERATE_REF(
       table<std::string, const char*>({{good.substr(0, good.size() / 2), "parse error"},
@@ -284,7 +284,7 @@ TEST_CASE("A file that is not JSON is refused with its name", "[jrl]") {
   CHECK_THROWS_WITH(parse_jrl(text, "team.jrl"), Contains("team.jrl: ") && Contains(message));
 }
 
-TEST_CASE("A corrupted JRL file is refused with its place, or contains a solvable graph", "[jrl]") {
+TEST_CASE("A corrupted JRL file is refused with its place, or contains a solvable graph") {
   check_corrupted<std::runtime_error>(SmallJrl().text(), "team.jrl", [](const std::string& text) {
     const JrlGraph graph = parse_jrl(text, "team.jrl");
     for (const JrlMeasurement& measured : graph.measurements) {
@@ -297,11 +297,11 @@ TEST_CASE("A corrupted JRL file is refused with its place, or contains a solvabl
   });
 }
 
-TEST_CASE("A path that is not a JRL file is refused with its name", "[jrl]") {
+TEST_CASE("A path that is not a JRL file is refused with its name") {
   check_no_files<std::runtime_error>(".jrl", [](const auto& place) { (void)read_jrl(place); });
 }
 
-TEST_CASE("COSMO-Bench files have the published numbers of poses and closures", "[jrl]") {
+TEST_CASE("COSMO-Bench files have the published numbers of poses and closures") {
   struct Set {
     const char* name;
     std::size_t poses;

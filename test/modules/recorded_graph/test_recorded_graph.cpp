@@ -15,7 +15,7 @@ RelativePose edge(KeyframeId from, KeyframeId to, double x = 1.0) {
   return {from, to, make_pose(Eigen::Matrix3d::Identity(), {x, 0, 0}), Matrix6::Identity()};
 }
 
-TEST_CASE("Measurements are sorted into odometry and closures", "[recorded]") {
+TEST_CASE("Measurements are sorted into odometry and closures") {
   const std::vector<RelativePose> edges = {
       edge({7, 1}, {7, 2}, 2.0), edge({7, 0}, {7, 1}, 1.0),  // odometry in any order
       edge({7, 2}, {7, 0}),                                  // closure
@@ -35,7 +35,7 @@ TEST_CASE("Measurements are sorted into odometry and closures", "[recorded]") {
   CHECK(graph.inter_closures[1].to == KeyframeId{40, 1000});
 }
 
-TEST_CASE("A graph that is not the part of one robot is refused", "[recorded]") {
+TEST_CASE("A graph that is not the part of one robot is refused") {
   const RelativePose step = edge({0, 0}, {0, 1});
   const auto refusal = [&](std::vector<RelativePose> edges) {
     edges.push_back(step);
@@ -64,7 +64,7 @@ std::vector<RelativePose> read(const std::string& text) {
   return parse_measurements(text, "test.csv");
 }
 
-TEST_CASE("A row of measurements is read with its units", "[recorded]") {
+TEST_CASE("A row of measurements is read with its units") {
   const auto rows = read(kHeader + "3,0,12,5,0,0,0.6,0.8,1,2,3,10000,100,1,1\n");
   REQUIRE(rows.size() == 1);
   CHECK(rows[0].from == KeyframeId{3, 0});
@@ -76,7 +76,7 @@ TEST_CASE("A row of measurements is read with its units", "[recorded]") {
   CHECK(precision.tau == Approx(100.0));
 }
 
-TEST_CASE("A bad row is refused with its line and the reason", "[recorded]") {
+TEST_CASE("A bad row is refused with its line and the reason") {
   const auto [row, reason] = GENERATE(table<std::string, std::string>({
       {"0,0,0,1,0,0,0,1,0,0,0,1", "line ends before tau"},
       {"65536,0,0,1,0,0,0,1,0,0,0,1,1", "robot is not an integer from 0 to 65535: '65536'"},
@@ -96,7 +96,7 @@ TEST_CASE("A bad row is refused with its line and the reason", "[recorded]") {
   CHECK_THROWS_WITH(read("a,b\n"), StartsWith("test.csv:1: the first line must name"));
 }
 
-TEST_CASE("The tunnels robots have the poses and edges their source states", "[recorded]") {
+TEST_CASE("The tunnels robots have the poses and edges their source states") {
   if (!shared_data("multi_robot/tunnels_8robots/robot0.csv")) return;
   const std::size_t poses[] = {105, 138, 149, 148, 168, 175, 191, 181};
   std::size_t odometry = 0, intra = 0, inter = 0;
@@ -116,7 +116,7 @@ TEST_CASE("The tunnels robots have the poses and edges their source states", "[r
   CHECK(inter == 2 * 3548);  // in the files of both robots
 }
 
-TEST_CASE("g2o files of one robot are read in every layout", "[recorded]") {
+TEST_CASE("g2o files of one robot are read in every layout") {
   const auto [name, robot, poses, intra, inter] =
       GENERATE(table<std::string, int, std::size_t, std::size_t, std::size_t>({
           {"door_slam/argos_simulation/clean/example_2robots/1.g2o", 1, 442, 0, 34},
@@ -134,7 +134,7 @@ TEST_CASE("g2o files of one robot are read in every layout", "[recorded]") {
   CHECK(graph.inter_closures.size() == inter);
 }
 
-TEST_CASE("The part of a robot contains its verticals", "[recorded][vertical]") {
+TEST_CASE("The part of a robot contains its verticals") {
   const TemporaryFolder folder;
   const auto file = folder.path() / "7.g2o";
   const Vertical second{{0.0, 1.0, 0.0}, 0.01};
@@ -157,8 +157,7 @@ TEST_CASE("The part of a robot contains its verticals", "[recorded][vertical]") 
       EndsWith("7.g2o: the prior on " + to_string(elsewhere) + " is on no keyframe of robot 7"));
 }
 
-TEST_CASE("A planar graph has equal weights in space, and a missing step is unknown",
-          "[recorded]") {
+TEST_CASE("A planar graph has equal weights in space, and a missing step is unknown") {
   const TemporaryFolder folder;
   const auto file = folder.path() / "0.g2o";
   std::ofstream(file) << "EDGE_SE2 0 1 1 0 0.1 4 0 0 2 0 9\nEDGE_SE2 0 2 1 0 0.1 4 0 0 2 0 9\n";
@@ -171,7 +170,7 @@ TEST_CASE("A planar graph has equal weights in space, and a missing step is unkn
   CHECK(graph.intra_closures.size() == 1);
 }
 
-TEST_CASE("A weight that no robot optimises is refused with its edge", "[recorded]") {
+TEST_CASE("A weight that no robot optimises is refused with its edge") {
   const double information = GENERATE(1e14, 2e-12);
   const TemporaryFolder folder;
   G2oGraph graph;
@@ -182,7 +181,7 @@ TEST_CASE("A weight that no robot optimises is refused with its edge", "[recorde
                     Contains("7.g2o: edge 7:0 -> 7:1 has a variance of"));
 }
 
-TEST_CASE("Files that are not the part of one robot are refused with their name", "[recorded]") {
+TEST_CASE("Files that are not the part of one robot are refused with their name") {
   // A block of a grid (poses 0, 1, 16, ...), and a file with a broken line.
   const auto [name, reason] = GENERATE(table<std::string, std::string>({
       {"distributed_mapper/blocks_world/2robots/0.g2o", "0.g2o: no "},
@@ -248,14 +247,14 @@ void check_drive(const RecordedGraph& graph) {
   }
 }
 
-TEST_CASE("A corrupted g2o file is refused with its line, or contains a solvable graph", "[g2o]") {
+TEST_CASE("A corrupted g2o file is refused with its line, or contains a solvable graph") {
   const std::string good = GENERATE(drive_g2o(), planar_g2o());
   check_corrupted<std::runtime_error>(good, "corrupted.g2o", [](const std::string& text) {
     check_graph(parse_g2o(text, "corrupted.g2o"));
   });
 }
 
-TEST_CASE("A corrupted graph of a robot is refused with its name, or can be played", "[recorded]") {
+TEST_CASE("A corrupted graph of a robot is refused with its name, or can be played") {
   const TemporaryFolder folder;
   const auto [name, good] =
       GENERATE(table<std::string, std::string>({{"7.g2o", drive_g2o()}, {"7.csv", drive_csv()}}));
@@ -264,7 +263,7 @@ TEST_CASE("A corrupted graph of a robot is refused with its name, or can be play
   });
 }
 
-TEST_CASE("A path that is not a file of a graph is refused with its name", "[recorded]") {
+TEST_CASE("A path that is not a file of a graph is refused with its name") {
   const std::string extension = GENERATE(".g2o", ".csv");
   check_no_files<std::runtime_error>(extension,
                                      [](const auto& place) { (void)read_recorded_graph(place); });

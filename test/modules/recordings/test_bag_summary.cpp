@@ -11,7 +11,7 @@ std::vector<std::uint8_t> image_at(Stamp stamp) {
   return encode_ros(mono_image({stamp, "camera"}, 3, 2));
 }
 
-TEST_CASE("Topics are summed up by the stamps of their sensors", "[recordings]") {
+TEST_CASE("Topics are summed up by the stamps of their sensors") {
   ListedBag bag;
   const auto image = bag.describe("/left", RosImage::kType);
   const auto text = bag.describe("/text", "std_msgs/String");
@@ -34,8 +34,7 @@ TEST_CASE("Topics are summed up by the stamps of their sensors", "[recordings]")
   CHECK(topics[1].stamps == std::vector<Stamp>{101 * kSecond});
 }
 
-TEST_CASE("Messages in an encoding that is not known are placed by the recorder's clock",
-          "[recordings]") {
+TEST_CASE("Messages in an encoding that is not known are placed by the recorder's clock") {
   ListedBag bag;
   bag.add_bytes(bag.add_channel("/left", RosImage::kType, "json"), 5, {'{'});
   const auto topics = summarise_topics(bag);
@@ -44,7 +43,7 @@ TEST_CASE("Messages in an encoding that is not known are placed by the recorder'
   CHECK_FALSE(topics[0].is_image);
 }
 
-TEST_CASE("Cameras of one rate are compared and others are not", "[recordings]") {
+TEST_CASE("Cameras of one rate are compared and others are not") {
   ListedBag bag;
   for (Stamp stamp = 0; stamp < 10 * kSecond; stamp += kSecond) {
     bag.add_bytes("/left", RosImage::kType, stamp, image_at(stamp));
@@ -61,7 +60,7 @@ TEST_CASE("Cameras of one rate are compared and others are not", "[recordings]")
 
 constexpr Stamp kMs = 1'000'000;
 
-TEST_CASE("Rate and gaps of stamps are those of their intervals", "[recordings]") {
+TEST_CASE("Rate and gaps of stamps are those of their intervals") {
   // Intervals of 10 ms, one of 50 and one of 12.
   std::vector<Stamp> stamps;
   for (int i = 0; i < 100; ++i)
@@ -77,14 +76,14 @@ TEST_CASE("Rate and gaps of stamps are those of their intervals", "[recordings]"
   CHECK(statistics.unordered == 0);
 }
 
-TEST_CASE("Jitter bounds the deviation of 19 of 20 intervals", "[recordings]") {
+TEST_CASE("Jitter bounds the deviation of 19 of 20 intervals") {
   // Deviations from the median of 1, 2, ..., 21 ms are 0, then 1 to 10 twice: of 21 the 20th is 10.
   std::vector<Stamp> stamps = {0};
   for (int i = 1; i <= 21; ++i) stamps.push_back(stamps.back() + i * kMs);
   CHECK(stamp_statistics(stamps).jitter_s == Approx(0.010));
 }
 
-TEST_CASE("Too few stamps have no rate", "[recordings]") {
+TEST_CASE("Too few stamps have no rate") {
   CHECK(stamp_statistics({}).count == 0);
   CHECK(std::isnan(stamp_statistics({}).rate_hz));
   const StampStatistics one = stamp_statistics({5});
@@ -96,7 +95,7 @@ TEST_CASE("Too few stamps have no rate", "[recordings]") {
   CHECK(stamp_statistics({-most, most}).largest_gap_s == Approx(2.0 * 9223372036.854775807));
 }
 
-TEST_CASE("Stamps of two cameras that are one agree", "[recordings]") {
+TEST_CASE("Stamps of two cameras that are one agree") {
   std::vector<Stamp> first, second;
   for (int i = 0; i < 20; ++i) {
     first.push_back(i * 50 * kMs);

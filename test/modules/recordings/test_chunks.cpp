@@ -41,7 +41,7 @@ std::vector<std::uint8_t> plain_bytes(std::size_t size) {
   return bytes;
 }
 
-TEST_CASE("Decompression restores the compressed bytes", "[recordings]") {
+TEST_CASE("Decompression restores the compressed bytes") {
   const std::string compression = GENERATE("none", "lz4", "zstd", "bz2");
   const std::size_t size = GENERATE(0U, 1U, 1000U, 1U << 20U, 5'000'001U);
   CAPTURE(compression, size);
@@ -51,7 +51,7 @@ TEST_CASE("Decompression restores the compressed bytes", "[recordings]") {
   CHECK(*result.value == plain);
 }
 
-TEST_CASE("Compressed bytes of another size than they state are refused", "[recordings]") {
+TEST_CASE("Compressed bytes of another size than they state are refused") {
   const std::string compression = GENERATE("none", "lz4", "zstd", "bz2");
   CAPTURE(compression);
   const auto packed = compressed(compression, plain_bytes(3'000'000));
@@ -102,7 +102,7 @@ Merged merge(const std::vector<std::vector<Stamp>>& times, const std::vector<Sta
   return merged;
 }
 
-TEST_CASE("Messages of chunks that overlap come in order of time and of the file", "[recordings]") {
+TEST_CASE("Messages of chunks that overlap come in order of time and of the file") {
   // Few enough times that many are equal.
   std::mt19937 rng(GENERATE(1U, 2U, 3U));
   const std::uint64_t held_bytes = GENERATE(std::uint64_t{0}, std::uint64_t{25}, ~std::uint64_t{0});
@@ -129,7 +129,7 @@ TEST_CASE("Messages of chunks that overlap come in order of time and of the file
   CHECK((merged.loads == times.size()) == (held_bytes > 25));
 }
 
-TEST_CASE("Messages are dropped if their chunk begins earlier than stated", "[recordings]") {
+TEST_CASE("Messages are dropped if their chunk begins earlier than stated") {
   const Merged merged = merge({{100, 101, 102, 103}, {99, 100, 103, 104}}, {100, 102});
   CHECK(merged.lost == std::vector<Stamp>{99, 100});
   check_order(merged.messages);

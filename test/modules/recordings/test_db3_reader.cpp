@@ -58,7 +58,7 @@ std::vector<std::string> names_in(const fs::path& folder) {
 
 }  // namespace
 
-TEST_CASE("Bags of ROS 2 give the same messages as SQLite's own program", "[recordings]") {
+TEST_CASE("Bags of ROS 2 give the same messages as SQLite's own program") {
   struct Known {
     const char* folder;
     ListedSum sum;  // result of Python's sqlite3
@@ -76,7 +76,7 @@ TEST_CASE("Bags of ROS 2 give the same messages as SQLite's own program", "[reco
   CHECK(to_string(reader->report()) == "");
 }
 
-TEST_CASE("Messages of a database come in order of time and id", "[recordings]") {
+TEST_CASE("Messages of a database come in order of time and id") {
   const TemporaryFolder folder;
   const bool has_index = GENERATE(true, false);
   const fs::path path =
@@ -98,7 +98,7 @@ TEST_CASE("Messages of a database come in order of time and id", "[recordings]")
   CHECK(names_in(folder.path()) == std::vector<std::string>{"a b%?#.db3"});
 }
 
-TEST_CASE("Messages in a write-ahead log are read", "[recordings]") {
+TEST_CASE("Messages in a write-ahead log are read") {
   const TemporaryFolder folder;
   const fs::path path = folder.path() / "a.db3";
   Database recorder(path);  // open meanwhile, as by a recorder that runs
@@ -109,7 +109,7 @@ TEST_CASE("Messages in a write-ahead log are read", "[recordings]") {
   CHECK(messages_of(*open_db3(path)).size() == 4);
 }
 
-TEST_CASE("Rows that are no messages are lost with their place", "[recordings]") {
+TEST_CASE("Rows that are no messages are lost with their place") {
   const TemporaryFolder folder;
   const fs::path path =
       database_of(folder, "a.db3",
@@ -125,7 +125,7 @@ TEST_CASE("Rows that are no messages are lost with their place", "[recordings]")
         path.string() + ": message 7: topic 99");
 }
 
-TEST_CASE("A database without the tables is refused and its views are not run", "[recordings]") {
+TEST_CASE("A database without the tables is refused and its views are not run") {
   const TemporaryFolder folder;
   CHECK_THROWS_WITH(open_db3(database_of(folder, "a.db3", "CREATE TABLE other(id INTEGER);")),
                     Contains("a.db3: no table topics"));
@@ -140,7 +140,7 @@ TEST_CASE("A database without the tables is refused and its views are not run", 
   check_no_files<InputFileError>(".db3", [](const fs::path& path) { (void)open_db3(path); });
 }
 
-TEST_CASE("Several files of a folder are one recording", "[recordings]") {
+TEST_CASE("Several files of a folder are one recording") {
   const TemporaryFolder folder;
   fs::create_directory(folder.path() / "bag");
   database_of(folder, "bag/bag_10.db3", std::string(kTables) + kRows);
@@ -161,7 +161,7 @@ TEST_CASE("Several files of a folder are one recording", "[recordings]") {
                      {10, 0}, {10, 0}, {10, 1}, {20, 1}, {25, 0}, {30, 1}});
 }
 
-TEST_CASE("A file that is no recording is refused by name", "[recordings]") {
+TEST_CASE("A file that is no recording is refused by name") {
   const TemporaryFolder folder;
   CHECK_THROWS_WITH(open_bag(folder.write("a.bag", "nothing of the kind")),
                     Contains("a.bag byte 0: does not begin like"));
@@ -179,7 +179,7 @@ TEST_CASE("A file that is no recording is refused by name", "[recordings]") {
   CHECK_THROWS_WITH(open_bag(folder.path() / "two"), Contains("both .db3 and .mcap"));
 }
 
-TEST_CASE("Corrupted databases are refused or read in order", "[recordings]") {
+TEST_CASE("Corrupted databases are refused or read in order") {
   const TemporaryFolder folder;
   // Long enough that rows, index and overflowing data have pages of their own.
   const fs::path good = database_of(
@@ -193,7 +193,7 @@ TEST_CASE("Corrupted databases are refused or read in order", "[recordings]") {
       });
 }
 
-TEST_CASE("Messages that a recorder compressed one by one are read", "[recordings]") {
+TEST_CASE("Messages that a recorder compressed one by one are read") {
   const TemporaryFolder folder;
   // "zstd" of 00 01 00 00 and ten times 07, and the first bytes of it.
   const fs::path path = database_of(

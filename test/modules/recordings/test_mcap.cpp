@@ -139,8 +139,7 @@ std::vector<TopicMessage> by_time(std::vector<TopicMessage> messages) {
 
 }  // namespace
 
-TEST_CASE("Every file of the MCAP conformance suite gives the messages that are listed",
-          "[recordings]") {
+TEST_CASE("Every file of the MCAP conformance suite gives the messages that are listed") {
   const auto folder = shared_data("ros_recordings/mcap/conformance");
   if (!folder) return;
   std::size_t files = 0;
@@ -164,7 +163,7 @@ TEST_CASE("Every file of the MCAP conformance suite gives the messages that are 
   CHECK(messages == 1694);
 }
 
-TEST_CASE("A recording of rosbag2 with zstd is read whole", "[recordings]") {
+TEST_CASE("A recording of rosbag2 with zstd is read whole") {
   const auto file = shared_data("ros_recordings/mcap/nav2_turtlebot.mcap");
   if (!file) return;
   const auto summed = open_mcap(*file);
@@ -183,7 +182,7 @@ TEST_CASE("A recording of rosbag2 with zstd is read whole", "[recordings]") {
   CHECK(to_string(reader->report()) == "");
 }
 
-TEST_CASE("MCAP files are to the byte those of the conformance suite", "[recordings]") {
+TEST_CASE("MCAP files are to the byte those of the conformance suite") {
   const auto folder = shared_data("ros_recordings/mcap/conformance");
   if (!folder) return;
   std::vector<McapMessage> ten;
@@ -199,7 +198,7 @@ TEST_CASE("MCAP files are to the byte those of the conformance suite", "[recordi
   CHECK(bytes == read_input_file(*folder / (name + ".mcap")));
 }
 
-TEST_CASE("A file cut at any byte gives the chunks before the cut", "[recordings]") {
+TEST_CASE("A file cut at any byte gives the chunks before the cut") {
   const std::string compression = GENERATE("", "zstd");
   CAPTURE(compression);
   const SmallFile file = small_file(compression);
@@ -228,7 +227,7 @@ TEST_CASE("A file cut at any byte gives the chunks before the cut", "[recordings
   CHECK(to_string(whole->report()).empty());
 }
 
-TEST_CASE("Attachments are read as they were written, or refused", "[recordings]") {
+TEST_CASE("Attachments are read as they were written, or refused") {
   std::string bytes = file_of({numbered(1, 5)}, true);
   const TemporaryFolder folder;
   CHECK(read_mcap_attachments(folder.write("a.mcap", bytes)) ==
@@ -241,7 +240,7 @@ TEST_CASE("Attachments are read as they were written, or refused", "[recordings]
   CHECK_THROWS_AS(read_mcap_attachments(folder.write("a.mcap", "#ROSBAG")), InputFileError);
 }
 
-TEST_CASE("A chunk with another checksum than it states is lost with its place", "[recordings]") {
+TEST_CASE("A chunk with another checksum than it states is lost with its place") {
   const TemporaryFolder folder;
   SmallFile file = small_file("");
   file.bytes[file.bytes.find(std::string(29, 29))] ^= 1;
@@ -268,8 +267,7 @@ TEST_CASE("A chunk with another checksum than it states is lost with its place",
   CHECK(other->report().count(BagFault::kChecksum) == 1);
 }
 
-TEST_CASE("Chunks that decompress to far more than the file are left out and reported",
-          "[recordings]") {
+TEST_CASE("Chunks that decompress to far more than the file are left out and reported") {
   McapWriter writer({});
   const auto channel = writer.add_channel({.topic = "a", .message_encoding = "b"}, {});
   const std::vector<std::uint8_t> zeros(std::size_t{40} << 20U);
@@ -286,7 +284,7 @@ TEST_CASE("Chunks that decompress to far more than the file are left out and rep
       StartsWith(path.string() + " byte ") && Contains("more than 64 MiB and 250 times the file"));
 }
 
-TEST_CASE("Corrupted MCAP files are refused or read in order", "[recordings]") {
+TEST_CASE("Corrupted MCAP files are refused or read in order") {
   const TemporaryFolder folder;
   const std::string good = small_file(GENERATE("", "zstd")).bytes;
   check_corrupted<InputFileError>(good, folder.path().string(), [&](const std::string& bytes) {
@@ -298,7 +296,7 @@ TEST_CASE("Corrupted MCAP files are refused or read in order", "[recordings]") {
   });
 }
 
-TEST_CASE("A file that is no MCAP file is refused by name", "[recordings]") {
+TEST_CASE("A file that is no MCAP file is refused by name") {
   check_no_files<InputFileError>(".mcap", [](const fs::path& path) { (void)open_mcap(path); });
   const TemporaryFolder folder;
   CHECK_THROWS_WITH(open_mcap(folder.write("a.mcap", "#ROSBAG V2.0\n")),

@@ -137,7 +137,7 @@ std::string small_bag(bool has_index) {
 
 }  // namespace
 
-TEST_CASE("Bags of ROS 1 give the same messages as ROS' own reader", "[recordings]") {
+TEST_CASE("Bags of ROS 1 give the same messages as ROS' own reader") {
   struct Known {
     const char* file;
     ListedSum sum;  // result of Debian's python3-rosbag 1.15
@@ -168,7 +168,7 @@ TEST_CASE("Bags of ROS 1 give the same messages as ROS' own reader", "[recording
     CHECK(counts[i] == reader->channels()[i].message_count);
 }
 
-TEST_CASE("A bag is read the same with and without an index", "[recordings]") {
+TEST_CASE("A bag is read the same with and without an index") {
   const bool has_index = GENERATE(true, false);
   const TemporaryFolder folder;
   const auto reader = open_ros1_bag(folder.write("a.bag", small_bag(has_index)));
@@ -184,7 +184,7 @@ TEST_CASE("A bag is read the same with and without an index", "[recordings]") {
   CHECK(reader->report().count(BagFault::kIndex) == (has_index ? 0 : 1));
 }
 
-TEST_CASE("The complete chunks of a truncated bag are read", "[recordings]") {
+TEST_CASE("The complete chunks of a truncated bag are read") {
   const std::string whole = small_bag(GENERATE(true, false));
   const TemporaryFolder folder;
   std::size_t before = 0;
@@ -201,7 +201,7 @@ TEST_CASE("The complete chunks of a truncated bag are read", "[recordings]") {
   CHECK(before >= 8);
 }
 
-TEST_CASE("Corrupted bags are refused or read in order", "[recordings]") {
+TEST_CASE("Corrupted bags are refused or read in order") {
   const std::string recorded = GENERATE("", "tf_example.bag", "no-messages.bag");
   const auto file = shared_data("ros_recordings/rosbag1/" + recorded);
   if (!file) return;
@@ -217,7 +217,7 @@ TEST_CASE("Corrupted bags are refused or read in order", "[recordings]") {
   });
 }
 
-TEST_CASE("A file that is no bag of version 2 is refused by name", "[recordings]") {
+TEST_CASE("A file that is no bag of version 2 is refused by name") {
   check_no_files<InputFileError>(".bag", [](const fs::path& path) { (void)open_ros1_bag(path); });
   const TemporaryFolder folder;
   CHECK_THROWS_WITH(open_ros1_bag(folder.write("a.bag", "#ROSBAG V1.2\n")),

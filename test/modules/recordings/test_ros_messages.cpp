@@ -208,8 +208,7 @@ RosImage image() {
 }  // namespace
 
 // golden/make.mjs wrote the messages; the values stand above.
-TEST_CASE("Messages are to the byte those of another CDR library, in both directions",
-          "[recordings]") {
+TEST_CASE("Messages are to the byte those of another CDR library, in both directions") {
   const std::vector<Golden> golden = goldens("messages.txt");
   REQUIRE(golden.size() == 19);
   std::size_t next = 0;
@@ -245,7 +244,7 @@ TEST_CASE("Messages are to the byte those of another CDR library, in both direct
   check(RosLog{1700000001123456789, RosLogLevel::kWarn, "vio", "slow", "", "f", 7});
 }
 
-TEST_CASE("Messages of any encoding are read equally, and refused when longer", "[recordings]") {
+TEST_CASE("Messages of any encoding are read equally, and refused when longer") {
   const auto check = []<typename Message>(std::size_t first, const Message&) {
     for (std::size_t k = first; k < first + 3; ++k) {
       Golden golden = samples()[k];
@@ -263,7 +262,7 @@ TEST_CASE("Messages of any encoding are read equally, and refused when longer", 
   check(kTransforms, RosTFMessage{});
 }
 
-TEST_CASE("The header is read from the beginning of any message", "[recordings]") {
+TEST_CASE("The header is read from the beginning of any message") {
   const Golden& golden = samples()[kOdometry + GENERATE(as<std::size_t>(), 0, 1, 2)];
   const auto header = decode_ros<RosHeader>(golden.encoding, golden.bytes);
   REQUIRE(header.value);
@@ -272,7 +271,7 @@ TEST_CASE("The header is read from the beginning of any message", "[recordings]"
   CHECK(decode_ros<RosHeader>(golden.encoding, std::span(golden.bytes).first(20)).refusal);
 }
 
-TEST_CASE("Stamps before 1970 are ROS 2's and those after 2038 ROS 1's", "[recordings]") {
+TEST_CASE("Stamps before 1970 are ROS 2's and those after 2038 ROS 1's") {
   ByteWriter out;
   out.u32(0);
   out.u32(0xffffffff);
@@ -287,8 +286,7 @@ TEST_CASE("Stamps before 1970 are ROS 2's and those after 2038 ROS 1's", "[recor
   CHECK(decode_ros<RosPoseStamped>("cdr", encode_ros(before_1970)).value->header.stamp == -1);
 }
 
-TEST_CASE("Unknown encodings, and images with fewer pixels than they state, are refused",
-          "[recordings]") {
+TEST_CASE("Unknown encodings, and images with fewer pixels than they state, are refused") {
   Bytes bytes = samples()[kImage].bytes;
   const std::size_t height = 4 + 8 + 4 + 8;
   REQUIRE(bytes[height] == 2);
@@ -303,7 +301,7 @@ TEST_CASE("Unknown encodings, and images with fewer pixels than they state, are 
   }
 }
 
-TEST_CASE("Types are known by their names in ROS 1 and 2", "[recordings]") {
+TEST_CASE("Types are known by their names in ROS 1 and 2") {
   const auto is_image = [](const std::string& type) {
     return is_of_type(BagChannel{.topic = "", .type = type, .encoding = ""}, RosImage::kType);
   };
@@ -320,7 +318,7 @@ TEST_CASE("Types are known by their names in ROS 1 and 2", "[recordings]") {
 
 namespace {
 
-TEST_CASE("A raw image's camera is that of K and D, a rectified one's that of P", "[recordings]") {
+TEST_CASE("A raw image's camera is that of K and D, a rectified one's that of P") {
   const Camera camera = camera_of(camera_info("left_optical"), RosImages::kRaw);
   CHECK(camera.width == 640);
   CHECK(camera.height == 480);
@@ -333,7 +331,7 @@ TEST_CASE("A raw image's camera is that of K and D, a rectified one's that of P"
   CHECK(rectified.lens.is_ideal());
 }
 
-TEST_CASE("ROS's models of distortion are lenses", "[recordings]") {
+TEST_CASE("ROS's models of distortion are lenses") {
   RosCameraInfo info = camera_info("left_optical");
   const auto lens = [&] { return camera_of(info, RosImages::kRaw).lens; };
   info.d = {-0.28, 0.07, 2e-4, 1e-5, 0.03};
@@ -355,7 +353,7 @@ TEST_CASE("ROS's models of distortion are lenses", "[recordings]") {
   CHECK(lens().is_ideal());
 }
 
-TEST_CASE("The baseline is computed from P of the right camera", "[recordings]") {
+TEST_CASE("The baseline is computed from P of the right camera") {
   CHECK(baseline_m(camera_info("right_optical", -43.0)).value() == Approx(0.1));
   CHECK(!baseline_m(camera_info("left_optical")));
   RosCameraInfo info = camera_info("right_optical", -43.0);
@@ -365,7 +363,7 @@ TEST_CASE("The baseline is computed from P of the right camera", "[recordings]")
   CHECK(!baseline_m(info));
 }
 
-TEST_CASE("The frame of a CameraInfo is the rectified camera's", "[recordings]") {
+TEST_CASE("The frame of a CameraInfo is the rectified camera's") {
   RosCameraInfo info = camera_info("left_optical");
   const Eigen::Matrix3d R = so3_exp({0.01, -0.03, 0.02});
   Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(info.r.data()) = R;
@@ -380,7 +378,7 @@ TEST_CASE("The frame of a CameraInfo is the rectified camera's", "[recordings]")
                     Contains("frame 'left_optical': R is not a rotation"));
 }
 
-TEST_CASE("A CameraInfo that is no calibration is refused by frame and field", "[recordings]") {
+TEST_CASE("A CameraInfo that is no calibration is refused by frame and field") {
   struct Case {
     const char* why;
     void (*spoil)(RosCameraInfo&);
@@ -414,7 +412,7 @@ TEST_CASE("A CameraInfo that is no calibration is refused by frame and field", "
                     Contains("frame 'left_optical': ") && Contains(c.why));
 }
 
-TEST_CASE("A rectified camera needs no K, and a raw one no P", "[recordings]") {
+TEST_CASE("A rectified camera needs no K, and a raw one no P") {
   RosCameraInfo info = camera_info("left_optical");
   info.k.fill(0.0);
   CHECK(camera_of(info, RosImages::kRectified).fx == 430.0);

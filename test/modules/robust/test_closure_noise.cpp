@@ -65,16 +65,14 @@ PairCycles random_pair(unsigned seed) {
 
 }  // namespace
 
-TEST_CASE("Odometry that is noisier than it claims is no reason to distrust closures",
-          "[closure_noise]") {
+TEST_CASE("Odometry that is noisier than it claims is no reason to distrust closures") {
   int distrusted = 0;
   for (unsigned seed = 0; seed < 2000; ++seed)
     if (estimate_closure_noise(random_pair(seed), 1.0) != 1.0) ++distrusted;
   CHECK(distrusted <= 10);  // 0.3 % of 4000 pairs
 }
 
-TEST_CASE("The noise of the closures of a pair is estimated in the presence of false closures",
-          "[closure_noise]") {
+TEST_CASE("The noise of the closures of a pair is estimated in the presence of false closures") {
   const unsigned seed = GENERATE(range(1U, 6U));
   const double scale = GENERATE(3.0, 5.0, 10.0);
   const double share_false = GENERATE(0.0, 0.4);
@@ -88,8 +86,7 @@ TEST_CASE("The noise of the closures of a pair is estimated in the presence of f
   CHECK(found == Approx(scale).epsilon(0.25));
 }
 
-TEST_CASE("False closures that end near each other do not count as noise of true ones",
-          "[closure_noise]") {
+TEST_CASE("False closures that end near each other do not count as noise of true ones") {
   const unsigned seed = GENERATE(range(1U, 6U));
   const double share_false = GENERATE(0.74, 0.89, 0.95);
   const int dimension = GENERATE(2, 3);
@@ -102,7 +99,7 @@ TEST_CASE("False closures that end near each other do not count as noise of true
   CHECK(estimate_closure_noise(pair_of(std::move(cycles), {}), 1.0) == 1.0);
 }
 
-TEST_CASE("Closures that are as noisy as claimed keep the factor of the team", "[closure_noise]") {
+TEST_CASE("Closures that are as noisy as claimed keep the factor of the team") {
   const unsigned seed = GENERATE(range(1U, 21U));
   const double usual = GENERATE(0.5, 1.0, 4.0);
   CAPTURE(seed, usual);
@@ -112,8 +109,7 @@ TEST_CASE("Closures that are as noisy as claimed keep the factor of the team", "
   CHECK(estimate_closure_noise(cycles, usual) == usual);
 }
 
-TEST_CASE("Closures as noisy as they claim stand out in a team that claims far too much noise",
-          "[closure_noise]") {
+TEST_CASE("Closures as noisy as they claim stand out in a team that claims far too much noise") {
   constexpr double kUsual = 0.005;
   const unsigned seed = GENERATE(range(1U, 6U));
   CAPTURE(seed);
@@ -125,7 +121,7 @@ TEST_CASE("Closures as noisy as they claim stand out in a team that claims far t
   CHECK(estimate_closure_noise(noisy, kUsual) == Approx(1.0).epsilon(0.25));
 }
 
-TEST_CASE("An error that the closures of a place share shows between places", "[closure_noise]") {
+TEST_CASE("An error that the closures of a place share shows between places") {
   const unsigned seed = GENERATE(range(1U, 6U));
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -134,7 +130,7 @@ TEST_CASE("An error that the closures of a place share shows between places", "[
   CHECK(estimate_closure_noise(cycles, 1.0) == Approx(3.2).epsilon(0.25));
 }
 
-TEST_CASE("Few observations do not make closures noisy", "[closure_noise]") {
+TEST_CASE("Few observations do not make closures noisy") {
   std::mt19937 rng(1);
   PairCycles cycles = pair_of(draw_cycles(40, 2.2, 0.0, 3, rng), {});
   CHECK(estimate_closure_noise(cycles, 1.0) > 1.7);
@@ -143,8 +139,7 @@ TEST_CASE("Few observations do not make closures noisy", "[closure_noise]") {
   CHECK(estimate_closure_noise({}, 2.5) == 2.5);
 }
 
-TEST_CASE("Cycles between places exclude a noise factor if there are enough of them",
-          "[closure_noise]") {
+TEST_CASE("Cycles between places exclude a noise factor if there are enough of them") {
   std::mt19937 rng(1);
   const PairCycles many = pair_of({}, draw_cycles(40, 1.0, 0.0, 3, rng));
   const PairCycles few = pair_of({}, draw_cycles(1, 1.0, 0.0, 3, rng));
@@ -156,7 +151,7 @@ TEST_CASE("Cycles between places exclude a noise factor if there are enough of t
   CHECK_FALSE(shows_noise(few));
 }
 
-TEST_CASE("The estimated share of true cycles equals the share in the data", "[closure_noise]") {
+TEST_CASE("The estimated share of true cycles equals the share in the data") {
   const double share = GENERATE(0.2, 0.5, 0.9);
   std::vector<double> log_ratio, weight;
   for (int k = 0; k < 100; ++k) {

@@ -34,8 +34,7 @@ AlignedOdometry aligned(KeyframeIndex a, KeyframeIndex b, const SE3& T_a_b) {
   return align_odometry(closure_for(a, b, T_a_b));
 }
 
-TEST_CASE("A place extends ten keyframes from its first closure, and a row to its last neighbour",
-          "[closure_places]") {
+TEST_CASE("A place extends ten keyframes from its first closure, and a row to its last neighbour") {
   std::vector<PoseEdge> closures;
   for (KeyframeIndex k = 0; k < 30; ++k)
     closures.push_back(k % 2 == 0 ? closure({0, 50 + k}, {1, 80 - k})
@@ -46,7 +45,7 @@ TEST_CASE("A place extends ten keyframes from its first closure, and a row to it
   CHECK(find_rows(closures).sizes == std::vector<std::size_t>{10, 10});
 }
 
-TEST_CASE("Rows join closures that are near each other on both robots", "[closure_places]") {
+TEST_CASE("Rows join closures that are near each other on both robots") {
   const std::vector<PoseEdge> closures{closure({0, 100}, {1, 200}), closure({0, 110}, {1, 190}),
                                        closure({0, 121}, {1, 190}), closure({0, 100}, {1, 211}),
                                        closure({0, 105}, {2, 200}), closure({0, 100}, {0, 200})};
@@ -57,8 +56,7 @@ TEST_CASE("Rows join closures that are near each other on both robots", "[closur
   CHECK(rows.votes() == std::vector<double>(6, 1.0));
 }
 
-TEST_CASE("Rows and places depend on neither order, direction nor ids of robots",
-          "[closure_places]") {
+TEST_CASE("Rows and places depend on neither order, direction nor ids of robots") {
   std::vector<PoseEdge> closures, renamed;
   for (KeyframeIndex k = 0; k < 40; ++k) {
     if (k / 5 % 3 == 2) continue;
@@ -77,7 +75,7 @@ TEST_CASE("Rows and places depend on neither order, direction nor ids of robots"
   }
 }
 
-TEST_CASE("A closure aligns the odometry of two robots, in either direction", "[closure_places]") {
+TEST_CASE("A closure aligns the odometry of two robots, in either direction") {
   const SE3 T = translation({1.0, 2.0, 3.0}) * rotation_z(0.7);
   Closure closure = closure_for(4, 9, T);
   const AlignedOdometry forward = align_odometry(closure);
@@ -91,8 +89,7 @@ TEST_CASE("A closure aligns the odometry of two robots, in either direction", "[
   CHECK(backward.p_b.isApprox(forward.p_b, 1e-12));
 }
 
-TEST_CASE("Closures of several places that agree on another relative pose are rivals",
-          "[closure_places]") {
+TEST_CASE("Closures of several places that agree on another relative pose are rivals") {
   const SE3 aisle = translation({0.0, 3.2, 0.0});
   const SE3 turned = translation({4.0, 1.0, 0.0}) * rotation_z(3.1416);
   std::vector<AlignedOdometry> all{aligned(0, 0, SE3::Identity()), aligned(0, 5, aisle),
@@ -109,7 +106,7 @@ TEST_CASE("Closures of several places that agree on another relative pose are ri
   CHECK(count_rival_rows(all, everything) == 0);
 }
 
-TEST_CASE("Closures that err a little, or all differently, are no rivals", "[closure_places]") {
+TEST_CASE("Closures that err a little, or all differently, are no rivals") {
   CHECK(count_rival_rows({}, {}) == 0);
   const SE3 little = translation({0.9, 0.0, 0.0}), more = translation({1.9, 0.0, 0.0});
   std::vector<AlignedOdometry> all{aligned(20, 20, SE3::Identity()), aligned(15, 20, little),

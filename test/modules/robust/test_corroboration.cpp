@@ -137,7 +137,7 @@ class Lanes {
   std::vector<PoseEdge> closures_;
 };
 
-TEST_CASE("The noise of closures is estimated from pairs of closures", "[pose_graph]") {
+TEST_CASE("The noise of closures is estimated from pairs of closures") {
   const int dimension = GENERATE(2, 3);
   const double times = GENERATE(0.1, 1.0, 4.0);
   const double step_sigma = GENERATE(1e-6, kSigma);
@@ -166,7 +166,7 @@ TEST_CASE("The noise of closures is estimated from pairs of closures", "[pose_gr
   CHECK(all->consistent >= share - 0.08);  // measured: 0.072
 }
 
-TEST_CASE("Cycles that count are spread over all closures", "[pose_graph]") {
+TEST_CASE("Cycles that count are spread over all closures") {
   Lanes lanes(3, 1.0, 1);
   for (int k = 0; k < kKeyframes; ++k) k < 40 ? lanes.add_false(k, k, false) : lanes.add_true(k, k);
   const auto noise = lanes.noise_scale(60);
@@ -175,7 +175,7 @@ TEST_CASE("Cycles that count are spread over all closures", "[pose_graph]") {
   CHECK(noise->consistent == Approx(260.0 / 300.0).margin(0.1));
 }
 
-TEST_CASE("Too few closures give no estimate of their noise", "[pose_graph]") {
+TEST_CASE("Too few closures give no estimate of their noise") {
   Lanes lanes(GENERATE(2, 3), 1.0, 3);
   CHECK_FALSE(lanes.noise_scale());
   lanes.add_true(0, 0);
@@ -184,7 +184,7 @@ TEST_CASE("Too few closures give no estimate of their noise", "[pose_graph]") {
   CHECK_FALSE(lanes.noise_scale());
 }
 
-TEST_CASE("Lengths that are not finite are not counted", "[pose_graph]") {
+TEST_CASE("Lengths that are not finite are not counted") {
   NoiseHistogram histogram;
   count_length(histogram, std::numeric_limits<double>::infinity());
   count_length(histogram, std::nan(""));
@@ -210,8 +210,7 @@ NoiseHistogram draw_lengths(unsigned seed, std::size_t count, double scale, doub
   return histogram;
 }
 
-TEST_CASE("Cycles with false closures do not set the noise scale, however many they are",
-          "[pose_graph]") {
+TEST_CASE("Cycles with false closures do not set the noise scale, however many they are") {
   const double share_false = GENERATE(0.3, 0.74, 0.89, 0.95);
   const double scale = GENERATE(0.5, 1.0, 3.0);
   const double false_size = GENERATE(20.0, 60.0);
@@ -227,8 +226,7 @@ TEST_CASE("Cycles with false closures do not set the noise scale, however many t
   CHECK(noise->consistent == Approx(1.0 - share_false).margin(0.1));
 }
 
-TEST_CASE("Noise whose lengths spread more than those of normal vectors is one population",
-          "[pose_graph]") {
+TEST_CASE("Noise whose lengths spread more than those of normal vectors is one population") {
   const double scale = GENERATE(2.0, 4.0, 10.0);
   const double spread = GENERATE(0.0, 0.3, 0.6);
   const double share_false = GENERATE(0.0, 0.3);
@@ -240,19 +238,19 @@ TEST_CASE("Noise whose lengths spread more than those of normal vectors is one p
   CHECK(noise->scale < 2.0 * scale);
 }
 
-TEST_CASE("Near closures that agree do not stand alone", "[pose_graph]") {
+TEST_CASE("Near closures that agree do not stand alone") {
   Lanes lanes(GENERATE(2, 3), 1.0, GENERATE(range(1U, 6U)));
   for (const int k : {10, 12, 15, 100, 101, 200, 205}) lanes.add_true(k, k);
   CHECK(lanes.isolated().empty());
 }
 
-TEST_CASE("A closure far from all others stands alone", "[pose_graph]") {
+TEST_CASE("A closure far from all others stands alone") {
   Lanes lanes(GENERATE(2, 3), 1.0, 4);
   for (const int k : {10, 40, 70}) lanes.add_true(k, k);
   CHECK(lanes.isolated() == lanes.ids());
 }
 
-TEST_CASE("No cycle contains an unknown step", "[pose_graph]") {
+TEST_CASE("No cycle contains an unknown step") {
   Lanes lanes(3, 1.0, 2);
   for (int k = 0; k < 40; ++k) lanes.add_true(k, k);
   for (int k = 1; k < 40; ++k) lanes.interrupt(k);
@@ -260,7 +258,7 @@ TEST_CASE("No cycle contains an unknown step", "[pose_graph]") {
   CHECK(lanes.isolated().size() == 40);
 }
 
-TEST_CASE("False closures stand alone, even near true ones", "[pose_graph]") {
+TEST_CASE("False closures stand alone, even near true ones") {
   const unsigned seed = GENERATE(range(1U, 6U));
   const int dimension = GENERATE(2, 3);
   CAPTURE(seed, dimension);
@@ -284,7 +282,7 @@ std::vector<PoseEdge> seen_from_the_other(std::vector<PoseEdge> closures) {
   return closures;
 }
 
-TEST_CASE("Both robots of a pair find equal sets of closures that stand alone", "[pose_graph]") {
+TEST_CASE("Both robots of a pair find equal sets of closures that stand alone") {
   const unsigned seed = GENERATE(range(1U, 6U));
   const int dimension = GENERATE(2, 3);
   CAPTURE(seed, dimension);
@@ -302,8 +300,7 @@ TEST_CASE("Both robots of a pair find equal sets of closures that stand alone", 
 
 // The solution is as imprecise as the path here, so half of the true ones are possible. The bound
 // is three standard deviations of the binomial distribution below.
-TEST_CASE("Drift explains true closures far from the kept ones, but no random ones",
-          "[pose_graph]") {
+TEST_CASE("Drift explains true closures far from the kept ones, but no random ones") {
   const int dimension = GENERATE(2, 3);
   CAPTURE(dimension);
   int of_true = 0, of_false = 0;
@@ -321,7 +318,7 @@ TEST_CASE("Drift explains true closures far from the kept ones, but no random on
   CHECK(of_false <= 110);  // 2200 in all
 }
 
-TEST_CASE("Nothing is possible beyond an unknown step", "[pose_graph]") {
+TEST_CASE("Nothing is possible beyond an unknown step") {
   Lanes lanes(3, 1.0, 5);
   for (const int k : {10, 20, 30}) lanes.add_true(k, k);
   lanes.interrupt(25);

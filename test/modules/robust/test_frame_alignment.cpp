@@ -11,7 +11,7 @@ double angle_between(const SE3& a, const SE3& b) {
 
 }  // namespace
 
-TEST_CASE("ten equal candidates win over forty random ones", "[pose_graph]") {
+TEST_CASE("ten equal candidates win over forty random ones") {
   const unsigned seed = GENERATE(range(0U, 50U));
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -28,7 +28,7 @@ TEST_CASE("ten equal candidates win over forty random ones", "[pose_graph]") {
   CHECK(alignment->inliers == std::vector<std::size_t>{0, 1, 2, 3, 4, 5, 6, 7, 8, 9});
 }
 
-TEST_CASE("candidates count by their weights", "[pose_graph]") {
+TEST_CASE("candidates count by their weights") {
   std::mt19937 rng(1);
   const SE3 few = random_pose(rng);
   const SE3 many = few * make_pose(Eigen::Matrix3d::Identity(), Eigen::Vector3d(100.0, 0.0, 0.0));
@@ -44,7 +44,7 @@ TEST_CASE("candidates count by their weights", "[pose_graph]") {
   CHECK_THROWS_AS(align_frames(candidates, weights), std::invalid_argument);
 }
 
-TEST_CASE("noise of the agreeing candidates averages out", "[pose_graph]") {
+TEST_CASE("noise of the agreeing candidates averages out") {
   const unsigned seed = GENERATE(1U, 2U, 3U);
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -64,7 +64,7 @@ TEST_CASE("noise of the agreeing candidates averages out", "[pose_graph]") {
   CHECK((alignment->T.translation() - truth.translation()).norm() < 0.123);
 }
 
-TEST_CASE("false candidates within the tolerance do not move the average", "[pose_graph]") {
+TEST_CASE("false candidates within the tolerance do not move the average") {
   const unsigned seed = GENERATE(range(1U, 11U));
   const double apart_m = GENERATE(2.0, 5.0, 9.0);
   const std::size_t wrong = GENERATE(10U, 18U);
@@ -83,7 +83,7 @@ TEST_CASE("false candidates within the tolerance do not move the average", "[pos
   CHECK(alignment->inliers.back() < 20);
 }
 
-TEST_CASE("alignment does not depend on the frame", "[pose_graph]") {
+TEST_CASE("alignment does not depend on the frame") {
   std::mt19937 rng(5);
   std::vector<SE3> candidates;
   std::vector<SE3> moved;
@@ -104,7 +104,7 @@ TEST_CASE("alignment does not depend on the frame", "[pose_graph]") {
   CHECK((frame * plain->T).isApprox(in_frame->T, 1e-9));
 }
 
-TEST_CASE("alignment without candidates has no result", "[pose_graph]") {
+TEST_CASE("alignment without candidates has no result") {
   CHECK_FALSE(align_frames({}).has_value());
 }
 

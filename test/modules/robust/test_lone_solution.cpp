@@ -71,7 +71,7 @@ double true_cost(const Laps& laps, const std::vector<SE3>& poses) {
 
 }  // namespace
 
-TEST_CASE("a robot with many new false closures does not move", "[pose_graph]") {
+TEST_CASE("a robot with many new false closures does not move") {
   Laps laps(1, {3U, 9U, 31U});
   const std::vector<SE3> relaxed = relaxed_start(laps.graph, {});
   for (std::size_t k = 0; k < relaxed.size(); ++k)
@@ -80,7 +80,7 @@ TEST_CASE("a robot with many new false closures does not move", "[pose_graph]") 
   CHECK(true_cost(laps, relaxed_start(laps.graph, {})) < 0.1 * true_cost(laps, relaxed));
 }
 
-TEST_CASE("a relaxed start is the optimum of the true own edges", "[pose_graph]") {
+TEST_CASE("a relaxed start is the optimum of the true own edges") {
   const unsigned seed = GENERATE(1U, 2U, 3U);
   CAPTURE(seed);
   Laps laps(seed);
@@ -93,7 +93,7 @@ TEST_CASE("a relaxed start is the optimum of the true own edges", "[pose_graph]"
   CHECK(true_cost(laps, laps.graph.start) > 10.0 * true_cost(laps, relaxed));
 }
 
-TEST_CASE("the hypothesis that nothing is false holds only if it is true", "[pose_graph]") {
+TEST_CASE("the hypothesis that nothing is false holds only if it is true") {
   const unsigned seed = GENERATE(range(1U, 11U));
   CAPTURE(seed);
   const Laps laps(seed, {});
@@ -104,7 +104,7 @@ TEST_CASE("the hypothesis that nothing is false holds only if it is true", "[pos
   CHECK_FALSE(solution_if_all_true(Laps(seed, {9U}).graph, {}));
 }
 
-TEST_CASE("a start without closures, or that cannot be solved, stays", "[pose_graph]") {
+TEST_CASE("a start without closures, or that cannot be solved, stays") {
   Laps laps(1);
   SECTION("no closures") {
     laps.graph.own.resize(laps.graph.odometry);
@@ -118,7 +118,7 @@ TEST_CASE("a start without closures, or that cannot be solved, stays", "[pose_gr
     CHECK(relaxed[k].isApprox(laps.graph.start[k], 0.0));
 }
 
-TEST_CASE("a relaxed start stays where closures to held poses hold it", "[pose_graph]") {
+TEST_CASE("a relaxed start stays where closures to held poses hold it") {
   Laps laps(4);
   const SE3 T_new_old(Eigen::Translation3d(2.0, -1.0, 0.5));
   for (const std::uint32_t k : {0U, 20U, 45U, 59U}) {

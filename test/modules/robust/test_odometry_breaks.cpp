@@ -59,7 +59,7 @@ struct Rounds {
 
 const SE3 kJump = make_pose(so3_exp({0.0, 0.0, 0.3}), {0.5, -0.4, 0.0});
 
-TEST_CASE("A wrong step of odometry is found and corrected", "[odometry_breaks]") {
+TEST_CASE("A wrong step of odometry is found and corrected") {
   const unsigned seed = GENERATE(range(1U, 11U));
   const std::size_t step = GENERATE(70, 149, 220);
   const std::size_t wrong = GENERATE(0, 6);  // false closures
@@ -80,8 +80,7 @@ TEST_CASE("A wrong step of odometry is found and corrected", "[odometry_breaks]"
   CHECK(left.head<3>().norm() < 0.15);
 }
 
-TEST_CASE("A wrong step keeps the weight of its correction in noisy odometry",
-          "[odometry_breaks]") {
+TEST_CASE("A wrong step keeps the weight of its correction in noisy odometry") {
   const unsigned seed = GENERATE(1U, 2U, 3U);
   CAPTURE(seed);
   Rounds rounds(seed, 5.0, 1);
@@ -101,7 +100,7 @@ TEST_CASE("A wrong step keeps the weight of its correction in noisy odometry",
   }
 }
 
-TEST_CASE("Two wrong steps are both found", "[odometry_breaks]") {
+TEST_CASE("Two wrong steps are both found") {
   const unsigned seed = GENERATE(range(1U, 6U));
   CAPTURE(seed);
   Rounds rounds(seed, 1.0, 3);
@@ -112,7 +111,7 @@ TEST_CASE("Two wrong steps are both found", "[odometry_breaks]") {
 
 // No true closure spans the middle of the trajectory, and a row of false closures does: two parts
 // of the environment look alike.
-TEST_CASE("A row of false closures that agree is not a wrong step", "[odometry_breaks]") {
+TEST_CASE("A row of false closures that agree is not a wrong step") {
   const unsigned seed = GENERATE(range(1U, 11U));
   const double apart_m = GENERATE(10.0, 70.0);
   const int dimension = GENERATE(2, 3);
@@ -128,7 +127,7 @@ TEST_CASE("A row of false closures that agree is not a wrong step", "[odometry_b
   CHECK(find_odometry_breaks(rounds.steps, rounds.closures, rounds.dimension).empty());
 }
 
-TEST_CASE("A wrong step may be long if it lasts long", "[odometry_breaks]") {
+TEST_CASE("A wrong step may be long if it lasts long") {
   constexpr std::size_t kStep = 149;
   Rounds rounds(1, 1.0, 3);
   // The robot drove on for a fifth of a round, and its odometry stood still.
@@ -146,7 +145,7 @@ TEST_CASE("A wrong step may be long if it lasts long", "[odometry_breaks]") {
   CHECK(breaks[0].step == kStep);
 }
 
-TEST_CASE("Odometry without a wrong step has no break, however noisy it is", "[odometry_breaks]") {
+TEST_CASE("Odometry without a wrong step has no break, however noisy it is") {
   const double odometry = GENERATE(1.0, 2.0, 5.0, 10.0);
   const std::size_t wrong = GENERATE(0, 10, 60);
   const int dimension = GENERATE(2, 3);

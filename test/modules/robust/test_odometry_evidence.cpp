@@ -61,7 +61,7 @@ struct Helices {
 
 }  // namespace
 
-TEST_CASE("Cycles through other robots show whose odometry is noisy", "[odometry_evidence]") {
+TEST_CASE("Cycles through other robots show whose odometry is noisy") {
   // In long cycles, noise of odometry looks like false closures: seeds 30 and 33.
   const auto [seed, share_false] = GENERATE(table<unsigned, double>(
       {{1, 0.0}, {2, 0.0}, {3, 0.2}, {4, 0.2}, {5, 0.2}, {30, 0.0}, {33, 0.0}}));
@@ -75,7 +75,7 @@ TEST_CASE("Cycles through other robots show whose odometry is noisy", "[odometry
   CHECK(found.at(1) < factor * 2.0);
 }
 
-TEST_CASE("Two noisy robots of four are found", "[odometry_evidence]") {
+TEST_CASE("Two noisy robots of four are found") {
   const unsigned seed = GENERATE(range(1U, 6U));
   const double factor = GENERATE(7.0, 20.0);
   CAPTURE(seed, factor);
@@ -86,7 +86,7 @@ TEST_CASE("Two noisy robots of four are found", "[odometry_evidence]") {
   CHECK(found.contains(2));
 }
 
-TEST_CASE("Odometry that is as precise as it claims is not blamed", "[odometry_evidence]") {
+TEST_CASE("Odometry that is as precise as it claims is not blamed") {
   const unsigned seed = GENERATE(range(1U, 11U));
   const double closure_noise = GENERATE(1.0, 4.0);
   const double share_false = GENERATE(0.0, 0.3, 0.8);
@@ -96,13 +96,12 @@ TEST_CASE("Odometry that is as precise as it claims is not blamed", "[odometry_e
   CHECK(likely_odometry_noise(team.votes(3)).empty());
 }
 
-TEST_CASE("If most robots seem noisy, closures may be the reason", "[odometry_evidence]") {
+TEST_CASE("If most robots seem noisy, closures may be the reason") {
   Helices team{.rng = std::mt19937(1), .noise = {{0, 7.0}, {1, 7.0}}};
   CHECK(likely_odometry_noise(team.votes(3)).empty());
 }
 
-TEST_CASE("Pairs that show noise of different sizes blame the odometry of a robot",
-          "[odometry_evidence]") {
+TEST_CASE("Pairs that show noise of different sizes blame the odometry of a robot") {
   const auto vote = [](RobotId b, std::array<float, kNoiseLevels> by_level) {
     PairVote pair{.a = 0, .b = b, .odometry = {}};
     for (const float gain : by_level) {
@@ -123,7 +122,7 @@ TEST_CASE("Pairs that show noise of different sizes blame the odometry of a robo
             .empty());
 }
 
-TEST_CASE("One peer alone cannot blame the odometry of a robot", "[odometry_evidence]") {
+TEST_CASE("One peer alone cannot blame the odometry of a robot") {
   Helices team{.rng = std::mt19937(1)};
   std::vector<PairVote> votes = team.votes(3);
   for (std::size_t i = 0; i < kNoiseLevels; ++i)  // robot 0 lies about robot 1

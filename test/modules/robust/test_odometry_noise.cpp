@@ -78,7 +78,7 @@ double factor(double a, double b) {
 
 }  // namespace
 
-TEST_CASE("A closure that is too far for any density is no noise of odometry", "[odometry_noise]") {
+TEST_CASE("A closure that is too far for any density is no noise of odometry") {
   Walk walk(1);
   walk.walk(1.0, 1.0);
   walk.close(2);
@@ -90,7 +90,7 @@ TEST_CASE("A closure that is too far for any density is no noise of odometry", "
   CHECK(noise.likely.empty());
 }
 
-TEST_CASE("The noise of odometry is estimated from cycles", "[odometry_noise]") {
+TEST_CASE("The noise of odometry is estimated from cycles") {
   const unsigned seed = GENERATE(range(1U, 11U));
   const double scale = GENERATE(1.0, 2.0, 7.0, 20.0);
   const int dimension = GENERATE(2, 3);
@@ -110,8 +110,7 @@ TEST_CASE("The noise of odometry is estimated from cycles", "[odometry_noise]") 
 
 // A turn of 50 steps then has a rotation noise of 2.8 rad, which a cycle of one closure cannot
 // show.
-TEST_CASE("Rotation noise beyond what a turn shows is estimated from closures near each other",
-          "[odometry_noise]") {
+TEST_CASE("Rotation noise beyond what a turn shows is estimated from closures near each other") {
   const unsigned seed = GENERATE(range(1U, 6U));
   constexpr double kScale = 40.0;
   Walk walk(seed);
@@ -124,7 +123,7 @@ TEST_CASE("Rotation noise beyond what a turn shows is estimated from closures ne
   CHECK(factor(noise.translation, kScale) < 2.2);
 }
 
-TEST_CASE("Noise of rotation and of translation are distinguished", "[odometry_noise]") {
+TEST_CASE("Noise of rotation and of translation are distinguished") {
   const unsigned seed = GENERATE(range(1U, 6U));
   Walk walk(seed);
   walk.walk(1.0, 10.0);
@@ -134,8 +133,7 @@ TEST_CASE("Noise of rotation and of translation are distinguished", "[odometry_n
   CHECK(factor(noise.translation, 10.0) < 1.7);
 }
 
-TEST_CASE("False closures neither increase the estimated noise of odometry nor hide it",
-          "[odometry_noise]") {
+TEST_CASE("False closures neither increase the estimated noise of odometry nor hide it") {
   const unsigned seed = GENERATE(range(1U, 6U));
   const double scale = GENERATE(1.0, 7.0);
   CAPTURE(seed, scale);
@@ -150,7 +148,7 @@ TEST_CASE("False closures neither increase the estimated noise of odometry nor h
   CHECK(factor(noise.translation, scale) < (scale > 1.0 ? 3.0 : 2.2));
 }
 
-TEST_CASE("A wrong place counts once, however many closures it has", "[odometry_noise]") {
+TEST_CASE("A wrong place counts once, however many closures it has") {
   Walk walk(1);
   walk.walk(1.0, 1.0);
   walk.close(10);
@@ -166,8 +164,7 @@ TEST_CASE("A wrong place counts once, however many closures it has", "[odometry_
 }
 
 // Noise of odometry alone is no reason to weaken closures.
-TEST_CASE("Closures as precise as they claim do not have the noise of odometry",
-          "[odometry_noise]") {
+TEST_CASE("Closures as precise as they claim do not have the noise of odometry") {
   const unsigned seed = GENERATE(range(1U, 6U));
   CAPTURE(seed);
   Walk walk(seed);
@@ -180,8 +177,7 @@ TEST_CASE("Closures as precise as they claim do not have the noise of odometry",
 
 // Only cycles of successive closures are short enough. They do not distinguish noisy steps from
 // noisy closures, except by translations that are more precise than claimed.
-TEST_CASE("Closures have the noise of odometry, although their translations are precise",
-          "[odometry_noise]") {
+TEST_CASE("Closures have the noise of odometry, although their translations are precise") {
   const unsigned seed = GENERATE(range(1U, 6U));
   CAPTURE(seed);
   Walk walk(seed);
@@ -195,8 +191,7 @@ TEST_CASE("Closures have the noise of odometry, although their translations are 
   CHECK(noise.translation == 1.0);
 }
 
-TEST_CASE("Closures that are noisier than they claim do not count as noise of odometry",
-          "[odometry_noise]") {
+TEST_CASE("Closures that are noisier than they claim do not count as noise of odometry") {
   const unsigned seed = GENERATE(range(1U, 6U));
   Walk walk(seed);
   walk.walk(1.0, 1.0);
@@ -209,8 +204,7 @@ TEST_CASE("Closures that are noisier than they claim do not count as noise of od
   CHECK(noise.translation < 2.0);
 }
 
-TEST_CASE("Closures that are much noisier than odometry, as shares of their claims, weigh less",
-          "[odometry_noise]") {
+TEST_CASE("Closures that are much noisier than odometry, as shares of their claims, weigh less") {
   const unsigned seed = GENERATE(range(1U, 11U));
   const int dimension = GENERATE(2, 3);
   CAPTURE(seed, dimension);
@@ -229,7 +223,7 @@ TEST_CASE("Closures that are much noisier than odometry, as shares of their clai
 }
 
 // Two or three cycles show either noise equally well.
-TEST_CASE("Noise of odometry is not read as that of few closures", "[odometry_noise]") {
+TEST_CASE("Noise of odometry is not read as that of few closures") {
   const unsigned seed = GENERATE(range(1U, 31U));
   CAPTURE(seed);
   Walk walk(seed);
@@ -238,8 +232,7 @@ TEST_CASE("Noise of odometry is not read as that of few closures", "[odometry_no
   CHECK(walk.noise().beside == 1.0);
 }
 
-TEST_CASE("Without closures, or with a single one, the noise of odometry is the claimed one",
-          "[odometry_noise]") {
+TEST_CASE("Without closures, or with a single one, the noise of odometry is the claimed one") {
   Walk walk(1);
   walk.walk(1.0, 1.0);
   CHECK(walk.noise().rotation == 1.0);

@@ -34,8 +34,7 @@ SE3 shifted(double x_m) {
 
 }  // namespace
 
-TEST_CASE("pairs of the other robots move robots that one of four has misplaced",
-          "[pose_graph][pair_consensus]") {
+TEST_CASE("pairs of the other robots move robots that one of four has misplaced") {
   const RobotId liar = GENERATE(as<RobotId>(), 1, 2, 3, 4);
   const double lie_m = GENERATE(5.0, 1000.0);
   CAPTURE(liar, lie_m);
@@ -55,7 +54,7 @@ TEST_CASE("pairs of the other robots move robots that one of four has misplaced"
   }
 }
 
-TEST_CASE("pairs with inconsistent closures have no vote", "[pose_graph][pair_consensus]") {
+TEST_CASE("pairs with inconsistent closures have no vote") {
   PairMotions pairs = pairs_of(
       {{1, SE3::Identity()}, {2, shifted(50.0)}, {3, shifted(-50.0)}, {4, SE3::Identity()}});
   for (auto& [robots, pair] : pairs) pair.strength = {1.0, 1.0};
@@ -65,8 +64,7 @@ TEST_CASE("pairs with inconsistent closures have no vote", "[pose_graph][pair_co
   CHECK(usual_strength(pairs).tau == kUnlimited.tau);
 }
 
-TEST_CASE("robots placed by a pair without a vote move to the place given by other pairs",
-          "[pose_graph][pair_consensus]") {
+TEST_CASE("robots placed by a pair without a vote move to the place given by other pairs") {
   PairMotions pairs = pairs_of({{1, SE3::Identity()}, {2, shifted(50.0)}, {3, SE3::Identity()}});
   pairs[{1, 3}].T = SinglePose::of(shifted(20.0));
   pairs[{1, 3}].spread_m = 2.0 * pairs[{1, 3}].consistent_m;
@@ -77,8 +75,7 @@ TEST_CASE("robots placed by a pair without a vote move to the place given by oth
   CHECK(moves.at(3).isApprox(SE3::Identity()));
 }
 
-TEST_CASE("one robot of four cannot change the usual strength of pairs",
-          "[pose_graph][pair_consensus]") {
+TEST_CASE("one robot of four cannot change the usual strength of pairs") {
   const RobotId liar = GENERATE(as<RobotId>(), 1, 2, 3, 4);
   const double lie = GENERATE(0.0, 1e-9, 1e9);
   CAPTURE(liar, lie);
@@ -96,7 +93,7 @@ TEST_CASE("one robot of four cannot change the usual strength of pairs",
   CHECK(usual.tau <= 10.0);
 }
 
-TEST_CASE("pairs are not limited if no robot can be outvoted", "[pose_graph][pair_consensus]") {
+TEST_CASE("pairs are not limited if no robot can be outvoted") {
   PairMotions pairs = of_four();
   for (auto& [robots, pair] : pairs) pair.strength = {1.0, 1.0};
   CHECK(usual_strength(pairs).tau == 1.0);
@@ -120,8 +117,7 @@ TEST_CASE("pairs are not limited if no robot can be outvoted", "[pose_graph][pai
   CHECK(usual_strength(pairs).tau == kUnlimited.tau);
 }
 
-TEST_CASE("the motion of a pair is the one on which most closures agree",
-          "[pose_graph][pair_consensus]") {
+TEST_CASE("the motion of a pair is the one on which most closures agree") {
   std::mt19937 rng(3);
   const SE3 T = random_pose(rng, 30.0);
   const SE3 off = make_pose(Eigen::Matrix3d::Identity(), {0.0, 60.0, 0.0});
@@ -144,8 +140,7 @@ TEST_CASE("the motion of a pair is the one on which most closures agree",
   CHECK_FALSE(motion_of_pair({}, 2, [](const KeyframeId&) { return SE3::Identity(); }));
 }
 
-TEST_CASE("third robots decide between two motions of a pair with nearly equal votes",
-          "[pose_graph][pair_consensus]") {
+TEST_CASE("third robots decide between two motions of a pair with nearly equal votes") {
   const SE3 still = SE3::Identity();
   PairMotions pairs = pairs_of({{1, still}, {2, still}, {3, still}});
   pairs[{1, 3}].rival = pairs[{1, 3}].T;
@@ -159,7 +154,7 @@ TEST_CASE("third robots decide between two motions of a pair with nearly equal v
   CHECK(moves.at(3).isApprox(certain ? shifted(20.0) : still));
 }
 
-TEST_CASE("the motion of a pair is the same with exchanged ids", "[pose_graph][pair_consensus]") {
+TEST_CASE("the motion of a pair is the same with exchanged ids") {
   std::mt19937 rng(5);
   const SE3 T = random_pose(rng, 30.0);
   const std::array<KeyframeIndex, 2> first{100, 0};
@@ -187,8 +182,7 @@ TEST_CASE("the motion of a pair is the same with exchanged ids", "[pose_graph][p
   CHECK(one->rival_centre.isApprox(one->rival.pose() * other->rival_centre, kTolerance));
 }
 
-TEST_CASE("three rows that agree give a pair a vote among many closures that do not",
-          "[pose_graph][pair_consensus]") {
+TEST_CASE("three rows that agree give a pair a vote among many closures that do not") {
   std::mt19937 rng(4);
   const SE3 T = random_pose(rng, 30.0);
   std::map<KeyframeId, SE3> poses;

@@ -36,7 +36,7 @@ struct Weighed {
   }
 };
 
-TEST_CASE("The weight of a closure minimises the surrogate of the truncated cost", "[pose_graph]") {
+TEST_CASE("The weight of a closure minimises the surrogate of the truncated cost") {
   const double c2 = 9.0;
   const double mu = GENERATE(1e-6, 1e-3, 0.1, 1.0, 30.0);
   const double r2 = GENERATE(0.0, 0.1, 4.0, 8.9, 9.1, 20.0, 500.0, 2e4);
@@ -49,7 +49,7 @@ TEST_CASE("The weight of a closure minimises the surrogate of the truncated cost
   CHECK(surrogate(w, r2, c2, mu) <= least + 1e-12 * (r2 + c2));  // no better one on the grid
 }
 
-TEST_CASE("Weights are 0 or 1 once the surrogate is steep", "[pose_graph]") {
+TEST_CASE("Weights are 0 or 1 once the surrogate is steep") {
   const double mu = GENERATE(100.0, 1e6, 1e30);
   CAPTURE(mu);
   CHECK(robust_weight(std::nan(""), 9.0, mu) == 0.0);
@@ -61,8 +61,7 @@ TEST_CASE("Weights are 0 or 1 once the surrogate is steep", "[pose_graph]") {
 }
 
 TEST_CASE(
-    "At the first mu the largest residual has a positive weight, and the cost increases up to it",
-    "[pose_graph]") {
+    "At the first mu the largest residual has a positive weight, and the cost increases up to it") {
   const double c2 = 20.0;
   const double largest = GENERATE(10.1, 19.0, 50.0, 1e3, 1e9);
   CAPTURE(largest);
@@ -80,7 +79,7 @@ TEST_CASE(
   }
 }
 
-TEST_CASE("The default threshold is a chi-squared quantile", "[pose_graph]") {
+TEST_CASE("The default threshold is a chi-squared quantile") {
   // 99.9999 %, 6 and 3 degrees of freedom: closed form with 6, with the error function for 3.
   const double c6 = std::pow(default_threshold(3), 2), c3 = std::pow(default_threshold(2), 2);
   CHECK(std::exp(-c6 / 2.0) * (1.0 + c6 / 2.0 + c6 * c6 / 8.0) == Approx(1e-6).epsilon(1e-6));
@@ -89,8 +88,7 @@ TEST_CASE("The default threshold is a chi-squared quantile", "[pose_graph]") {
         Approx(1e-6).epsilon(1e-6));
 }
 
-TEST_CASE("Decided weights that the poses contradict are reopened a bounded number of times",
-          "[pose_graph]") {
+TEST_CASE("Decided weights that the poses contradict are reopened a bounded number of times") {
   Weighed weighing{.residuals = {0.5, 400.0}, .barc = 3.0};
   weighing.run();
   REQUIRE(weighing.weights == std::vector<double>{1.0, 0.0});
@@ -107,8 +105,7 @@ TEST_CASE("Decided weights that the poses contradict are reopened a bounded numb
   CHECK(times < 10);
 }
 
-TEST_CASE("The schedule ends, and the residual of every closure decides its weight",
-          "[pose_graph]") {
+TEST_CASE("The schedule ends, and the residual of every closure decides its weight") {
   const double largest = GENERATE(3.001, 30.0, 400.0, 1e4, 1e9);
   CAPTURE(largest);
   Weighed weighing{.residuals = {0.0, 2.999, 3.001, largest}, .barc = 3.0};
@@ -116,7 +113,7 @@ TEST_CASE("The schedule ends, and the residual of every closure decides its weig
   CHECK(weighing.weights == std::vector<double>{1.0, 1.0, 0.0, 0.0});
 }
 
-TEST_CASE("Weights that never settle are decided nevertheless", "[pose_graph]") {
+TEST_CASE("Weights that never settle are decided nevertheless") {
   RobustSchedule schedule;
   const RobustSchedule::Tally restless =
       GENERATE(RobustSchedule::Tally{.changed = 1}, RobustSchedule::Tally{.fractional = 1},

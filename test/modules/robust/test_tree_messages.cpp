@@ -135,7 +135,7 @@ UpMessage up_again(const UpMessage& message) {
 
 // Every field of these messages has a value of its own. Equal bytes after decoding and encoding
 // therefore mean that decoding restores every field.
-TEST_CASE("Decoding restores a message up the tree", "[pose_graph]") {
+TEST_CASE("Decoding restores a message up the tree") {
   UpMessage empty_system{.round = 1, .sums = {}};
   empty_system.system.emplace().schur = BlockMatrix::zero(6, 0, 0);
   for (const UpMessage& sent :
@@ -149,8 +149,7 @@ TEST_CASE("Decoding restores a message up the tree", "[pose_graph]") {
   }
 }
 
-TEST_CASE("Couplings are rounded to 2^-32 of the geometric mean of their diagonal entries",
-          "[pose_graph]") {
+TEST_CASE("Couplings are rounded to 2^-32 of the geometric mean of their diagonal entries") {
   const TreeSystem sent = *some_up_message(GENERATE(3, 6), true).system;
   const TreeSystem received = *up_again({.sums = {}, .system = sent}).system;
   CHECK(received.schur.diagonal == sent.schur.diagonal);
@@ -166,7 +165,7 @@ TEST_CASE("Couplings are rounded to 2^-32 of the geometric mean of their diagona
   }
 }
 
-TEST_CASE("A zero block costs one bit", "[pose_graph]") {
+TEST_CASE("A zero block costs one bit") {
   UpMessage dense = some_up_message(6, true), sparse = dense;
   sparse.system->schur = BlockMatrix::zero(6, 4, 3);
   sparse.system->schur.diagonal = dense.system->schur.diagonal;
@@ -179,7 +178,7 @@ TEST_CASE("A zero block costs one bit", "[pose_graph]") {
   CHECK(size - encode(sparse).size() >= 8 * 3 * 21 + 2 * 36);
 }
 
-TEST_CASE("A coupling that no diagonal entry explains is bounded", "[pose_graph]") {
+TEST_CASE("A coupling that no diagonal entry explains is bounded") {
   UpMessage sent = some_up_message(6, true);
   BlockMatrix& schur = sent.system->schur;
   schur.at(0)(1, 1) = 0.0;
@@ -194,7 +193,7 @@ TEST_CASE("A coupling that no diagonal entry explains is bounded", "[pose_graph]
   CHECK(encode(received) == encode(sent));
 }
 
-TEST_CASE("Decoding restores a message down the tree", "[pose_graph]") {
+TEST_CASE("Decoding restores a message down the tree") {
   using Next = TreeVerdict::Next;
   using Weighing = TreeVerdict::Weighing;
   const Next next = GENERATE(Next::kStep, Next::kShorten, Next::kRefresh, Next::kStart,
@@ -223,7 +222,7 @@ void check_harmless(const Bytes& bytes) {
     FAIL_CHECK("another message");
 }
 
-TEST_CASE("A message truncated anywhere is refused", "[pose_graph]") {
+TEST_CASE("A message truncated anywhere is refused") {
   for (const Bytes& bytes : one_of_each()) {
     for (std::size_t size = 0; size < bytes.size(); ++size) {
       const std::span<const std::uint8_t> cut(bytes.data(), size);
@@ -244,7 +243,7 @@ std::size_t largest_resident_kb() {
   return static_cast<std::size_t>(usage.ru_maxrss);
 }
 
-TEST_CASE("A message with a wrong byte is refused, or is another valid message", "[pose_graph]") {
+TEST_CASE("A message with a wrong byte is refused, or is another valid message") {
   std::mt19937 rng(7);
   const std::vector<Bytes> messages = one_of_each();
   constexpr int kChanges = 100000;
@@ -261,7 +260,7 @@ TEST_CASE("A message with a wrong byte is refused, or is another valid message",
 }
 
 // `count` in place of each byte, and so also in place of each count.
-TEST_CASE("Counts beyond the size of the message are refused", "[pose_graph]") {
+TEST_CASE("Counts beyond the size of the message are refused") {
   const std::uint64_t count = GENERATE(std::uint64_t{1} << 61U, ~std::uint64_t{0});
   CAPTURE(count);
   const std::size_t before_kb = largest_resident_kb();
@@ -278,7 +277,7 @@ TEST_CASE("Counts beyond the size of the message are refused", "[pose_graph]") {
   CHECK(largest_resident_kb() - before_kb < 64 * 1024);
 }
 
-TEST_CASE("Verdicts with numbers out of range are refused", "[pose_graph]") {
+TEST_CASE("Verdicts with numbers out of range are refused") {
   using V = TreeVerdict;
   const std::vector<void (*)(V&)> faults{[](V& v) { v.scale = 1.5; },
                                          [](V& v) { v.scale = 0.0; },
@@ -298,7 +297,7 @@ TEST_CASE("Verdicts with numbers out of range are refused", "[pose_graph]") {
   }
 }
 
-TEST_CASE("Inconsistent systems are refused", "[pose_graph]") {
+TEST_CASE("Inconsistent systems are refused") {
   using S = TreeSystem;
   const std::vector<void (*)(S&)> faults{[](S& s) { s.edges[0].pair = 3; },
                                          [](S& s) { s.edges[0].kappa = 0.0F; },

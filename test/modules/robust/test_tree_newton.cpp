@@ -15,7 +15,7 @@ auto newton(TreeNewtonOptions options) {
 
 const TreeNewtonOptions kTrusting{.robust = false};
 
-TEST_CASE("A team finds the optimum of its graph with any tree", "[pose_graph]") {
+TEST_CASE("A team finds the optimum of its graph with any tree") {
   const unsigned seed = GENERATE(1U, 2U);
   const double tilt_sigma = GENERATE(0.0, 0.01);  // noise of verticals
   const bool is_held = GENERATE(false, true);     // an absent robot holds the frame
@@ -38,7 +38,7 @@ TEST_CASE("A team finds the optimum of its graph with any tree", "[pose_graph]")
   }
 }
 
-TEST_CASE("Late, duplicate and reordered messages change nothing", "[pose_graph]") {
+TEST_CASE("Late, duplicate and reordered messages change nothing") {
   const TeamProblem problem =
       random_team_problem({.robots = {0, 2, 5, 7}, .pairs = {{0, 2}, {2, 5}, {5, 7}, {0, 7}}}, 3);
   SolverTeam team = solver_team(problem, chain(problem.members()), {}, newton({}));
@@ -51,8 +51,7 @@ TEST_CASE("Late, duplicate and reordered messages change nothing", "[pose_graph]
       CHECK(late.poses().at(robot)[k].matrix() == poses[k].matrix());
 }
 
-TEST_CASE("Weights of closures to the parent change no second derivatives of the child",
-          "[pose_graph]") {
+TEST_CASE("Weights of closures to the parent change no second derivatives of the child") {
   TeamProblem problem =
       random_team_problem({.robots = {0, 2}, .pairs = {{0, 2}}, .closures = 20}, 5);
   int false_closures = 0;
@@ -80,8 +79,7 @@ TEST_CASE("Weights of closures to the parent change no second derivatives of the
   CHECK(systems <= 3);  // at the start, if a step is undone, and full ones at the end
 }
 
-TEST_CASE("Impossible verdicts are refused, and the true one is accepted afterwards",
-          "[pose_graph]") {
+TEST_CASE("Impossible verdicts are refused, and the true one is accepted afterwards") {
   using Next = TreeVerdict::Next;
   const TeamProblem problem = random_team_problem({.robots = {1, 2}, .pairs = {{1, 2}}}, 6);
   const TeamTree tree = star(problem.members());
@@ -123,8 +121,7 @@ TEST_CASE("Impossible verdicts are refused, and the true one is accepted afterwa
   CHECK(central.cost(poses) == Approx(central.optimum(problem.start)).epsilon(kRelativeGap));
 }
 
-TEST_CASE("A system before the start, or with other couplings later, stops no robot",
-          "[pose_graph]") {
+TEST_CASE("A system before the start, or with other couplings later, stops no robot") {
   const TeamProblem problem = random_team_problem({.robots = {1, 2}, .pairs = {{1, 2}}}, 6);
   const TeamTree tree = star(problem.members());
   const TreeNewtonOptions options{.max_rounds = 20, .robust = false};

@@ -73,8 +73,7 @@ std::array<TreeVerdict, 2> two_steps(double first, double second, bool honest) {
 
 }  // namespace
 
-TEST_CASE("Closures are weighed more strictly only near the minimum if odometry is noisy",
-          "[tree_root]") {
+TEST_CASE("Closures are weighed more strictly only near the minimum if odometry is noisy") {
   const auto waits = [](double first, double second, bool honest) {
     const auto steps = two_steps(first, second, honest);
     return steps[0].mu == steps[1].mu;
@@ -84,21 +83,21 @@ TEST_CASE("Closures are weighed more strictly only near the minimum if odometry 
   CHECK_FALSE(waits(1.0, 1.0, true));
 }
 
-TEST_CASE("Robots decide closures alone if these are a tenth of all", "[tree_root]") {
+TEST_CASE("Robots decide closures alone if these are a tenth of all") {
   CHECK_FALSE(start_after(100, 100).weigh_all);
   CHECK_FALSE(start_after(100, 10).weigh_all);
   CHECK(start_after(100, 9).weigh_all);
   CHECK(start_after(100, 0).weigh_all);
 }
 
-TEST_CASE("A robot alone, or a team that trusts closures, starts at once", "[tree_root]") {
+TEST_CASE("A robot alone, or a team that trusts closures, starts at once") {
   TreeRoot alone({3}, {}, false), trusting({0, 1}, {.robust = false}, false);
   for (TreeRoot* root : {&alone, &trusting})
     CHECK(root->decide_start({.open = 100, .poses = 100}, 0).verdict.next ==
           TreeVerdict::Next::kStart);
 }
 
-TEST_CASE("The usual noise of a pair is reached by most pairs", "[tree_root]") {
+TEST_CASE("The usual noise of a pair is reached by most pairs") {
   CHECK(start_with({3.0F, 2.5F, 2.0F, 1.0F, 1.0F}).usual_noise == 2.0);
   CHECK(start_with({3.0F, 3.0F, 3.0F, 1.0F, 1.0F, 1.0F}).usual_noise == 1.0);
   // Pairs without an estimate count as 1, and two pairs are no majority.

@@ -32,7 +32,7 @@ std::vector<PublishedClosure> closures() {
 
 }  // namespace
 
-TEST_CASE("Closures are drawn as lines by their stage", "[ros_dds]") {
+TEST_CASE("Closures are drawn as lines by their stage") {
   const RosMarkerArray message = closure_lines(closures(), straight(3), {5, "map"});
   REQUIRE(message.markers.size() == 4);
   const auto points = [&](std::size_t kind) { return message.markers[kind].points; };
@@ -50,7 +50,7 @@ TEST_CASE("Closures are drawn as lines by their stage", "[ros_dds]") {
   }
 }
 
-TEST_CASE("The faces of a mesh have the colours of their vertices", "[ros_dds]") {
+TEST_CASE("The faces of a mesh have the colours of their vertices") {
   LabelledMesh mesh;
   mesh.vertices = {{1, 2, 3}, {4, 5, 6}, {7, 8, 9}};
   mesh.colors = {{255, 0, 0}, {0, 255, 0}, {0, 0, 51}};
@@ -66,7 +66,7 @@ TEST_CASE("The faces of a mesh have the colours of their vertices", "[ros_dds]")
   CHECK(surface_of(mesh, mesh.faces, {}).colors.empty());
 }
 
-TEST_CASE("A type definition contains each of its nested types once", "[ros_dds]") {
+TEST_CASE("A type definition contains each of its nested types once") {
   const std::string path = ros_definition(RosPath::kType);
   CHECK(path.starts_with("std_msgs/Header header\ngeometry_msgs/PoseStamped[] poses\n====="));
   std::size_t parts = 0;
@@ -77,7 +77,7 @@ TEST_CASE("A type definition contains each of its nested types once", "[ros_dds]
   CHECK_THROWS_AS(ros_definition("a/B"), std::invalid_argument);
 }
 
-TEST_CASE("A robot's record holds the published messages and the final states", "[ros_dds]") {
+TEST_CASE("A robot's record holds the published messages and the final states") {
   const TemporaryFolder folder;
   const fs::path file = folder.path() / "a.mcap";
   Topic<OdometryState> odometry;
@@ -184,7 +184,7 @@ TEST_CASE("A robot's record holds the published messages and the final states", 
   for (const TopicMessage& message : record.messages) CHECK(message.log_time >= 1000);
 }
 
-TEST_CASE("The map frame of a robot that has not joined has no parent frame", "[ros_dds]") {
+TEST_CASE("The map frame of a robot that has not joined has no parent frame") {
   const RobotId anchor = GENERATE(as<RobotId>(), 3, 7);
   const TemporaryFolder folder;
   const fs::path file = folder.path() / "a.mcap";
@@ -208,7 +208,7 @@ TEST_CASE("The map frame of a robot that has not joined has no parent frame", "[
   CHECK(links.size() == (anchor == 7 ? 3 : 2));
 }
 
-TEST_CASE("A record ends when the disk is full and reports it once", "[ros_dds]") {
+TEST_CASE("A record ends when the disk is full and reports it once") {
   const TemporaryFolder folder;
   const fs::path file = folder.path() / "a.mcap";
   fs::create_symlink("/dev/full", file);
@@ -224,7 +224,7 @@ TEST_CASE("A record ends when the disk is full and reports it once", "[ros_dds]"
   CHECK(fs::is_symlink(file));
 }
 
-TEST_CASE("The record of a killed process is complete up to the last flush", "[ros_dds]") {
+TEST_CASE("The record of a killed process is complete up to the last flush") {
   const TemporaryFolder folder;
   const fs::path file = folder.write("a.mcap", "of an earlier run");
   McapSink sink(file, [](const auto&) {});
@@ -252,7 +252,7 @@ T value_at(const RosPointCloud2& cloud, std::size_t point, std::size_t field) {
   return value;
 }
 
-TEST_CASE("A mesh is published as its vertices with their colours", "[ros_dds]") {
+TEST_CASE("A mesh is published as its vertices with their colours") {
   LabelledMesh mesh;
   mesh.vertices = {{1, 2, 3}, {4, 5, 6.5F}};
   mesh.colors = {{0x12, 0x34, 0x56}, {1, 2, 3}};
@@ -271,8 +271,7 @@ TEST_CASE("A mesh is published as its vertices with their colours", "[ros_dds]")
   CHECK(cloud_of(mesh, 10, {}).fields.size() == 3);
 }
 
-TEST_CASE("A large mesh is published as a bounded number of vertices from all its parts",
-          "[ros_dds]") {
+TEST_CASE("A large mesh is published as a bounded number of vertices from all its parts") {
   LabelledMesh mesh;
   for (int k = 0; k < 1000; ++k) mesh.vertices.emplace_back(static_cast<float>(k), 0.0F, 0.0F);
   for (const std::size_t most : {1U, 7U, 300U, 999U, 1000U, 2000U}) {
@@ -332,8 +331,7 @@ std::size_t faces_of(const std::map<std::int32_t, std::size_t>& shown) {
 }
 
 TEST_CASE(
-    "All faces of a mesh are published in small pieces and pieces of the former mesh are deleted",
-    "[ros_dds]") {
+    "All faces of a mesh are published in small pieces and pieces of the former mesh are deleted") {
   SurfacePieces pieces;
   CHECK_FALSE(pieces.next({}));
   std::map<std::int32_t, std::size_t> shown;
@@ -346,7 +344,7 @@ TEST_CASE(
   }
 }
 
-TEST_CASE("A new mesh waits until the present one is published", "[ros_dds]") {
+TEST_CASE("A new mesh waits until the present one is published") {
   SurfacePieces pieces;
   pieces.offer(std::make_shared<const LabelledMesh>(square(40)));  // 7 pieces
   REQUIRE(pieces.next({}));
@@ -357,7 +355,7 @@ TEST_CASE("A new mesh waits until the present one is published", "[ros_dds]") {
   CHECK(pieces.next({})->points.size() == 3 * 300);
 }
 
-TEST_CASE("A mesh with too many faces is coarsened and covers the same area", "[ros_dds]") {
+TEST_CASE("A mesh with too many faces is coarsened and covers the same area") {
   const LabelledMesh mesh = square(100);
   CHECK(coarsened(mesh, 20000).faces == mesh.faces);
   for (const std::size_t most : {10000U, 1000U, 100U}) {

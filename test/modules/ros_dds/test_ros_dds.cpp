@@ -36,7 +36,7 @@ void wait_for_reader(const RosPublisher& publisher) {
   REQUIRE(publisher.reader_count() > 0);
 }
 
-TEST_CASE("A message published on a ROS topic is received unchanged", "[ros_dds]") {
+TEST_CASE("A message published on a ROS topic is received unchanged") {
   LiveBag subscription(network(), {{"/a/imu", "sensor_msgs/msg/Imu", RosQos::kSensorData, 100},
                                    {"a/image", "sensor_msgs/Image", RosQos::kSensorData, 10}});
   const RosPublisher images(network(), "/a/image", "sensor_msgs/msg/Image", RosQos::kSensorData,
@@ -60,7 +60,7 @@ TEST_CASE("A message published on a ROS topic is received unchanged", "[ros_dds]
   CHECK(subscription.report().empty());
 }
 
-TEST_CASE("Every known type can be published, and nested messages cross", "[ros_dds]") {
+TEST_CASE("Every known type can be published, and nested messages cross") {
   for (const std::string& type : known_ros_types()) {
     CAPTURE(type);
     CHECK_NOTHROW(RosPublisher(network(), "/" + type, type, RosQos::kReliable, 10));
@@ -89,7 +89,7 @@ TEST_CASE("Every known type can be published, and nested messages cross", "[ros_
   crosses(marker);
 }
 
-TEST_CASE("Viewers receive the pose, diagnostics and mesh of the robot", "[ros_dds]") {
+TEST_CASE("Viewers receive the pose, diagnostics and mesh of the robot") {
   Topic<OdometryState> odometry;
   Topic<KeyframeOdometry> keyframes;
   Topic<Trajectory> trajectories;
@@ -152,7 +152,7 @@ TEST_CASE("Viewers receive the pose, diagnostics and mesh of the robot", "[ros_d
   CHECK(diagnostics[1].values[0].value == "3");
 }
 
-TEST_CASE("A robot that is not localised publishes no pose in the map", "[ros_dds]") {
+TEST_CASE("A robot that is not localised publishes no pose in the map") {
   class CountingSink final : public RosSink {
    public:
     explicit CountingSink(std::map<std::string, int>& counts) : counts_(counts) {}
@@ -188,7 +188,7 @@ TEST_CASE("A robot that is not localised publishes no pose in the map", "[ros_dd
   CHECK(counts["/a/pose"] == (is_localised ? 3 : 0));
 }
 
-TEST_CASE("A publisher is discovered as long as it exists", "[ros_dds]") {
+TEST_CASE("A publisher is discovered as long as it exists") {
   const auto shared = network();
   RosDiscovery discovery(*shared);
   const RosPublisher stays(shared, "/stays", "visualization_msgs/Marker", RosQos::kReliable, 1);
@@ -200,7 +200,7 @@ TEST_CASE("A publisher is discovered as long as it exists", "[ros_dds]") {
   CHECK(std::ranges::count(discovery.publishers(), "/stays", &TopicPublisher::topic) == 1);
 }
 
-TEST_CASE("A late subscriber receives as many latched messages as the depth", "[ros_dds]") {
+TEST_CASE("A late subscriber receives as many latched messages as the depth") {
   constexpr int kKept = 5;
   const RosPublisher publisher(network(), "/pieces", "visualization_msgs/Marker", RosQos::kLatched,
                                kKept);
@@ -217,7 +217,7 @@ TEST_CASE("A late subscriber receives as many latched messages as the depth", "[
   }
 }
 
-TEST_CASE("Bytes that are no message of the topic are not published", "[ros_dds]") {
+TEST_CASE("Bytes that are no message of the topic are not published") {
   const RosPublisher publisher(network(), "/b/imu", "sensor_msgs/msg/Imu", RosQos::kReliable, 10);
   auto bytes = encode_ros(imu(1));
   bytes.resize(bytes.size() - 100);

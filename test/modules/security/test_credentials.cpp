@@ -32,8 +32,7 @@ Secret<N> secret_from_hex(std::string_view digits) {
   return secret;
 }
 
-TEST_CASE("Certificates and credentials have the bytes of the test vectors in SECURITY",
-          "[security]") {
+TEST_CASE("Certificates and credentials have the bytes of the test vectors in SECURITY") {
   Secret<32> authority_seed, robot_seed;
   std::fill_n(authority_seed.data(), 32, std::uint8_t{1});
   std::fill_n(robot_seed.data(), 32, std::uint8_t{2});
@@ -61,7 +60,7 @@ TEST_CASE("Certificates and credentials have the bytes of the test vectors in SE
   CHECK_THAT(text, Contains(credentials));
 }
 
-TEST_CASE("Credentials are signed with every field of the identity", "[security]") {
+TEST_CASE("Credentials are signed with every field of the identity") {
   const ToyTeam team;
   const RobotKeys keys = team.keys_of(3, "alpha");
   const RobotIdentity identity = toy_identity(3, "alpha");
@@ -75,13 +74,13 @@ TEST_CASE("Credentials are signed with every field of the identity", "[security]
     CHECK_FALSE(is_signed_by_robot(shown, other));
 }
 
-TEST_CASE("The longest announcement of a robot fits into its user data", "[security]") {
+TEST_CASE("The longest announcement of a robot fits into its user data") {
   const std::string most =
       "robot=65535;name=" + std::string(64, 'n') + ";proto=65535;boot=ffffffffffffffff;auth=";
   CHECK(most.size() + kCredentialsLength <= 1024);
 }
 
-TEST_CASE("Texts that are no credentials are refused with the reason", "[security]") {
+TEST_CASE("Texts that are no credentials are refused with the reason") {
   const std::string zeros(kCredentialsLength, 'A');
   CHECK(reason_of(parse_credentials("").refusal) == "credentials of another length");
   CHECK(reason_of(parse_credentials(zeros + "A").refusal) == "credentials of another length");
@@ -94,7 +93,7 @@ TEST_CASE("Texts that are no credentials are refused with the reason", "[securit
   CHECK(reason_of(parse_credentials(text).refusal) == "credentials are not base 64");
 }
 
-TEST_CASE("The number of admitted processes is bounded", "[security]") {
+TEST_CASE("The number of admitted processes is bounded") {
   AdmittedPeers peers;
   const TeamPeer live{0, 1};
   peers.add(live, {});
@@ -105,7 +104,7 @@ TEST_CASE("The number of admitted processes is bounded", "[security]") {
   CHECK(peers.find({2 * kMaxAdmitted - 1, 1}) != nullptr);
 }
 
-TEST_CASE("Encryption is the XChaCha20-Poly1305 of the standard's example", "[security]") {
+TEST_CASE("Encryption is the XChaCha20-Poly1305 of the standard's example") {
   // draft-irtf-cfrg-xchacha-03, appendix A.3.1.
   const auto key =
       secret_from_hex<32>("808182838485868788898a8b8c8d8e8f909192939495969798999a9b9c9d9e9f");

@@ -37,7 +37,7 @@ struct TeamOnDisk {
   TemporaryFolder folder;
 };
 
-TEST_CASE("A secret that other users may read is refused", "[security]") {
+TEST_CASE("A secret that other users may read is refused") {
   const TeamOnDisk team;
   const auto secret = team.alpha() / "secret_key.txt";
   CHECK(fs::status(secret).permissions() == (fs::perms::owner_read | fs::perms::owner_write));
@@ -51,7 +51,7 @@ TEST_CASE("A secret that other users may read is refused", "[security]") {
   CHECK(team.refusal().empty());
 }
 
-TEST_CASE("A changed file is refused with its name and line", "[security]") {
+TEST_CASE("A changed file is refused with its name and line") {
   struct Change {
     const char *file, *part, *by, *refusal;
   };
@@ -77,7 +77,7 @@ TEST_CASE("A changed file is refused with its name and line", "[security]") {
   CHECK_THAT(team.refusal(), Contains(refusal));
 }
 
-TEST_CASE("A wrong or incomplete file of keys is refused", "[security]") {
+TEST_CASE("A wrong or incomplete file of keys is refused") {
   const TeamOnDisk team;
   SECTION("something behind its end") {
     team.folder.write("survey/alpha/authority.txt",
@@ -104,7 +104,7 @@ TEST_CASE("A wrong or incomplete file of keys is refused", "[security]") {
 
 constexpr std::int64_t kEnd_s = kToyNow_s + 86400;
 
-TEST_CASE("The authority's secret is in no robot's folder", "[security]") {
+TEST_CASE("The authority's secret is in no robot's folder") {
   const TemporaryFolder folder;
   TeamFolder::make(folder.path() / "survey", {{0, "alpha"}}, kToyNow_s, kEnd_s);
   const std::string text = folder.read("survey/authority/secret_key.txt");
@@ -114,7 +114,7 @@ TEST_CASE("The authority's secret is in no robot's folder", "[security]") {
           std::string::npos);
 }
 
-TEST_CASE("Conflicting names and ids are refused before anything is written", "[security]") {
+TEST_CASE("Conflicting names and ids are refused before anything is written") {
   const TemporaryFolder folder;
   const fs::path survey = folder.path() / "survey";
   using Robots = std::vector<RobotName>;
@@ -125,7 +125,7 @@ TEST_CASE("Conflicting names and ids are refused before anything is written", "[
   CHECK_FALSE(fs::exists(survey));
 }
 
-TEST_CASE("A robot gets new keys after the former have lapsed", "[security]") {
+TEST_CASE("A robot gets new keys after the former have lapsed") {
   const TemporaryFolder folder;
   const fs::path survey = folder.path() / "survey";
   TeamFolder team = TeamFolder::make(survey, {{0, "alpha"}}, kToyNow_s, kEnd_s);
@@ -147,8 +147,7 @@ TEST_CASE("A robot gets new keys after the former have lapsed", "[security]") {
   CHECK(TeamFolder(survey).issued().size() == 2);
 }
 
-TEST_CASE("A revocation reaches the existing folders and increases the number of the list",
-          "[security]") {
+TEST_CASE("A revocation reaches the existing folders and increases the number of the list") {
   const TemporaryFolder folder;
   const fs::path survey = folder.path() / "survey";
   TeamFolder team =
@@ -167,7 +166,7 @@ TEST_CASE("A revocation reaches the existing folders and increases the number of
   CHECK(load_revocations(survey / "alpha").revoked.size() == 2);
 }
 
-TEST_CASE("A robot to revoke is looked up by name before id", "[security]") {
+TEST_CASE("A robot to revoke is looked up by name before id") {
   const TemporaryFolder folder;
   TeamFolder team =
       TeamFolder::make(folder.path() / "survey", {{0, "7"}, {7, "alpha"}}, kToyNow_s, kEnd_s);

@@ -7,7 +7,7 @@ namespace {
 
 using Status = Opened::Status;
 
-TEST_CASE("A message for one robot opens there and only there", "[security]") {
+TEST_CASE("A message for one robot opens there and only there") {
   const ToyTeam team;
   ToyMember a(team, 0, "alpha"), b(team, 1, "beta"), c(team, 2, "gamma");
   introduce(a, b);
@@ -32,7 +32,7 @@ TEST_CASE("A message for one robot opens there and only there", "[security]") {
   CHECK(c.seal.open(for_c, *sealed).status == Status::kRefused);
 }
 
-TEST_CASE("A message to all opens at every member", "[security]") {
+TEST_CASE("A message to all opens at every member") {
   const ToyTeam team;
   ToyMember a(team, 0, "alpha"), b(team, 1, "beta"), c(team, 2, "gamma");
   introduce(a, b);
@@ -49,7 +49,7 @@ TEST_CASE("A message to all opens at every member", "[security]") {
   CHECK(c.seal.open(context, *sealed).content == content);
 }
 
-TEST_CASE("A message waits for the keys it needs", "[security]") {
+TEST_CASE("A message waits for the keys it needs") {
   const ToyTeam team;
   ToyMember a(team, 0, "alpha"), b(team, 1, "beta");
   REQUIRE(a.admit(b) == nullptr);
@@ -72,7 +72,7 @@ TEST_CASE("A message waits for the keys it needs", "[security]") {
   CHECK(b.seal.open(to_all, *sealed_to_all).status == Status::kOpened);
 }
 
-TEST_CASE("A key message opens at one process and is no ordinary message", "[security]") {
+TEST_CASE("A key message opens at one process and is no ordinary message") {
   const ToyTeam team;
   ToyMember a(team, 0, "alpha"), b(team, 1, "beta"), c(team, 2, "gamma");
   introduce(a, b);
@@ -90,8 +90,7 @@ TEST_CASE("A key message opens at one process and is no ordinary message", "[sec
   CHECK(b.seal.accept_key_message(a.peer(), *key) == nullptr);  // repeating it is harmless
 }
 
-TEST_CASE("Messages in another robot's name, to itself, or to an unknown robot are not sealed",
-          "[security]") {
+TEST_CASE("Messages in another robot's name, to itself, or to an unknown robot are not sealed") {
   const ToyTeam team;
   ToyMember a(team, 0, "alpha"), b(team, 1, "beta");
   CHECK_THROWS_AS(a.seal.seal(toy_context(b), toy_content()), std::invalid_argument);
@@ -110,7 +109,7 @@ struct Pair {
   ToyMember a{team, 0, "alpha"}, b{team, 1, "beta"};
 };
 
-TEST_CASE("A sealed message with any bit flipped is refused", "[security]") {
+TEST_CASE("A sealed message with any bit flipped is refused") {
   Pair pair;
   const bool addressed = GENERATE(true, false);
   CAPTURE(addressed);
@@ -131,7 +130,7 @@ TEST_CASE("A sealed message with any bit flipped is refused", "[security]") {
   CHECK(pair.b.seal.open(context, sealed).status == Status::kOpened);
 }
 
-TEST_CASE("A message with any bit of its context flipped does not open", "[security]") {
+TEST_CASE("A message with any bit of its context flipped does not open") {
   Pair pair;
   const bool addressed = GENERATE(true, false);
   CAPTURE(addressed);
@@ -174,7 +173,7 @@ TEST_CASE("A message with any bit of its context flipped does not open", "[secur
   CHECK(pair.b.seal.open(context, sealed).status == Status::kOpened);
 }
 
-TEST_CASE("A message of an admitted peer is refused in another context", "[security]") {
+TEST_CASE("A message of an admitted peer is refused in another context") {
   // All these peers are known, so the context is the reason for the refusal, not a missing key.
   Pair pair;
   ToyMember restarted(pair.a, 5000);
@@ -199,7 +198,7 @@ TEST_CASE("A message of an admitted peer is refused in another context", "[secur
   CHECK(pair.b.seal.open(context, *to_all).status == Status::kRefused);
 }
 
-TEST_CASE("Messages changed at random never open", "[security]") {
+TEST_CASE("Messages changed at random never open") {
   const unsigned seed = GENERATE(1U, 2U, 3U);
   CAPTURE(seed);
   InputCorrupter corrupter(seed);
@@ -222,7 +221,7 @@ TEST_CASE("Messages changed at random never open", "[security]") {
   CHECK(pair.b.seal.open(to_all, sealed_to_all).status == Status::kOpened);
 }
 
-TEST_CASE("Credentials with any bit flipped are refused", "[security]") {
+TEST_CASE("Credentials with any bit flipped are refused") {
   const ToyTeam team;
   ToyMember a(team, 0, "alpha"), b(team, 1, "beta");
   const std::string genuine = b.seal.credentials();

@@ -21,7 +21,7 @@ std::string admission(ToyMember& to, const RobotKeys& keys, const RobotIdentity&
   return refusal;
 }
 
-TEST_CASE("A robot is admitted only with a valid certificate of its team", "[security]") {
+TEST_CASE("A robot is admitted only with a valid certificate of its team") {
   const ToyTeam team, others("survey");
   ToyMember a(team, 0, "alpha");
   const RobotKeys good = team.keys_of(1, "beta");
@@ -53,7 +53,7 @@ TEST_CASE("A robot is admitted only with a valid certificate of its team", "[sec
         "these are this process's own credentials");
 }
 
-TEST_CASE("An exchange key of small order is refused", "[security]") {
+TEST_CASE("An exchange key of small order is refused") {
   const ToyTeam team;
   ToyMember a(team, 0, "alpha");
   const RobotKeys keys = team.keys_of(1, "beta");
@@ -65,7 +65,7 @@ TEST_CASE("An exchange key of small order is refused", "[security]") {
   CHECK_FALSE(a.seal.is_admitted({1, identity.boot}));
 }
 
-TEST_CASE("A process keeps the keys with which it was admitted", "[security]") {
+TEST_CASE("A process keeps the keys with which it was admitted") {
   const ToyTeam team;
   ToyMember a(team, 0, "alpha"), b(team, 1, "beta");
   introduce(a, b);
@@ -75,7 +75,7 @@ TEST_CASE("A process keeps the keys with which it was admitted", "[security]") {
   CHECK(b.seal.open(toy_context(a, b.peer()), *sealed).status == Status::kOpened);
 }
 
-TEST_CASE("A robot without keys of its own does not start", "[security]") {
+TEST_CASE("A robot without keys of its own does not start") {
   ToyTeam team;
   const RobotKeys keys = team.keys_of(1, "beta");
   const RobotIdentity identity = toy_identity(1, "beta");
@@ -90,7 +90,7 @@ TEST_CASE("A robot without keys of its own does not start", "[security]") {
   CHECK_THROWS_AS(TeamSeal(changed, identity, kToyNow_s), std::invalid_argument);
 }
 
-TEST_CASE("A revoked robot is removed, refused, and cannot read later messages", "[security]") {
+TEST_CASE("A revoked robot is removed, refused, and cannot read later messages") {
   ToyTeam team;
   ToyMember a(team, 0, "alpha"), b(team, 1, "beta"), c(team, 2, "gamma");
   introduce(a, b);
@@ -115,7 +115,7 @@ TEST_CASE("A revoked robot is removed, refused, and cannot read later messages",
   CHECK_FALSE(a.seal.update(list, kToyNow_s).new_key);
 }
 
-TEST_CASE("A robot known only by its credentials is not admitted, and lapses", "[security]") {
+TEST_CASE("A robot known only by its credentials is not admitted, and lapses") {
   ToyTeam team;
   ToyMember a(team, 0, "alpha"), b(team, 1, "beta");
   const auto known = a.seal.certified(b.identity, b.seal.credentials(), kToyNow_s);
@@ -133,7 +133,7 @@ TEST_CASE("A robot known only by its credentials is not admitted, and lapses", "
   CHECK_FALSE(a.seal.credentials_of(b.peer()));
 }
 
-TEST_CASE("A new member reads messages to all that were sealed before a revocation", "[security]") {
+TEST_CASE("A new member reads messages to all that were sealed before a revocation") {
   ToyTeam team;
   ToyMember a(team, 0, "alpha"), late(team, 3, "delta"), c(team, 2, "gamma");
   introduce(a, c);
@@ -145,7 +145,7 @@ TEST_CASE("A new member reads messages to all that were sealed before a revocati
   CHECK(late.seal.open(to_all, *before).status == Status::kOpened);
 }
 
-TEST_CASE("A member whose certificate expires reads no later messages", "[security]") {
+TEST_CASE("A member whose certificate expires reads no later messages") {
   const ToyTeam team;
   ToyMember a(team, 0, "alpha"), b(team, 1, "beta");
   introduce(a, b);
@@ -159,7 +159,7 @@ TEST_CASE("A member whose certificate expires reads no later messages", "[securi
   CHECK(b.seal.open(toy_context(a), *after).status == Status::kNotYet);
 }
 
-TEST_CASE("Old and forged lists of revocations change nothing", "[security]") {
+TEST_CASE("Old and forged lists of revocations change nothing") {
   ToyTeam team, others;
   ToyMember a(team, 0, "alpha"), b(team, 1, "beta");
   introduce(a, b);
@@ -174,7 +174,7 @@ TEST_CASE("Old and forged lists of revocations change nothing", "[security]") {
   CHECK(a.seal.is_admitted(b.peer()));
 }
 
-TEST_CASE("After more revocations than keys are kept, old messages are refused", "[security]") {
+TEST_CASE("After more revocations than keys are kept, old messages are refused") {
   ToyTeam team;
   ToyMember a(team, 0, "alpha"), b(team, 1, "beta");
   const SealContext to_all = toy_context(a);
@@ -186,7 +186,7 @@ TEST_CASE("After more revocations than keys are kept, old messages are refused",
   CHECK(b.seal.open(to_all, *a.seal.seal(to_all, toy_content())).status == Status::kOpened);
 }
 
-TEST_CASE("A replayed older key message does not remove newer keys", "[security]") {
+TEST_CASE("A replayed older key message does not remove newer keys") {
   ToyTeam team;
   ToyMember a(team, 0, "alpha"), b(team, 1, "beta");
   introduce(a, b);
@@ -198,8 +198,8 @@ TEST_CASE("A replayed older key message does not remove newer keys", "[security]
   CHECK(b.seal.open(toy_context(a), *sealed).status == Status::kOpened);
 }
 
-TEST_CASE("A member cannot send to all in another member's name although it has that member's key",
-          "[security]") {
+TEST_CASE(
+    "A member cannot send to all in another member's name although it has that member's key") {
   const ToyTeam team;
   ToyMember a(team, 0, "alpha"), b(team, 1, "beta");
   RogueMember c(team, 2, "gamma");
@@ -216,8 +216,7 @@ TEST_CASE("A member cannot send to all in another member's name although it has 
   CHECK(reason_of(a.seal.open(as_b, forged).reason) == "message is not signed by its sender");
 }
 
-TEST_CASE("The sender's signature commits to the key so that all members read the same content",
-          "[security]") {
+TEST_CASE("The sender's signature commits to the key so that all members read the same content") {
   const ToyTeam team;
   ToyMember a(team, 0, "alpha"), b(team, 1, "beta");
   RogueMember c(team, 2, "gamma");
@@ -229,7 +228,7 @@ TEST_CASE("The sender's signature commits to the key so that all members read th
   CHECK(a.seal.open(toy_context(b), other_key).status == Status::kRefused);
 }
 
-TEST_CASE("Replayed credentials of a process do not displace the active one", "[security]") {
+TEST_CASE("Replayed credentials of a process do not displace the active one") {
   const ToyTeam team;
   ToyMember a(team, 0, "alpha"), b(team, 1, "beta");
   std::vector<std::unique_ptr<ToyMember>> former;

@@ -54,8 +54,7 @@ Errors errors_of(const LabelledMesh& mesh, const Distance& distance) {
   return errors;
 }
 
-TEST_CASE("The mesh of a sphere is closed across blocks and near the sphere",
-          "[semantic_mapping]") {
+TEST_CASE("The mesh of a sphere is closed across blocks and near the sphere") {
   constexpr double kRadius_m = 1.0;
   const auto sphere = [](const Eigen::Vector3d& p) { return (p - kCentre).norm() - kRadius_m; };
   BlockMap map = new_map();
@@ -78,7 +77,7 @@ TEST_CASE("The mesh of a sphere is closed across blocks and near the sphere",
   CHECK(volume_of(result) > 0.98 * volume);
 }
 
-TEST_CASE("The surface has no cracks with any signs", "[semantic_mapping]") {
+TEST_CASE("The surface has no cracks with any signs") {
   const unsigned seed = GENERATE(1U, 2U, 3U);
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -97,8 +96,7 @@ TEST_CASE("The surface has no cracks with any signs", "[semantic_mapping]") {
   CHECK(volume_of(result) > 0.0);
 }
 
-TEST_CASE("Only changed blocks are meshed again, and vertices keep their identity",
-          "[semantic_mapping]") {
+TEST_CASE("Only changed blocks are meshed again, and vertices keep their identity") {
   double radius_m = 1.0;
   const auto sphere = [&](const Eigen::Vector3d& p) { return (p - kCentre).norm() - radius_m; };
   BlockMap map = new_map();
@@ -144,8 +142,7 @@ TEST_CASE("Only changed blocks are meshed again, and vertices keep their identit
   }
 }
 
-TEST_CASE("Final mesh stays when its blocks are erased and stays connected with the rest",
-          "[semantic_mapping]") {
+TEST_CASE("Final mesh stays when its blocks are erased and stays connected with the rest") {
   double radius_m = 1.0;
   const auto sphere = [&](const Eigen::Vector3d& p) { return (p - kCentre).norm() - radius_m; };
   BlockMap map = new_map();
@@ -182,7 +179,7 @@ TEST_CASE("Final mesh stays when its blocks are erased and stays connected with 
                       before.ids.end()));
 }
 
-TEST_CASE("Unobserved voxels leave a hole, not a wall", "[semantic_mapping]") {
+TEST_CASE("Unobserved voxels leave a hole, not a wall") {
   const auto plane = [](const Eigen::Vector3d& p) { return p.z() - 0.05; };
   BlockMap map = new_map();
   fill(map, 1, plane);
@@ -247,8 +244,7 @@ struct PlaneTwice {
   MapMesh first;
 };
 
-TEST_CASE("Superseded final surface is dropped and its votes on labels are kept",
-          "[semantic_mapping]") {
+TEST_CASE("Superseded final surface is dropped and its votes on labels are kept") {
   PlaneTwice plane;
   const std::size_t faces = plane.first.mesh.faces.size(), vertices = plane.first.ids.size();
   REQUIRE(plane.mesh.face_count() == 2 * faces);

@@ -7,7 +7,7 @@
 namespace km {
 namespace {
 
-TEST_CASE("Two halves of a recorded kitchen agree where they overlap", "[semantic_mapping][slow]") {
+TEST_CASE("Two halves of a recorded kitchen agree where they overlap") {
   const auto folder = shared_data("7scenes_redkitchen");
   if (!folder) return;
   RecordedKitchen kitchen(*folder);

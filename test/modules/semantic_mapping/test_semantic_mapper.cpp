@@ -8,7 +8,7 @@
 namespace km {
 namespace {
 
-TEST_CASE("A room is mapped at its position with its labels", "[semantic_mapping]") {
+TEST_CASE("A room is mapped at its position with its labels") {
   const double voxel_m = GENERATE(0.05, 0.1);
   const Lens lens = GENERATE(
       Lens(), Lens(LensModel::kRadialTangential, {-0.28, 0.07, 2e-4, -1e-4}),  // as of EuRoC's
@@ -44,7 +44,7 @@ TEST_CASE("A room is mapped at its position with its labels", "[semantic_mapping
   CHECK(static_cast<double>(right) / count > 0.97);  // wrong where walls meet
 }
 
-TEST_CASE("All pixels of a fisheye image with bearings are used", "[semantic_mapping]") {
+TEST_CASE("All pixels of a fisheye image with bearings are used") {
   Camera camera = small_camera();
   camera.fx = camera.fy = 40.0;  // the borders are more than 80 degrees off the axis
   camera.lens = Lens(LensModel::kEquidistant, {0.0, 0.0, 0.0, 0.0});
@@ -66,7 +66,7 @@ TEST_CASE("All pixels of a fisheye image with bearings are used", "[semantic_map
   }
 }
 
-TEST_CASE("Two depths are averaged by their weights", "[semantic_mapping]") {
+TEST_CASE("Two depths are averaged by their weights") {
   // The depth is 2.00 m from z = 0, and 4.04 m from z = -2 m: surface at 2.00 and 2.04 m.
   SemanticMappingConfig config = settings();
   config.depth_sigma_per_m = 0.005;
@@ -99,7 +99,7 @@ TEST_CASE("Two depths are averaged by their weights", "[semantic_mapping]") {
   CHECK(seen_twice > 30);
 }
 
-TEST_CASE("Pixels without depth change nothing", "[semantic_mapping]") {
+TEST_CASE("Pixels without depth change nothing") {
   SemanticMappingConfig config = settings();
   config.max_range_m = 65.0;
   SemanticMapper mapper(config, small_camera(), two_classes());
@@ -127,7 +127,7 @@ TEST_CASE("Pixels without depth change nothing", "[semantic_mapping]") {
   }
 }
 
-TEST_CASE("Unusable frames are refused and leave the map unchanged", "[semantic_mapping]") {
+TEST_CASE("Unusable frames are refused and leave the map unchanged") {
   SemanticMapper mapper(settings(), small_camera(), two_classes());
   const DepthAndLabels good = wall(2.0);
   REQUIRE(integrate(mapper, good, at(0), 3));
@@ -164,7 +164,7 @@ TEST_CASE("Unusable frames are refused and leave the map unchanged", "[semantic_
   CHECK(mapper.size().blocks == blocks);
 }
 
-TEST_CASE("A pose outside the map's reach maps nothing", "[semantic_mapping]") {
+TEST_CASE("A pose outside the map's reach maps nothing") {
   SemanticMapper mapper(settings(), small_camera(), two_classes());
   const double far_m = GENERATE(1e7, -1e12, 1e300);
   CAPTURE(far_m);
@@ -173,8 +173,7 @@ TEST_CASE("A pose outside the map's reach maps nothing", "[semantic_mapping]") {
   CHECK(mapper.size().blocks == 0);
 }
 
-TEST_CASE("Labels of another size or outside the palette are dropped and counted",
-          "[semantic_mapping]") {
+TEST_CASE("Labels of another size or outside the palette are dropped and counted") {
   SemanticMapper mapper(settings(), small_camera(), two_classes());
   DepthAndLabels images = wall(2.0);
   SECTION("another size") {
@@ -203,7 +202,7 @@ TEST_CASE("Labels of another size or outside the palette are dropped and counted
   }
 }
 
-TEST_CASE("Surface is meshed once enough images show it", "[semantic_mapping]") {
+TEST_CASE("Surface is meshed once enough images show it") {
   SemanticMappingConfig config = settings();
   // At a standard deviation of 0.08 m, means of three have 0.046 m, and means of two have 0.057 m.
   const bool is_noisy = GENERATE(false, true);
@@ -221,7 +220,7 @@ TEST_CASE("Surface is meshed once enough images show it", "[semantic_mapping]") 
   }
 }
 
-TEST_CASE("Vertices have the colours of the image, at one exposure", "[semantic_mapping]") {
+TEST_CASE("Vertices have the colours of the image, at one exposure") {
   SemanticMapper mapper(settings(0.05), small_camera(), two_classes());
   const DepthAndLabels images = wall(2.0);
   ColorImage color{images.depth.width, images.depth.height, {}};
@@ -246,7 +245,7 @@ TEST_CASE("Vertices have the colours of the image, at one exposure", "[semantic_
   }
 }
 
-TEST_CASE("The smallest voxels fit the depths", "[semantic_mapping]") {
+TEST_CASE("The smallest voxels fit the depths") {
   const auto voxel_m = [&](std::uint16_t mm) {
     const DepthImage depth{4, 1, {0, mm, mm, 60000}};
     const std::vector images(2, std::make_shared<const DepthImage>(depth));
@@ -260,7 +259,7 @@ TEST_CASE("The smallest voxels fit the depths", "[semantic_mapping]") {
   CHECK_THROWS_AS(SemanticMapper({}, small_camera()), std::invalid_argument);  // without images
 }
 
-TEST_CASE("Far surface has larger voxels until it is seen from near", "[semantic_mapping]") {
+TEST_CASE("Far surface has larger voxels until it is seen from near") {
   SemanticMappingConfig config = settings(0.05);
   config.depth_sigma_per_m = 0.01;  // bands up to 3.2, 4.5 and 6.3 m
   SemanticMapper mapper(config, small_camera(), two_classes());
@@ -287,7 +286,7 @@ TEST_CASE("Far surface has larger voxels until it is seen from near", "[semantic
   CHECK(static_cast<double>(faces_in_middle()) == Approx(2.0 * area_m2 / 0.0025).epsilon(0.1));
 }
 
-TEST_CASE("Carving removes an object that has gone", "[semantic_mapping]") {
+TEST_CASE("Carving removes an object that has gone") {
   SemanticMapper mapper(settings(0.05), small_camera(), two_classes());
   for (KeyframeIndex i = 0; i < 5; ++i) REQUIRE(integrate(mapper, wall(3.0, true), at(0), i));
   mapper.update_mesh();
@@ -305,7 +304,7 @@ TEST_CASE("Carving removes an object that has gone", "[semantic_mapping]") {
   CHECK(map.mesh.vertices.size() > vertices_before(map, 2.0) + 500);  // the wall
 }
 
-TEST_CASE("A repeated frame keeps every vertex and its first keyframe", "[semantic_mapping]") {
+TEST_CASE("A repeated frame keeps every vertex and its first keyframe") {
   SemanticMapper mapper(settings(0.05), small_camera(), two_classes());
   // At the rim of the ball, voxels far behind the surface have small weights: few frames are too
   // few.
@@ -334,8 +333,7 @@ TEST_CASE("A repeated frame keeps every vertex and its first keyframe", "[semant
   }
 }
 
-TEST_CASE("Surface that left the window is final and a revisit makes new vertices",
-          "[semantic_mapping]") {
+TEST_CASE("Surface that left the window is final and a revisit makes new vertices") {
   SemanticMappingConfig config = settings();
   config.window_m = 5.0;
   SemanticMapper mapper(config, small_camera(), two_classes());
@@ -366,7 +364,7 @@ TEST_CASE("Surface that left the window is final and a revisit makes new vertice
 
 // Along a wall, with a window shorter than the distance travelled: rim edges away from the wall's
 // own border.
-TEST_CASE("Mesh that became final during the motion has no cracks", "[semantic_mapping]") {
+TEST_CASE("Mesh that became final during the motion has no cracks") {
   SemanticMappingConfig config = settings();
   config.window_m = 0.6;
   const KeyframeIndex meshed_every = GENERATE(1U, 7U, 100U);
@@ -390,7 +388,7 @@ TEST_CASE("Mesh that became final during the motion has no cracks", "[semantic_m
   CHECK(cracks == 0);
 }
 
-TEST_CASE("Blocks never exceed their bound and their mesh is not lost", "[semantic_mapping]") {
+TEST_CASE("Blocks never exceed their bound and their mesh is not lost") {
   SemanticMappingConfig config = settings();
   config.max_blocks = 64;
   SemanticMapper mapper(config, small_camera(), two_classes());
@@ -418,7 +416,7 @@ TEST_CASE("Blocks never exceed their bound and their mesh is not lost", "[semant
   CHECK(full.size().blocks == 64);
 }
 
-TEST_CASE("Two threads give the same mesh as one, bit by bit", "[semantic_mapping]") {
+TEST_CASE("Two threads give the same mesh as one, bit by bit") {
   const auto map_with = [](int threads) {
     cv::setNumThreads(threads);
     SemanticMapper mapper(settings(), small_camera(), BoxRoom::palette());

@@ -37,8 +37,7 @@ DenseFrame frame(int i) {
   return {i * kPeriod, depth, labels, at(0), static_cast<KeyframeIndex>(i / 2)};
 }
 
-TEST_CASE("A mesh is published every few seconds and at the end and is coloured by its labels",
-          "[semantic_mapping_node]") {
+TEST_CASE("A mesh is published every few seconds and at the end and is coloured by its labels") {
   Bench bench;
   for (int i = 0; i < 35; ++i) bench.node->step(frame(i));
   CHECK(bench.meshes.size() == 2);  // at 3 s and 6 s
@@ -60,7 +59,7 @@ TEST_CASE("A mesh is published every few seconds and at the end and is coloured 
   CHECK(bench.last.unlabelled == 0);
 }
 
-TEST_CASE("Unusable frames are counted by reason", "[semantic_mapping_node]") {
+TEST_CASE("Unusable frames are counted by reason") {
   Bench bench;
   DenseFrame unlabelled = frame(0);
   unlabelled.labels = nullptr;
@@ -82,7 +81,7 @@ TEST_CASE("Unusable frames are counted by reason", "[semantic_mapping_node]") {
   CHECK(bench.last.off_palette_pixels == 160 * 120);
 }
 
-TEST_CASE("Superseded surface is dropped with the next frame", "[semantic_mapping_node]") {
+TEST_CASE("Superseded surface is dropped with the next frame") {
   Bench bench;
   const auto step = [&](int i, double x) {
     DenseFrame next = frame(i);
@@ -115,8 +114,7 @@ TEST_CASE("Superseded surface is dropped with the next frame", "[semantic_mappin
   CHECK(bench.last.size.faces == faces - first.mesh.faces.size());
 }
 
-TEST_CASE("Space is published while it is wanted, and begins with all blocks",
-          "[semantic_mapping_node]") {
+TEST_CASE("Space is published while it is wanted, and begins with all blocks") {
   Bench bench;
   std::vector<SpaceUpdate> updates;
   bench.space.subscribe([&](const auto& update) { updates.push_back(*update); });

@@ -6,7 +6,7 @@ namespace {
 
 constexpr unsigned kOne = VoxelLabels::kVotesPerWeight;  // votes of weight 1
 
-TEST_CASE("Four labels are counted exactly, in any order", "[semantic_mapping]") {
+TEST_CASE("Four labels are counted exactly, in any order") {
   const unsigned seed = GENERATE(1U, 2U, 3U);
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -26,8 +26,7 @@ TEST_CASE("Four labels are counted exactly, in any order", "[semantic_mapping]")
   CHECK(counts[labels.best()] == most);
 }
 
-TEST_CASE("A label with more than a fifth of the votes is not lost to many others",
-          "[semantic_mapping]") {
+TEST_CASE("A label with more than a fifth of the votes is not lost to many others") {
   const unsigned seed = GENERATE(1U, 2U, 3U);
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -38,7 +37,7 @@ TEST_CASE("A label with more than a fifth of the votes is not lost to many other
   CHECK(labels.best() == 1);
 }
 
-TEST_CASE("Old votes fade", "[semantic_mapping]") {
+TEST_CASE("Old votes fade") {
   VoxelLabels labels;
   for (int i = 0; i < 1000; ++i) labels.observe(1, kOne);
   CHECK(labels.weight_of(1) <= 255.0 / kOne);
@@ -46,7 +45,7 @@ TEST_CASE("Old votes fade", "[semantic_mapping]") {
   CHECK(labels.best() == 2);
 }
 
-TEST_CASE("Votes of two vertices add up", "[semantic_mapping]") {
+TEST_CASE("Votes of two vertices add up") {
   VoxelLabels a, b;
   a.observe(1, 8);
   a.observe(2, 3);

@@ -57,7 +57,7 @@ std::unique_ptr<ListedBag> recording(const Plan& plan) {
   return bag;
 }
 
-TEST_CASE("Messages of a bag become packets without a hole between them", "[sensors][bag]") {
+TEST_CASE("Messages of a bag become packets without a hole between them") {
   BagDataset dataset("test.bag", recording({}), small_rig());
   CHECK(dataset.pair_count() == 40);
   const auto packets = packets_of(dataset);
@@ -77,7 +77,7 @@ TEST_CASE("Messages of a bag become packets without a hole between them", "[sens
   CHECK(dataset.remarks().empty());
 }
 
-TEST_CASE("Poses of an odometry replace inertial samples", "[sensors][bag]") {
+TEST_CASE("Poses of an odometry replace inertial samples") {
   const bool is_live_late = GENERATE(false, true);  // logged after their frame
   CAPTURE(is_live_late);
   Rig rig = small_rig();
@@ -115,8 +115,7 @@ TEST_CASE("Poses of an odometry replace inertial samples", "[sensors][bag]") {
                     Contains("not of nav_msgs/Odometry"));
 }
 
-TEST_CASE("A frame without its right image is counted and the other frames stay",
-          "[sensors][bag]") {
+TEST_CASE("A frame without its right image is counted and the other frames stay") {
   const std::vector<int> lost =
       GENERATE(std::vector{0}, std::vector{7}, std::vector{30, 31}, std::vector{39});
   const Stamp late = GENERATE(0, 2'000'000);
@@ -137,7 +136,7 @@ TEST_CASE("A frame without its right image is counted and the other frames stay"
                   : std::vector<std::string>{}));
 }
 
-TEST_CASE("A window of a bag begins with the second before it", "[sensors][bag]") {
+TEST_CASE("A window of a bag begins with the second before it") {
   BagDataset dataset("test.bag", recording({}), small_rig(), {.from_s = 0.5, .to_s = 1.0});
   const auto packets = packets_of(dataset);
   REQUIRE(packets.size() == 10);
@@ -156,7 +155,7 @@ TEST_CASE("A window of a bag begins with the second before it", "[sensors][bag]"
                     StartsWith("test.bag: no frame") && Contains("from 50 s"));
 }
 
-TEST_CASE("Missing topics are refused and the existing topics are listed", "[sensors][bag]") {
+TEST_CASE("Missing topics are refused and the existing topics are listed") {
   Rig rig = small_rig();
   rig.topics.right = "/rihgt";
   CHECK_THROWS_WITH(BagDataset("test.bag", recording({}), rig),
@@ -186,7 +185,7 @@ class DamagedBag final : public BagReader {
   std::unique_ptr<ListedBag> rest_;
 };
 
-TEST_CASE("Unreadable parts of a bag are counted with their place", "[sensors][bag]") {
+TEST_CASE("Unreadable parts of a bag are counted with their place") {
   const auto damaged = [](std::unique_ptr<ListedBag> rest) {
     return std::make_unique<DamagedBag>(std::move(rest));
   };
@@ -208,7 +207,7 @@ TEST_CASE("Unreadable parts of a bag are counted with their place", "[sensors][b
                         Contains("damaged pieces"));
 }
 
-TEST_CASE("A bad message of a bag affects no other message", "[sensors][bag]") {
+TEST_CASE("A bad message of a bag affects no other message") {
   auto bag = recording({.frames = 0});
   for (int k = 0; k < 30; ++k) {
     const Stamp stamp = kFirst + k * kFramePeriod;
@@ -245,7 +244,7 @@ TEST_CASE("A bad message of a bag affects no other message", "[sensors][bag]") {
         std::string::npos);
 }
 
-TEST_CASE("Gyroscope and accelerometer with their own stamps are joined", "[sensors][bag]") {
+TEST_CASE("Gyroscope and accelerometer with their own stamps are joined") {
   auto bag = std::make_unique<ListedBag>();
   constexpr Stamp kGyroPeriod = 2'500'000, kAccelPeriod = 16'000'000;
   for (Stamp at = 0; at < 3'000'000'000; at += 500'000) {
@@ -278,7 +277,7 @@ TEST_CASE("Gyroscope and accelerometer with their own stamps are joined", "[sens
   CHECK(dataset.report().count(ReaderFault::kPairWithoutImu) == 1);
 }
 
-TEST_CASE("Depth of a bag joins its frame, at a lower rate too", "[sensors][bag]") {
+TEST_CASE("Depth of a bag joins its frame, at a lower rate too") {
   Rig rig = small_rig();
   rig.topics.right.clear();
   rig.topics.depth = "/depth";
@@ -321,7 +320,7 @@ TEST_CASE("Depth of a bag joins its frame, at a lower rate too", "[sensors][bag]
   CHECK(dataset.remarks().size() == 1);
 }
 
-TEST_CASE("Images of every common encoding become the same grey", "[sensors][bag]") {
+TEST_CASE("Images of every common encoding become the same grey") {
   struct Kind {
     const char* encoding;
     std::vector<std::uint8_t> pixel;  // one grey level, 90; mono16 of 16 and 12 bits
@@ -359,7 +358,7 @@ TEST_CASE("Images of every common encoding become the same grey", "[sensors][bag
   }
 }
 
-TEST_CASE("Colours of every common encoding are those of the scene", "[sensors][bag]") {
+TEST_CASE("Colours of every common encoding are those of the scene") {
   const auto color_of = [](const char* encoding, const std::vector<std::uint8_t>& pixels) {
     RosImage message = image(kFirst, 0);
     message.encoding = encoding;
@@ -401,7 +400,7 @@ TEST_CASE("Colours of every common encoding are those of the scene", "[sensors][
                                    {0, kFirst, encode_ros(compressed)}, {kWidth, kHeight})));
 }
 
-TEST_CASE("The name of a Bayer pattern determines the place of its colours", "[sensors][bag]") {
+TEST_CASE("The name of a Bayer pattern determines the place of its colours") {
   // A red scene: only red pixels are bright.
   RosImage message = image(kFirst, 0);
   message.encoding = "bayer_rggb8";
@@ -418,7 +417,7 @@ TEST_CASE("The name of a Bayer pattern determines the place of its colours", "[s
   CHECK(inner_gray("bayer_bggr8") == Approx(0.114 * 200).margin(1.0));
 }
 
-TEST_CASE("Compressed depth is decoded by the format that its message states", "[sensors][bag]") {
+TEST_CASE("Compressed depth is decoded by the format that its message states") {
   struct Case {
     std::string format;
     std::vector<std::uint8_t> bytes;  // after the header
@@ -453,7 +452,7 @@ TEST_CASE("Compressed depth is decoded by the format that its message states", "
   CHECK_THAT(depth_of(c.bytes.size(), "h264").problem, Contains("states the format 'h264'"));
 }
 
-TEST_CASE("A recording continues after its clock was set back", "[sensors][bag]") {
+TEST_CASE("A recording continues after its clock was set back") {
   constexpr Stamp kStep = 10'000'000'000;  // longer than the recording before it
   auto whole = recording({.frames = 80});
   auto bag = std::make_unique<ListedBag>();

@@ -29,8 +29,7 @@ std::string first_of(const ReaderReport& report, ReaderFault fault) {
 
 }  // namespace
 
-TEST_CASE("A recording without faults gives every pair and every sample between them",
-          "[sensors]") {
+TEST_CASE("A recording without faults gives every pair and every sample between them") {
   const EurocFolder folder(GENERATE(".png", ".jpg"));
   FolderReader reader = open_folder(folder.root());
   const auto packets = packets_of(reader);
@@ -53,7 +52,7 @@ TEST_CASE("A recording without faults gives every pair and every sample between 
   CHECK(packets[1].imu[0].accel == Eigen::Vector3d(1.0, 2.0, 9.8));
 }
 
-TEST_CASE("A window is half open and counts from the recording's first image", "[sensors]") {
+TEST_CASE("A window is half open and counts from the recording's first image") {
   const EurocFolder folder;
   FolderReader first = open_folder(folder.root(), {.part = {.from_s = 0.0, .to_s = 0.2}});
   FolderReader second = open_folder(folder.root(), {.part = {.from_s = 0.2, .to_s = 100.0}});
@@ -76,7 +75,7 @@ TEST_CASE("A window is half open and counts from the recording's first image", "
                     Contains("from 0 s to 0.35 s"));
 }
 
-TEST_CASE("Blanks, comments, CRLF and a bare header in the lists are accepted", "[sensors]") {
+TEST_CASE("Blanks, comments, CRLF and a bare header in the lists are accepted") {
   const EurocFolder folder;
   std::string list = "timestamp [ns] , filename\r\n";
   for (int i = 0; i < EurocFolder::kPairs; ++i) {
@@ -89,7 +88,7 @@ TEST_CASE("Blanks, comments, CRLF and a bare header in the lists are accepted", 
   CHECK(reader.report().empty());
 }
 
-TEST_CASE("Stamps of left and right may differ by the tolerance", "[sensors]") {
+TEST_CASE("Stamps of left and right may differ by the tolerance") {
   const EurocFolder folder;
   folder.replace("cam1/data.csv", "10100000000,", "10100900000,");
   CHECK(open_folder(folder.root()).pair_count() == 8);
@@ -100,7 +99,7 @@ TEST_CASE("Stamps of left and right may differ by the tolerance", "[sensors]") {
   CHECK(strict.report().count(ReaderFault::kRightWithoutLeft) == 1);
 }
 
-TEST_CASE("Missing files and folders are refused by name", "[sensors]") {
+TEST_CASE("Missing files and folders are refused by name") {
   const EurocFolder folder;
   CHECK_THROWS_WITH(open_folder("/nowhere/at/all"), "/nowhere/at/all: no such folder");
   for (const std::string file : {"cam0/data.csv", "cam1/data.csv", "imu0/data.csv",
@@ -124,7 +123,7 @@ TEST_CASE("Missing files and folders are refused by name", "[sensors]") {
   CHECK_THROWS_WITH(open_folder(folder.root()), EndsWith("in it are robot0, robot1"));
 }
 
-TEST_CASE("A recording needs no inertial sensor", "[sensors]") {
+TEST_CASE("A recording needs no inertial sensor") {
   const EurocFolder folder;
   const FolderOptions options{.imu = false};
   const SE3 T_imu_left = open_folder(folder.root()).rig().stereo.cameras[0].T_body_cam;
@@ -144,7 +143,7 @@ TEST_CASE("A recording needs no inertial sensor", "[sensors]") {
   CHECK(reader.report().empty());
 }
 
-TEST_CASE("A correction moves the stamps of images and the cameras", "[sensors]") {
+TEST_CASE("A correction moves the stamps of images and the cameras") {
   const EurocFolder folder;
   folder.add_depth();
   FolderReader right = open_folder(folder.root());
@@ -166,7 +165,7 @@ TEST_CASE("A correction moves the stamps of images and the cameras", "[sensors]"
             .pair_count() == 6);
 }
 
-TEST_CASE("Lists without a usable row are refused", "[sensors]") {
+TEST_CASE("Lists without a usable row are refused") {
   struct Case {
     const char *file, *text, *message;
   };
@@ -192,7 +191,7 @@ TEST_CASE("Lists without a usable row are refused", "[sensors]") {
   CHECK_THROWS_WITH(open_folder(folder.root()), EndsWith(message));
 }
 
-TEST_CASE("Repeated rows and images without a partner are skipped and counted", "[sensors]") {
+TEST_CASE("Repeated rows and images without a partner are skipped and counted") {
   const EurocFolder folder;
   const std::string row = "10150000000,10150000000.png\n";  // line 5
   folder.replace("cam0/data.csv", row, row + row);
@@ -208,7 +207,7 @@ TEST_CASE("Repeated rows and images without a partner are skipped and counted", 
              EndsWith("cam0/data.csv line 5: 10150000000.png"));
 }
 
-TEST_CASE("A gap between inertial samples is reported and the pairs are kept", "[sensors]") {
+TEST_CASE("A gap between inertial samples is reported and the pairs are kept") {
   const EurocFolder folder;
   std::string text = folder.read("imu0/data.csv");
   const auto begin = text.find("10110000000");
@@ -221,7 +220,7 @@ TEST_CASE("A gap between inertial samples is reported and the pairs are kept", "
              Contains("0.040000 s after 10105000000"));
 }
 
-TEST_CASE("Pairs outside the inertial samples are skipped", "[sensors]") {
+TEST_CASE("Pairs outside the inertial samples are skipped") {
   const EurocFolder folder;
   std::string text = folder.read("imu0/data.csv");
   SECTION("start late") {
@@ -237,7 +236,7 @@ TEST_CASE("Pairs outside the inertial samples are skipped", "[sensors]") {
   CHECK(outcome.report.count(ReaderFault::kPairWithoutImu) == 2);
 }
 
-TEST_CASE("The rig has the numbers of the sensor files", "[sensors]") {
+TEST_CASE("The rig has the numbers of the sensor files") {
   const EurocFolder folder;
   const SensorRig rig = read_euroc_rig(folder.mav0());
   const Camera& left = rig.stereo.cameras[0];
@@ -258,8 +257,7 @@ TEST_CASE("The rig has the numbers of the sensor files", "[sensors]") {
   CHECK(rig.imu.rate_hz == 200.0);
 }
 
-TEST_CASE("The body is the inertial sensor, and a rotation with rounded digits is made exact",
-          "[sensors]") {
+TEST_CASE("The body is the inertial sensor, and a rotation with rounded digits is made exact") {
   const EurocFolder folder;
   folder.write("cam0/sensor.yaml", "%YAML:1.0\n" + EurocFolder::camera_yaml(0.0));  // OpenCV's
   folder.replace("cam0/sensor.yaml", "0, -1, 0,", "0, -1.00003, 0,");
@@ -272,7 +270,7 @@ TEST_CASE("The body is the inertial sensor, and a rotation with rounded digits i
   CHECK(rig.stereo.baseline_m() == Approx(0.1));
 }
 
-TEST_CASE("An impossible calibration is refused with file and line", "[sensors]") {
+TEST_CASE("An impossible calibration is refused with file and line") {
   struct Case {
     std::string sensor, from, to, message;
   };
@@ -316,7 +314,7 @@ TEST_CASE("An impossible calibration is refused with file and line", "[sensors]"
                     Contains(c.sensor + "/sensor.yaml") && Contains(c.message));
 }
 
-TEST_CASE("Two cameras in one place are refused", "[sensors]") {
+TEST_CASE("Two cameras in one place are refused") {
   const EurocFolder folder;
   folder.write("cam1/sensor.yaml", EurocFolder::camera_yaml(0.0));
   CHECK_THROWS_WITH(read_euroc_rig(folder.mav0()), Contains("where the left one is"));

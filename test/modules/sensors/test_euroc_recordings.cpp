@@ -70,7 +70,7 @@ void corrupt_row(const EurocFolder& folder, const Row& row) {
 
 }  // namespace
 
-TEST_CASE("A bad row is skipped and counted with its line and no other row is", "[sensors]") {
+TEST_CASE("A bad row is skipped and counted with its line and no other row is") {
   const std::string day = std::to_string(kDay_ns);
   const Row row = GENERATE_COPY(
       Row{"gyro 1e300", "imu0/data.csv", 300, "1e300,0,0,0,0,9.8", ReaderFault::kImplausible, 8},
@@ -121,7 +121,7 @@ auto by_bytes(std::string bytes) {
   };
 }
 
-TEST_CASE("A bad image loses its pair and no inertial sample", "[sensors]") {
+TEST_CASE("A bad image loses its pair and no inertial sample") {
   using enum ReaderFault;
   const BadImage bad = GENERATE(
       BadImage{"missing", kMissingImage, ".png: no such image", [](auto& f) { fs::remove(f); }},
@@ -157,7 +157,7 @@ TEST_CASE("A bad image loses its pair and no inertial sample", "[sensors]") {
   CHECK(outcome.packets[3].imu.front().stamp == outcome.packets[2].imu.back().stamp);
 }
 
-TEST_CASE("A corrupted list or calibration is refused or gives valid packets", "[sensors]") {
+TEST_CASE("A corrupted list or calibration is refused or gives valid packets") {
   const std::string file =
       GENERATE("imu0/data.csv", "cam0/data.csv", "cam1/data.csv", "imu0/sensor.yaml",
                "cam0/sensor.yaml", "cam1/sensor.yaml", "depth0/sensor.yaml");
@@ -172,7 +172,7 @@ TEST_CASE("A corrupted list or calibration is refused or gives valid packets", "
   });
 }
 
-TEST_CASE("A corrupted image gives an image of the right size or none", "[sensors]") {
+TEST_CASE("A corrupted image gives an image of the right size or none") {
   const bool is_jpeg = GENERATE(false, true);
   CAPTURE(is_jpeg);
   cv::Mat pixels(24, 32, CV_8UC1);
@@ -212,7 +212,7 @@ constexpr const char* kPalette =
 
 }  // namespace
 
-TEST_CASE("Without a right camera, depth makes an RGB-D rig", "[sensors]") {
+TEST_CASE("Without a right camera, depth makes an RGB-D rig") {
   const EurocFolder folder;
   folder.make_rgbd();
   const SensorRig rig = read_euroc_rig(folder.mav0());
@@ -240,7 +240,7 @@ TEST_CASE("Without a right camera, depth makes an RGB-D rig", "[sensors]") {
   CHECK(open_folder(folder.mav0()).pair_count() == EurocFolder::kPairs);
 }
 
-TEST_CASE("Range, scale and baseline of depth have defaults", "[sensors]") {
+TEST_CASE("Range, scale and baseline of depth have defaults") {
   const EurocFolder folder;
   folder.make_rgbd();
   for (const char* line :
@@ -253,7 +253,7 @@ TEST_CASE("Range, scale and baseline of depth have defaults", "[sensors]") {
   CHECK(read_depth_scale(folder.mav0()) == 0.001);
 }
 
-TEST_CASE("Depth and labels beside stereo are read on request", "[sensors]") {
+TEST_CASE("Depth and labels beside stereo are read on request") {
   const EurocFolder folder;
   folder.add_depth();
   folder.add_labels(2);
@@ -271,7 +271,7 @@ TEST_CASE("Depth and labels beside stereo are read on request", "[sensors]") {
   CHECK(second->frame->labels == nullptr);
 }
 
-TEST_CASE("A recording without requested depth or labels is refused", "[sensors]") {
+TEST_CASE("A recording without requested depth or labels is refused") {
   const EurocFolder folder;
   const auto refusal_with = [&](const FolderOptions& options, const std::string& end) {
     CHECK_THROWS_WITH(open_folder(folder.root(), options), Contains(end));
@@ -291,7 +291,7 @@ TEST_CASE("A recording without requested depth or labels is refused", "[sensors]
   refusal_with({}, "depth0/data.csv: no such file");
 }
 
-TEST_CASE("A depth or label image that cannot be used loses only itself", "[sensors]") {
+TEST_CASE("A depth or label image that cannot be used loses only itself") {
   struct Case {
     const char* sensor;
     ReaderFault fault;
@@ -326,7 +326,7 @@ TEST_CASE("A depth or label image that cannot be used loses only itself", "[sens
   check_image_lost(folder, {.labels = labels}, c.fault, c.text);
 }
 
-TEST_CASE("A depth image of no frame is counted", "[sensors]") {
+TEST_CASE("A depth image of no frame is counted") {
   const EurocFolder folder;
   folder.make_rgbd();
   folder.replace("depth0/data.csv", "10100000000,", "10110000000,");
@@ -334,7 +334,7 @@ TEST_CASE("A depth image of no frame is counted", "[sensors]") {
                    "depth0/data.csv line 4: 10100000000.png");
 }
 
-TEST_CASE("Depths outside the sensor's range are dropped", "[sensors]") {
+TEST_CASE("Depths outside the sensor's range are dropped") {
   const EurocFolder folder;
   folder.make_rgbd();
   cv::Mat pixels(24, 32, CV_16UC1, cv::Scalar(0));
@@ -354,7 +354,7 @@ TEST_CASE("Depths outside the sensor's range are dropped", "[sensors]") {
   CHECK(depths() == std::vector<int>{3990, 4000, 10000, 0, 0, 0, 0});
 }
 
-TEST_CASE("Depth that is not aligned with the left camera is refused", "[sensors]") {
+TEST_CASE("Depth that is not aligned with the left camera is refused") {
   struct Case {
     const char *from, *to, *message;
   };
@@ -376,7 +376,7 @@ TEST_CASE("Depth that is not aligned with the left camera is refused", "[sensors
                     Contains("depth0/sensor.yaml") && Contains(c.message));
 }
 
-TEST_CASE("The palette maps labels from colours to ids", "[sensors]") {
+TEST_CASE("The palette maps labels from colours to ids") {
   const EurocFolder folder;
   folder.add_labels();
   folder.write("label_palette.csv", kPalette);

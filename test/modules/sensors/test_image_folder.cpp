@@ -42,7 +42,7 @@ void write_tum(const fs::path& root) {
   }
 }
 
-TEST_CASE("A folder in KITTI's layout is read with its calibration", "[sensors][folder]") {
+TEST_CASE("A folder in KITTI's layout is read with its calibration") {
   const TemporaryFolder folder;
   write_kitti(folder);
   CHECK(layout_of(folder.path()) == FolderLayout::kKitti);
@@ -67,8 +67,7 @@ TEST_CASE("A folder in KITTI's layout is read with its calibration", "[sensors][
   CHECK_THROWS_WITH(open_folder(folder.path(), {}, "camera.yaml"), Contains("leave --rig out"));
 }
 
-TEST_CASE("A bad file of a folder in KITTI's layout is refused with file, line and value",
-          "[sensors][folder]") {
+TEST_CASE("A bad file of a folder in KITTI's layout is refused with file, line and value") {
   struct Case {
     std::string file, text, message;
   };
@@ -92,8 +91,7 @@ TEST_CASE("A bad file of a folder in KITTI's layout is refused with file, line a
   CHECK_THROWS_WITH(open_folder(folder.path()), Contains("image_1: no such folder"));
 }
 
-TEST_CASE("Faulty times and images of a folder in KITTI's layout are left out and counted",
-          "[sensors][folder]") {
+TEST_CASE("Faulty times and images of a folder in KITTI's layout are left out and counted") {
   struct Case {
     const char *times, *missing;
     ReaderFault fault;
@@ -125,7 +123,7 @@ TEST_CASE("Faulty times and images of a folder in KITTI's layout are left out an
   CHECK_THAT(report.entries().at(c.fault).first, Contains(c.example));
 }
 
-TEST_CASE("A folder in the layout of TUM RGB-D has the camera of its name", "[sensors][folder]") {
+TEST_CASE("A folder in the layout of TUM RGB-D has the camera of its name") {
   const TemporaryFolder folder;
   const fs::path root = folder.path() / "rgbd_dataset_freiburg2_desk";
   write_tum(root);
@@ -137,8 +135,7 @@ TEST_CASE("A folder in the layout of TUM RGB-D has the camera of its name", "[se
   CHECK_FALSE(tum_camera(folder.path() / "desk"));
 }
 
-TEST_CASE("The camera of a folder in the layout of TUM RGB-D can be described",
-          "[sensors][folder]") {
+TEST_CASE("The camera of a folder in the layout of TUM RGB-D can be described") {
   const TemporaryFolder folder;
   const fs::path root = folder.path() / "desk";
   write_tum(root);
@@ -184,7 +181,7 @@ void write_seven_scenes(const TemporaryFolder& folder) {
   }
 }
 
-TEST_CASE("A folder in the layout of 7-Scenes is read at 30 Hz", "[sensors][folder]") {
+TEST_CASE("A folder in the layout of 7-Scenes is read at 30 Hz") {
   const TemporaryFolder folder;
   write_seven_scenes(folder);
   FolderReader reader = open_folder(folder.path());
@@ -203,8 +200,7 @@ TEST_CASE("A folder in the layout of 7-Scenes is read at 30 Hz", "[sensors][fold
                     Contains("camera-intrinsics.txt line 2: inf is not a number"));
 }
 
-TEST_CASE("The names of frames show the layout of 7-Scenes without a calibration",
-          "[sensors][folder]") {
+TEST_CASE("The names of frames show the layout of 7-Scenes without a calibration") {
   const TemporaryFolder folder;
   write_seven_scenes(folder);
   fs::remove(folder.path() / "camera-intrinsics.txt");

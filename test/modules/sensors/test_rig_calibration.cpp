@@ -77,7 +77,7 @@ struct Files {
   }
 };
 
-TEST_CASE("Kalibr's files give the rig that they describe", "[sensors][calibration]") {
+TEST_CASE("Kalibr's files give the rig that they describe") {
   const Files files;
   const RigCalibration calibration = files.read_kalibr(kCamera0 + kCamera1);
   const Camera& left = calibration.rig.stereo.cameras[0];
@@ -105,7 +105,7 @@ TEST_CASE("Kalibr's files give the rig that they describe", "[sensors][calibrati
   CHECK(calibration.notes.empty());
 }
 
-TEST_CASE("All formats for the poses of the cameras agree", "[sensors][calibration]") {
+TEST_CASE("All formats for the poses of the cameras agree") {
   const Files files;
   const RigCalibration plain = files.read_kalibr(kCamera0 + kCamera1);
   const std::string inverse0 =
@@ -137,7 +137,7 @@ TEST_CASE("All formats for the poses of the cameras agree", "[sensors][calibrati
   CHECK(one.imu_topic == "/imu0");
 }
 
-TEST_CASE("The models of Kalibr's chains are read", "[sensors][calibration]") {
+TEST_CASE("The models of Kalibr's chains are read") {
   const Files files;
   const auto left_of = [&](const std::string& text) {
     return files.read_kalibr(text + kCamera1).rig.stereo.cameras[0];
@@ -166,7 +166,7 @@ TEST_CASE("The models of Kalibr's chains are read", "[sensors][calibration]") {
   CHECK(rational.lens.coefficients().size() == 8);
 }
 
-TEST_CASE("The published calibration of TUM-VI is read", "[sensors][calibration]") {
+TEST_CASE("The published calibration of TUM-VI is read") {
   const auto cameras = shared_data("tumvi_rooms/calib/kalibr_imucam_chain.yaml");
   const auto imu = shared_data("tumvi_rooms/calib/kalibr_imu_chain.yaml");
   if (!cameras || !imu) return;
@@ -218,7 +218,7 @@ const std::string kBasalt = R"({
 }
 )";
 
-TEST_CASE("Basalt's file gives the rig that it describes", "[sensors][calibration]") {
+TEST_CASE("Basalt's file gives the rig that it describes") {
   const Files files;
   std::string text = kBasalt;  // JSON may be indented by tabs
   for (std::size_t at = 0; (at = text.find("    ", at)) != text.npos;) text.replace(at, 4, 1, '\t');
@@ -245,7 +245,7 @@ TEST_CASE("Basalt's file gives the rig that it describes", "[sensors][calibratio
   CHECK(calibration.image_topics[0].empty());
 }
 
-TEST_CASE("Basalt's other models are read", "[sensors][calibration]") {
+TEST_CASE("Basalt's other models are read") {
   const Files files;
   const auto left_of = [&](const std::string& type, const std::string& more) {
     return files
@@ -268,7 +268,7 @@ TEST_CASE("Basalt's other models are read", "[sensors][calibration]") {
         Approx(254.9 + 158.0 / (0.6 * std::sqrt(2.1) + 0.4)));
 }
 
-TEST_CASE("An unused part of a calibration is noted with its place", "[sensors][calibration]") {
+TEST_CASE("An unused part of a calibration is noted with its place") {
   const Files files;
   const auto notes_of = [](const RigCalibration& calibration) {
     REQUIRE(calibration.notes.size() == 1);
@@ -284,7 +284,7 @@ TEST_CASE("An unused part of a calibration is noted with its place", "[sensors][
              Contains("imu.yaml line 8: Tw is not applied"));
 }
 
-TEST_CASE("A pair is chosen among more cameras, or one with depth", "[sensors][calibration]") {
+TEST_CASE("A pair is chosen among more cameras, or one with depth") {
   const Files files;
   std::string third = replaced(kCamera1, "cam1:", "cam2:");
   third = replaced(third, "[0.0, -1.0, 0.0, -0.1]", "[0.0, -1.0, 0.0, -0.3]");
@@ -300,8 +300,7 @@ TEST_CASE("A pair is chosen among more cameras, or one with depth", "[sensors][c
   }
 }
 
-TEST_CASE("Files of ROS' camera_calibration give the pair without its pose on the body",
-          "[sensors][calibration]") {
+TEST_CASE("Files of ROS' camera_calibration give the pair without its pose on the body") {
   const TemporaryFolder folder;
   const auto write = [&folder](const std::string& name, const std::string& Tx) {
     return folder.write(
@@ -324,8 +323,7 @@ TEST_CASE("Files of ROS' camera_calibration give the pair without its pose on th
   CHECK_THROWS_WITH(read_rig({right, left}, choice), Contains("no baseline"));
 }
 
-TEST_CASE("A file that is no calibration is refused with a list of the expected formats",
-          "[sensors][calibration]") {
+TEST_CASE("A file that is no calibration is refused with a list of the expected formats") {
   const Files files;
   CHECK_THROWS_WITH(read_rig({}), Contains("expected a folder"));
   CHECK_THROWS_WITH(files.read("a.yaml", "some: thing\n"),
@@ -344,7 +342,7 @@ TEST_CASE("A file that is no calibration is refused with a list of the expected 
   check_no_files<DatasetError>(".yaml", [](const fs::path& file) { (void)read_rig({file}); });
 }
 
-TEST_CASE("An impossible Kalibr chain is refused with file and line", "[sensors][calibration]") {
+TEST_CASE("An impossible Kalibr chain is refused with file and line") {
   struct Case {
     std::string from, to, message;
   };
@@ -363,7 +361,7 @@ TEST_CASE("An impossible Kalibr chain is refused with file and line", "[sensors]
                     Contains("camchain.yaml " + c.message));
 }
 
-TEST_CASE("An impossible Basalt file is refused with file and line", "[sensors][calibration]") {
+TEST_CASE("An impossible Basalt file is refused with file and line") {
   struct Case {
     std::string from, to, message;
   };
@@ -386,7 +384,7 @@ void check_calibration(const RigCalibration& calibration) {
   CHECK(std::abs(calibration.image_time_offset_s.value_or(0.0)) <= 10.0);
 }
 
-TEST_CASE("A corrupted calibration is refused or gives a valid rig", "[sensors][calibration]") {
+TEST_CASE("A corrupted calibration is refused or gives a valid rig") {
   const TemporaryFolder folder;
   SECTION("Kalibr") {
     check_corrupted<DatasetError>(

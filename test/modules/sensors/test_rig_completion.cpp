@@ -36,7 +36,7 @@ PartialRig nothing_known() {
   return rig;
 }
 
-TEST_CASE("CameraInfo and static transforms complete a rig", "[sensors][calibration]") {
+TEST_CASE("CameraInfo and static transforms complete a rig") {
   ListedBag bag;
   bag.add("/left_info", camera_info("left_optical", 0.0));
   add_transforms(bag, {kLeftOnBase});
@@ -55,7 +55,7 @@ TEST_CASE("CameraInfo and static transforms complete a rig", "[sensors][calibrat
   CHECK(rig.notes.empty());
 }
 
-TEST_CASE("Raw images are rotated by R from their frame", "[sensors][calibration]") {
+TEST_CASE("Raw images are rotated by R from their frame") {
   const Eigen::Matrix3d R_left = so3_exp({0.01, -0.03, 0.02}), R_right = so3_exp({-0.02, 0.01, 0});
   using RowMajor = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
   RosCameraInfo left = camera_info("imu", 0.0), right = camera_info("imu", -43.0);
@@ -82,7 +82,7 @@ TEST_CASE("Raw images are rotated by R from their frame", "[sensors][calibration
   CHECK(rig.notes.size() == (rectified ? 0U : 2U));
 }
 
-TEST_CASE("Poses in the rig file and CameraInfo complete a rig", "[sensors][calibration]") {
+TEST_CASE("Poses in the rig file and CameraInfo complete a rig") {
   PartialRig partial = nothing_known();
   partial.has_extrinsics = true;
   partial.has_pair = GENERATE(true, false);
@@ -136,8 +136,7 @@ std::string refusal_of_depth(const DepthMessages& depth, bool is_accepted = fals
   }
 }
 
-TEST_CASE("Depth that is not aligned with colour is refused, with the remedy",
-          "[sensors][calibration]") {
+TEST_CASE("Depth that is not aligned with colour is refused, with the remedy") {
   struct Case {
     DepthMessages depth;
     const char* message;
@@ -157,8 +156,7 @@ TEST_CASE("Depth that is not aligned with colour is refused, with the remedy",
   CHECK(refusal_of_depth(c.depth, true).empty());
 }
 
-TEST_CASE("Depth is aligned if its frame, or its place and CameraInfo, are those of the images",
-          "[sensors][calibration]") {
+TEST_CASE("Depth is aligned if its frame, or its place and CameraInfo, are those of the images") {
   const DepthMessages depth = GENERATE(
       DepthMessages{}, DepthMessages{.frame = "/color_optical", .info_fx = std::nullopt},
       DepthMessages{.info_fx = std::nullopt, .images = 1},
@@ -167,8 +165,7 @@ TEST_CASE("Depth is aligned if its frame, or its place and CameraInfo, are those
   CHECK(refusal_of_depth(depth).empty());
 }
 
-TEST_CASE("Without an inertial sensor the body is the odometry's child frame",
-          "[sensors][calibration]") {
+TEST_CASE("Without an inertial sensor the body is the odometry's child frame") {
   PartialRig partial = nothing_known();
   partial.rig.topics.imu.clear();
   partial.rig.topics.odometry = "/odom";
@@ -184,7 +181,7 @@ TEST_CASE("Without an inertial sensor the body is the odometry's child frame",
   CHECK(stereo.cameras[0].T_body_cam.translation().isApprox(Eigen::Vector3d(0.2, 0, 0)));
 }
 
-TEST_CASE("Calibrated cameras get the pose of their images' frame", "[sensors][calibration]") {
+TEST_CASE("Calibrated cameras get the pose of their images' frame") {
   PartialRig partial = nothing_known();
   partial.has_cameras = partial.has_pair = true;
   for (Camera& camera : partial.rig.sensors.stereo.cameras) camera.fx = 300.0;
@@ -202,8 +199,7 @@ TEST_CASE("Calibrated cameras get the pose of their images' frame", "[sensors][c
   CHECK(stereo.cameras[1].T_body_cam.translation().isApprox(Eigen::Vector3d(0.31, 0, 0)));
 }
 
-TEST_CASE("A missing part of a calibration is named with the topics that could supply it",
-          "[sensors][calibration]") {
+TEST_CASE("A missing part of a calibration is named with the topics that could supply it") {
   const auto complaint = [](ListedBag& bag) -> std::string {
     try {
       static_cast<void>(complete_rig("a.bag", bag, nothing_known()));
@@ -240,7 +236,7 @@ TEST_CASE("A missing part of a calibration is named with the topics that could s
                                                "is 0: the camera is not calibrated"));
 }
 
-TEST_CASE("A chain of static transforms is followed in both directions", "[sensors]") {
+TEST_CASE("A chain of static transforms is followed in both directions") {
   StaticTransforms transforms;
   transforms.add(
       {{kImuOnBase, kLeftOnBase, transform("left_optical", "lens", {0, 0, 0.5}, {0, 0, 0})}});
@@ -258,7 +254,7 @@ TEST_CASE("A chain of static transforms is followed in both directions", "[senso
   CHECK(!transforms.find("imu", "z"));
 }
 
-TEST_CASE("Poses come from /tf if /tf_static does not have them", "[sensors][calibration]") {
+TEST_CASE("Poses come from /tf if /tf_static does not have them") {
   const bool has_static = GENERATE(false, true);  // it has other frames
   CAPTURE(has_static);
   ListedBag bag;
@@ -274,7 +270,7 @@ TEST_CASE("Poses come from /tf if /tf_static does not have them", "[sensors][cal
   CHECK_THAT(rig.notes[0], Contains("that on /tf"));
 }
 
-TEST_CASE("A calibration that is a text is named with its topic", "[sensors][calibration]") {
+TEST_CASE("A calibration that is a text is named with its topic") {
   ListedBag bag;
   add_transforms(bag, {kLeftOnBase});
   bag.describe("/left_info", "std_msgs/String");

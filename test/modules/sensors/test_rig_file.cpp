@@ -27,7 +27,7 @@ PartialRig read(const TemporaryFolder& folder, const std::string& text) {
   return read_rig_file(folder.write("rig.yaml", text));
 }
 
-TEST_CASE("A rig file names the files of Kalibr or contains their keys", "[sensors]") {
+TEST_CASE("A rig file names the files of Kalibr or contains their keys") {
   const TemporaryFolder folder;
   folder.write("camchain.yaml", kChain);
   folder.write("imu.yaml",
@@ -63,7 +63,7 @@ TEST_CASE("A rig file names the files of Kalibr or contains their keys", "[senso
   CHECK_THAT(other.rig.notes[1], Contains("/a is calibrated as /cam0"));
 }
 
-TEST_CASE("A rig file for depth needs no calibration of depth", "[sensors]") {
+TEST_CASE("A rig file for depth needs no calibration of depth") {
   const EurocFolder recording;
   const TemporaryFolder folder;
   fs::create_directory_symlink(recording.root(), folder.path() / "recording");
@@ -83,7 +83,7 @@ TEST_CASE("A rig file for depth needs no calibration of depth", "[sensors]") {
 const CameraCalibration kCorrection{
     0.0123456789, make_pose(so3_exp({0.02, -0.01, 0.03}), {0.004, -0.005, 0.006})};
 
-TEST_CASE("A corrected rig file gives the rig of the original with the correction", "[sensors]") {
+TEST_CASE("A corrected rig file gives the rig of the original with the correction") {
   const EurocFolder recording;
   const TemporaryFolder folder, elsewhere;
   fs::create_directory_symlink(recording.root(), folder.path() / "recording");
@@ -109,7 +109,7 @@ TEST_CASE("A corrected rig file gives the rig of the original with the correctio
   CHECK(corrected_rig_text(elsewhere.path() / "rig_estimated.yaml", kCorrection) == corrected);
 }
 
-TEST_CASE("A recording with its own rig accepts a file with only a correction", "[sensors]") {
+TEST_CASE("A recording with its own rig accepts a file with only a correction") {
   const TemporaryFolder folder;
   const auto file = folder.write("rig.yaml", corrected_rig_text("", kCorrection));
   const CameraCalibration read = read_rig_correction(file);
@@ -127,7 +127,7 @@ TEST_CASE("A recording with its own rig accepts a file with only a correction", 
                     Contains("scaled.yaml: T_body_rig"));
 }
 
-TEST_CASE("Parts that a rig file lacks come from topics", "[sensors]") {
+TEST_CASE("Parts that a rig file lacks come from topics") {
   const TemporaryFolder folder;
   const PartialRig none =
       read(folder,
@@ -155,7 +155,7 @@ TEST_CASE("Parts that a rig file lacks come from topics", "[sensors]") {
       Eigen::Vector3d(0.2, 0, 0)));
 }
 
-TEST_CASE("A rig file may state poses of cameras that CameraInfo describes", "[sensors]") {
+TEST_CASE("A rig file may state poses of cameras that CameraInfo describes") {
   const TemporaryFolder folder;
   const std::string poses =
       "calibration:\n  cam0: {T_cam_imu: [[1,0,0,0.5], [0,1,0,0], [0,0,1,0], [0,0,0,1]]}\n";
@@ -185,7 +185,7 @@ TEST_CASE("A rig file may state poses of cameras that CameraInfo describes", "[s
                     Contains("rig.yaml line"));
 }
 
-TEST_CASE("Without inertial sensor and odometry the body is the left camera", "[sensors]") {
+TEST_CASE("Without inertial sensor and odometry the body is the left camera") {
   const TemporaryFolder folder;
   std::string chain = kChain;  // Kalibr without an inertial sensor
   const std::string first = "T_cam_imu: [[1,0,0,0], [0,1,0,0], [0,0,1,0], [0,0,0,1]], ";
@@ -200,7 +200,7 @@ TEST_CASE("Without inertial sensor and odometry the body is the left camera", "[
   CHECK(cameras[1].T_body_cam.translation().x() > 0.0);
 }
 
-TEST_CASE("A robot without an inertial sensor may name its odometry", "[sensors]") {
+TEST_CASE("A robot without an inertial sensor may name its odometry") {
   const TemporaryFolder folder;
   folder.write("camchain.yaml", kChain);
   folder.write("poses.tum", "1 0 0 0 0 0 0 1\n");
@@ -216,7 +216,7 @@ TEST_CASE("A robot without an inertial sensor may name its odometry", "[sensors]
   CHECK(file.pose_file == folder.path() / "poses.tum");
 }
 
-TEST_CASE("A missing or wrong key of a rig file is named by file and line", "[sensors]") {
+TEST_CASE("A missing or wrong key of a rig file is named by file and line") {
   const std::string pair = "left: {topic: /a}\nright: {topic: /b}\n";
   const auto [text, message] = GENERATE_COPY(table<std::string, std::string>(
       {{"left: {topic: /a}\nimu: {topic: /i}\n", "one camera does not measure distances"},

@@ -62,7 +62,7 @@ struct Run {
 
 }  // namespace
 
-TEST_CASE("Every packet is published in order, then the end", "[sensors]") {
+TEST_CASE("Every packet is published in order, then the end") {
   const PlaybackPace pace =
       GENERATE(PlaybackPace::fastest(), PlaybackPace{1000.0, true}, PlaybackPace{1000.0, false});
   Run run;
@@ -82,7 +82,7 @@ TEST_CASE("Every packet is published in order, then the end", "[sensors]") {
 }
 
 // Odometry that takes three times the interval of the images.
-TEST_CASE("Images that come too fast are dropped evenly after the map", "[sensors]") {
+TEST_CASE("Images that come too fast are dropped evenly after the map") {
   constexpr double kRate = 10.0;  // an image every 5 ms
   constexpr auto kCost = std::chrono::milliseconds(15);
   Run run;
@@ -106,7 +106,7 @@ TEST_CASE("Images that come too fast are dropped evenly after the map", "[sensor
   }
 }
 
-TEST_CASE("A recording that waits loses no image and no frame of the map", "[sensors]") {
+TEST_CASE("A recording that waits loses no image and no frame of the map") {
   constexpr double kRate = 10.0;  // an image every 5 ms
   constexpr auto kCost = std::chrono::milliseconds(15);
   Run run;
@@ -126,7 +126,7 @@ TEST_CASE("A recording that waits loses no image and no frame of the map", "[sen
   CHECK(end.paused_s > 0.5);
 }
 
-TEST_CASE("A node that waits for the next packet stops at once", "[sensors]") {
+TEST_CASE("A node that waits for the next packet stops at once") {
   Run run;
   std::promise<void> first;
   run.packets.subscribe([&](const auto&) { first.set_value(); });
@@ -140,7 +140,7 @@ TEST_CASE("A node that waits for the next packet stops at once", "[sensors]") {
   CHECK(node.published() == 1);
 }
 
-TEST_CASE("A reader that throws ends the node with its exception", "[sensors]") {
+TEST_CASE("A reader that throws ends the node with its exception") {
   Run run;
   SensorsNode node({}, PlaybackPace::fastest(), std::make_unique<FakeReader>(3, 0.05, true),
                    run.topics());
@@ -221,8 +221,7 @@ int first_with(const Playback& run, auto&& is) {
 
 }  // namespace
 
-TEST_CASE("The map loses its frames first and then odometry every second image and both recover",
-          "[sensors]") {
+TEST_CASE("The map loses its frames first and then odometry every second image and both recover") {
   Playback run{.cost_s = 0.07};
   run.play(400);
   const int map = first_with(run, [](const ShedLoad& load) { return load.map; });
@@ -247,7 +246,7 @@ TEST_CASE("The map loses its frames first and then odometry every second image a
   CHECK(fast.waited_s == 0.0);
 }
 
-TEST_CASE("Odometry keeps the images that it needs and the recording waits", "[sensors]") {
+TEST_CASE("Odometry keeps the images that it needs and the recording waits") {
   // A fifth of the features is lost from image to image. 0.64 of them survive to the second image,
   // 0.41 to the fourth.
   Playback run{.cost_s = 0.25, .share_per_s = std::pow(0.8, 1.0 / kPeriod_s)};
@@ -257,7 +256,7 @@ TEST_CASE("Odometry keeps the images that it needs and the recording waits", "[s
   CHECK(run.worst_lag_s <= 2.0 * kMaxLag_s + run.cost_s);
 }
 
-TEST_CASE("A step that has to be repeated is undone less and less often", "[sensors]") {
+TEST_CASE("A step that has to be repeated is undone less and less often") {
   Playback run{.cost_s = 0.06};
   run.play(4000);
   int changes = 0;
@@ -267,7 +266,7 @@ TEST_CASE("A step that has to be repeated is undone less and less often", "[sens
   CHECK(changes < 40);  // 200 s; with a constant waiting time about one a second
 }
 
-TEST_CASE("A share of tracked features that is no number is ignored", "[sensors]") {
+TEST_CASE("A share of tracked features that is no number is ignored") {
   const double share = GENERATE(std::nan(""), HUGE_VAL, -1.0);
   CAPTURE(share);
   LoadShedding shedding(kMaxLag_s);
@@ -279,7 +278,7 @@ TEST_CASE("A share of tracked features that is no number is ignored", "[sensors]
   CHECK(shedding.max_stride() == LoadShedding::kMaxStride);
 }
 
-TEST_CASE("An impossible lag is refused", "[sensors]") {
+TEST_CASE("An impossible lag is refused") {
   CHECK_THROWS_AS(LoadShedding(-0.1), std::invalid_argument);
   CHECK_THROWS_AS(LoadShedding(std::nan("")), std::invalid_argument);
 }

@@ -14,7 +14,7 @@ constexpr StampVerdict kGood = StampVerdict::kGood, kRepeated = StampVerdict::kR
 constexpr Stamp kDay = 86'400'000'000'000;
 using Verdicts = std::vector<StampVerdict>;
 
-TEST_CASE("One wrong stamp at any place affects no other stamp", "[sensors]") {
+TEST_CASE("One wrong stamp at any place affects no other stamp") {
   const std::size_t place = GENERATE(0U, 1U, 5U, 8U, 9U);
   const Stamp offset = GENERATE(values<Stamp>({kDay, -kDay, 25, -25}));
   std::vector<Stamp> stamps;
@@ -27,7 +27,7 @@ TEST_CASE("One wrong stamp at any place affects no other stamp", "[sensors]") {
   CHECK((verdicts[place] == kGood) == still_in_order);
 }
 
-TEST_CASE("After a clock was set the part with the most stamps is kept", "[sensors]") {
+TEST_CASE("After a clock was set the part with the most stamps is kept") {
   CHECK(judge_stamps(std::vector<Stamp>{1, 2, kDay, kDay + 1, kDay + 2}) ==
         Verdicts{kJump, kJump, kGood, kGood, kGood});
   CHECK(judge_stamps(std::vector<Stamp>{kDay, kDay + 1, 1, 2, 3}) ==
@@ -38,7 +38,7 @@ TEST_CASE("After a clock was set the part with the most stamps is kept", "[senso
         Verdicts{kGood, kGood, kRepeated, kGood, kGood});
 }
 
-TEST_CASE("No other choice of stamps in order keeps more of them", "[sensors]") {
+TEST_CASE("No other choice of stamps in order keeps more of them") {
   CHECK(judge_stamps({}).empty());
   const unsigned seed = GENERATE(range(0U, 50U));
   CAPTURE(seed);
@@ -73,7 +73,7 @@ Verdicts judged_as_they_come(const std::vector<Stamp>& stamps) {
   return verdicts;
 }
 
-TEST_CASE("Stamps of a stream are judged one by one", "[sensors]") {
+TEST_CASE("Stamps of a stream are judged one by one") {
   CHECK(judged_as_they_come({10, 20, 20, 15, 30}) ==
         Verdicts{kGood, kGood, kRepeated, kUnordered, kGood});
   CHECK(judged_as_they_come({10, 20, kDay, 30, -kDay, 40}) ==
@@ -82,7 +82,7 @@ TEST_CASE("Stamps of a stream are judged one by one", "[sensors]") {
   CHECK(judged_as_they_come({10, least, most, 20}) == Verdicts{kGood, kJump, kJump, kGood});
 }
 
-TEST_CASE("The clock of a stream may be set but not back to times already used", "[sensors]") {
+TEST_CASE("The clock of a stream may be set but not back to times already used") {
   // Forward, as by a time server, and also if it began with an invalid stamp.
   CHECK(judged_as_they_come({10, 20, 30, 40, kDay, kDay + 1, kDay + 2, kDay + 3}) ==
         Verdicts{kGood, kGood, kGood, kGood, kJump, kJump, kGood, kGood});
@@ -93,7 +93,7 @@ TEST_CASE("The clock of a stream may be set but not back to times already used",
 
 constexpr Stamp kInterval = 50'000'000;
 
-TEST_CASE("Missing images are counted at any jitter", "[sensors]") {
+TEST_CASE("Missing images are counted at any jitter") {
   const unsigned seed = GENERATE(range(0U, 5U));
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -112,7 +112,7 @@ TEST_CASE("Missing images are counted at any jitter", "[sensors]") {
   CHECK(counted == lost);
 }
 
-TEST_CASE("A new stream or a new rate reports missing images only briefly", "[sensors]") {
+TEST_CASE("A new stream or a new rate reports missing images only briefly") {
   MissingImages missing;
   CHECK(missing.before(kInterval).missing == 0);
   CHECK(missing.before(9 * kInterval).missing == 0);  // the interval is not known yet
@@ -134,7 +134,7 @@ SE3 pose_at(double t_s) {
   return kStart * se3_exp(t_s * kTwist);
 }
 
-TEST_CASE("Between poses the body moves at constant velocity", "[sensors][poses]") {
+TEST_CASE("Between poses the body moves at constant velocity") {
   PoseStream poses;
   for (const double t_s : {10.0, 10.4, 11.0})
     poses.add(nanoseconds(t_s), {pose_at(t_s), t_s * Matrix6::Identity()});
@@ -158,7 +158,7 @@ TEST_CASE("Between poses the body moves at constant velocity", "[sensors][poses]
   CHECK(poses.at(nanoseconds(12.5)));
 }
 
-TEST_CASE("A pause of the cameras bounds the samples and poses that wait", "[sensors][poses]") {
+TEST_CASE("A pause of the cameras bounds the samples and poses that wait") {
   constexpr double kPause_s = 780.0, kRate_hz = 100.0;
   ImuStream imu;
   for (int k = 0; k <= kPause_s * kRate_hz; ++k) imu.add({.stamp = nanoseconds(k / kRate_hz)});
@@ -180,7 +180,7 @@ TEST_CASE("A pause of the cameras bounds the samples and poses that wait", "[sen
   CHECK(joiner.lost() == static_cast<std::size_t>(kPause_s - ImuStream::kLongest_s));
 }
 
-TEST_CASE("A covariance of ROS becomes that of the body's perturbation", "[sensors][poses]") {
+TEST_CASE("A covariance of ROS becomes that of the body's perturbation") {
   const SE3 T_odom_child = pose_at(1.0);
   const SE3 T_child_body = se3_exp((Vector6() << -0.3, 0.5, 0.2, 0.7, -0.4, 0.9).finished());
   const int axis = GENERATE(0, 1, 2, 3, 4, 5);  // axis of ROS: x, y, z, and rotations about them
@@ -198,7 +198,7 @@ TEST_CASE("A covariance of ROS becomes that of the body's perturbation", "[senso
   CHECK(pose.covariance.isApprox(xi * xi.transpose(), 1e-5));
 }
 
-TEST_CASE("A message of an odometry without a valid pose is refused", "[sensors][poses]") {
+TEST_CASE("A message of an odometry without a valid pose is refused") {
   RosOdometry message;
   message.pose.pose.position = {1, 2, 3};
   message.pose.covariance[0] = 0.25;
@@ -213,7 +213,7 @@ TEST_CASE("A message of an odometry without a valid pose is refused", "[sensors]
   CHECK(!measured_pose(message, SE3::Identity()));
 }
 
-TEST_CASE("A file of poses is read row by row", "[sensors][poses]") {
+TEST_CASE("A file of poses is read row by row") {
   const TemporaryFolder folder;
   std::string covariance, negative;
   for (int k = 0; k < 36; ++k) covariance += k % 7 == 0 ? " 0.5" : " 0";
@@ -249,8 +249,7 @@ TEST_CASE("A file of poses is read row by row", "[sensors][poses]") {
                         EndsWith("none.tum line 1: has 3 fields, not 8 or 44"));
 }
 
-TEST_CASE("Packets get the poses of a file and frames without one are counted",
-          "[sensors][poses]") {
+TEST_CASE("Packets get the poses of a file and frames without one are counted") {
   const EurocFolder folder;  // eight frames from 10 s on, at 20 Hz
   folder.write("poses.tum", "10.025 0 0 0 0 0 0 1\n10.075 1 0 0 0 0 0 1\n10.225 4 0 0 0 0 0 1\n");
   PoseFileReader reader(std::make_unique<FolderReader>(open_folder(folder.root())),
@@ -265,7 +264,7 @@ TEST_CASE("Packets get the poses of a file and frames without one are counted",
   CHECK(reader.report().count(ReaderFault::kFrameWithoutPose) == 4);
 }
 
-TEST_CASE("Numbers of sensors outside the usual range are named by their confusions", "[sensors]") {
+TEST_CASE("Numbers of sensors outside the usual range are named by their confusions") {
   struct Case {
     UsualNumber number;
     double value;
@@ -296,7 +295,7 @@ TEST_CASE("Numbers of sensors outside the usual range are named by their confusi
   CHECK(exchanged->id == "imu.exchanged");
 }
 
-TEST_CASE("The first packets of a source show its rates and units once", "[sensors]") {
+TEST_CASE("The first packets of a source show its rates and units once") {
   FirstPackets first;
   std::vector<Doubt> found;
   for (Stamp k = 0; k < 40; ++k) {

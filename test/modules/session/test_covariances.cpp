@@ -111,7 +111,7 @@ void check_against(const MatrixXd& expected, const Stacked& stacked, SolverTeam&
   }
 }
 
-TEST_CASE("Covariances equal those of the dense inverse, with any tree", "[pose_graph]") {
+TEST_CASE("Covariances equal those of the dense inverse, with any tree") {
   const double tilt_sigma = GENERATE(0.0, kSmall);
   CAPTURE(tilt_sigma);
   const TeamProblem problem =
@@ -133,7 +133,7 @@ TEST_CASE("Covariances equal those of the dense inverse, with any tree", "[pose_
   }
 }
 
-TEST_CASE("Held poses of absent robots make covariances absolute", "[pose_graph]") {
+TEST_CASE("Held poses of absent robots make covariances absolute") {
   TeamProblem problem = random_team_problem({.robots = {1, 2, 3},
                                              .pairs = {{1, 2}, {2, 3}, {1, 3}},
                                              .sigma = kSmall,
@@ -146,7 +146,7 @@ TEST_CASE("Held poses of absent robots make covariances absolute", "[pose_graph]
   check_against(2.0 * hessian(problem, stacked).inverse(), stacked, team);
 }
 
-TEST_CASE("Errors of the poses are as large as their covariances say", "[pose_graph]") {
+TEST_CASE("Errors of the poses are as large as their covariances say") {
   double sum = 0.0, count = 0.0;
   for (unsigned seed = 0; seed < 40; ++seed) {
     const TeamProblem problem =
@@ -179,7 +179,7 @@ void add_false_closures(TeamProblem& problem, double spread_m, std::mt19937& rng
   problem.edges = in_order(problem.edges);
 }
 
-TEST_CASE("Rejected closures that agree roughly do not increase the covariances", "[pose_graph]") {
+TEST_CASE("Rejected closures that agree roughly do not increase the covariances") {
   TeamProblem problem = random_team_problem({.robots = {1, 2}, .pairs = {{1, 2}}}, 8);
   std::erase_if(problem.edges,
                 [](const PoseEdge& e) { return e.from.robot == e.to.robot && !is_step(e); });

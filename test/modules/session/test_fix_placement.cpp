@@ -111,8 +111,7 @@ bool each_settles_again(TeamNetwork& network) {
   });
 }
 
-TEST_CASE("fixes with 30 % outliers and a biased block place a run in the absolute frame",
-          "[pose_graph][fixes]") {
+TEST_CASE("fixes with 30 % outliers and a biased block place a run in the absolute frame") {
   TeamNetwork network;
   const auto method = GENERATE(PgoMethod::kNewton, PgoMethod::kRbcd);
   Run run(network, 4, GENERATE(1U, 2U, 3U, 4U, 5U), true, method);
@@ -136,7 +135,7 @@ TEST_CASE("fixes with 30 % outliers and a biased block place a run in the absolu
   CHECK(fixes.residual_m < 2.0 * kSigma_m);  // 1.7 sigmas are the root mean square in three axes
 }
 
-TEST_CASE("fixes do not locate a robot before it has moved", "[pose_graph][fixes]") {
+TEST_CASE("fixes do not locate a robot before it has moved") {
   TeamNetwork network;
   Run still(network, 4, 11, true, PgoMethod::kNewton, 0.003),
       moving(network, 5, 12, true, PgoMethod::kNewton);
@@ -173,7 +172,7 @@ std::vector<ClosureId> close(Run& low, Run& high, const SE3& error = SE3::Identi
   return between;
 }
 
-TEST_CASE("closures bring a robot without fixes into the absolute frame", "[pose_graph][fixes]") {
+TEST_CASE("closures bring a robot without fixes into the absolute frame") {
   TeamNetwork network;
   Run without(network, 2, 21, false, PgoMethod::kNewton);
   Run with(network, 5, 22, true, PgoMethod::kNewton);
@@ -208,8 +207,7 @@ double relative_error_m(const Run& low, const Run& high, std::initializer_list<K
 // The mean errors of the fixes of the two robots are 0.2 m apart. The 118 fixes then contradict the
 // closures by a cost of 118 (0.1 m / 0.3 m)^2 = 13, less than that of six rejected closures. With
 // 0.5 m instead of 0.1 m it is 328, and some seeds reject the closures.
-TEST_CASE("fixes of all robots act on one frame if closures tie the robots",
-          "[pose_graph][fixes]") {
+TEST_CASE("fixes of all robots act on one frame if closures tie the robots") {
   TeamNetwork network;
   using enum PgoMethod;
   const auto [method, seed] = GENERATE(std::pair(kNewton, 41U), std::pair(kNewton, 43U),
@@ -240,8 +238,7 @@ TEST_CASE("fixes of all robots act on one frame if closures tie the robots",
 // The mean errors of the fixes of the two robots are 1 m apart, as those of GNSS on one day may be.
 // As independent errors they would cost 118 (0.5 m / 0.3 m)^2 = 328, enough to reject six true
 // closures. With their correlation time of a minute, 118 fixes count as two.
-TEST_CASE("a common error of the fixes of a robot does not outvote closures",
-          "[pose_graph][fixes]") {
+TEST_CASE("a common error of the fixes of a robot does not outvote closures") {
   TeamNetwork network;
   const unsigned seed = GENERATE(41U, 43U, 45U, 47U, 49U);
   CAPTURE(seed);
@@ -261,7 +258,7 @@ TEST_CASE("a common error of the fixes of a robot does not outvote closures",
 
 // The sum of exp(-|dt| / tau) over equally spaced fixes is coth(dt / (2 tau)) far from the ends,
 // and half of it plus a half at an end.
-TEST_CASE("fixes with correlated errors share their weight", "[pose_graph][fixes]") {
+TEST_CASE("fixes with correlated errors share their weight") {
   constexpr std::size_t kFixes = 1001;
   constexpr double kCorrelation_s = 20.0;
   const std::vector<SE3> poses(kFixes, SE3::Identity());
@@ -285,7 +282,7 @@ TEST_CASE("fixes with correlated errors share their weight", "[pose_graph][fixes
   CHECK(fix_edges(fixes, kept, poses)[500].precision.tau == Approx(4.0));
 }
 
-TEST_CASE("false closures between robots in one datum are rejected", "[pose_graph][fixes]") {
+TEST_CASE("false closures between robots in one datum are rejected") {
   TeamNetwork network;
   const unsigned seed = GENERATE(51U, 53U, 55U);
   CAPTURE(seed);
@@ -304,8 +301,7 @@ TEST_CASE("false closures between robots in one datum are rejected", "[pose_grap
   }
 }
 
-TEST_CASE("fixes of one robot that are 39 km away leave others in their frame, with closures",
-          "[pose_graph][fixes]") {
+TEST_CASE("fixes of one robot that are 39 km away leave others in their frame, with closures") {
   TeamNetwork network;
   const bool is_scattered = GENERATE(true, false), are_joined = GENERATE(true, false);
   const RobotId id = GENERATE(RobotId{1}, RobotId{9});
@@ -333,8 +329,7 @@ TEST_CASE("fixes of one robot that are 39 km away leave others in their frame, w
   }
 }
 
-TEST_CASE("robots share an absolute frame without closures if they have one datum",
-          "[pose_graph][fixes]") {
+TEST_CASE("robots share an absolute frame without closures if they have one datum") {
   TeamNetwork network;
   Run low(network, 3, 31, true, PgoMethod::kNewton), high(network, 6, 32, true, PgoMethod::kNewton);
   const bool is_one_datum = GENERATE(true, false);

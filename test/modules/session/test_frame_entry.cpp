@@ -34,7 +34,7 @@ struct Drifted {
 
 }  // namespace
 
-TEST_CASE("a drifted trajectory is deformed to the poses of other robots", "[pose_graph]") {
+TEST_CASE("a drifted trajectory is deformed to the poses of other robots") {
   const unsigned seed = GENERATE(1U, 2U, 3U);
   CAPTURE(seed);
   const Drifted robot(seed);
@@ -56,14 +56,14 @@ TEST_CASE("a drifted trajectory is deformed to the poses of other robots", "[pos
   CHECK(robot.equals_truth(deformed_to_received(robot.poses, 1, robot.own, closures, received)));
 }
 
-TEST_CASE("the chordal initialisation replaces poses of a higher cost only", "[pose_graph]") {
+TEST_CASE("the chordal initialisation replaces poses of a higher cost only") {
   const Drifted robot(4);
   CHECK(robot.equals_truth(better_of_chordal(robot.poses, robot.own)));
   const std::vector<SE3> kept = better_of_chordal(robot.truth, robot.own);
   for (std::size_t k = 0; k < kept.size(); ++k) CHECK(kept[k].isApprox(robot.truth[k], 1e-9));
 }
 
-TEST_CASE("a robot alone reports whether its rounds suffice", "[pose_graph]") {
+TEST_CASE("a robot alone reports whether its rounds suffice") {
   Drifted robot(5);
   robot.own.push_back({{1, 2}, {1, 27}, robot.truth[2].inverse() * robot.truth[27], {100.0, 10.0}});
   const SessionGraph graph{.self = 1, .start = robot.poses, .own = robot.own};

@@ -14,22 +14,21 @@ TeamStatus status_of(RobotId robot, std::vector<EdgeSetOffer> offers) {
 
 }  // namespace
 
-TEST_CASE("Robots that one place ties are tentative, with all robots behind them", "[frame_ties]") {
+TEST_CASE("Robots that one place ties are tentative, with all robots behind them") {
   const std::vector<RobotTie> ties{{0, 1, 2}, {1, 2, 1}, {2, 3, 5}};
   CHECK(frame_ties(0, kMembers, ties) == FrameTies{{2, 3}, {4}});
   CHECK(frame_ties(3, kMembers, ties) == FrameTies{{0, 1}, {4}});
   CHECK(frame_ties(4, kMembers, ties) == FrameTies{{}, {0, 1, 2, 3}});
 }
 
-TEST_CASE("A circle of robots with one place for each pair is certain", "[frame_ties]") {
+TEST_CASE("A circle of robots with one place for each pair is certain") {
   const std::vector<RobotTie> circle{{0, 1, 1}, {0, 4, 1}, {1, 2, 1}, {2, 3, 1}, {3, 4, 1}};
   for (const RobotId self : kMembers) CHECK(frame_ties(self, kMembers, circle) == FrameTies{});
   const std::span<const RobotTie> chain(circle.data() + 1, 4);
   CHECK(frame_ties(0, kMembers, chain) == FrameTies{{1, 2, 3, 4}, {}});
 }
 
-TEST_CASE("A single place that another one contradicts ties nothing, unless a circle confirms it",
-          "[frame_ties]") {
+TEST_CASE("A single place that another one contradicts ties nothing, unless a circle confirms it") {
   const std::vector<RobotTie> chain{{0, 1, 2}, {1, 2, 1, true}, {2, 3, 1}};
   CHECK(frame_ties(0, kMembers, chain) == FrameTies{{}, {2, 3, 4}});
   CHECK(frame_ties(2, kMembers, chain) == FrameTies{{3}, {0, 1, 4}});
@@ -37,8 +36,7 @@ TEST_CASE("A single place that another one contradicts ties nothing, unless a ci
   CHECK(frame_ties(0, kMembers, circle) == FrameTies{{}, {3, 4}});
 }
 
-TEST_CASE("Several places that others contradict tie nothing, not even in a circle",
-          "[frame_ties]") {
+TEST_CASE("Several places that others contradict tie nothing, not even in a circle") {
   const std::vector<RobotTie> chain{{0, 1, 2}, {1, 2, 4, true}, {2, 3, 2}};
   CHECK(frame_ties(0, kMembers, chain) == FrameTies{{}, {2, 3, 4}});
   CHECK(frame_ties(2, kMembers, chain) == FrameTies{{}, {0, 1, 4}});
@@ -48,7 +46,7 @@ TEST_CASE("Several places that others contradict tie nothing, not even in a circ
   CHECK(frame_ties(0, kMembers, detour) == FrameTies{{}, {3, 4}});
 }
 
-TEST_CASE("Being tentative is mutual", "[frame_ties]") {
+TEST_CASE("Being tentative is mutual") {
   std::mt19937 rng(1);
   std::uniform_int_distribution<std::uint32_t> places(0, 2);
   const auto holds = [](const Robots& robots, RobotId id) {
@@ -69,8 +67,7 @@ TEST_CASE("Being tentative is mutual", "[frame_ties]") {
   }
 }
 
-TEST_CASE("The robots of a pair both report their places, and the lower number counts",
-          "[frame_ties]") {
+TEST_CASE("The robots of a pair both report their places, and the lower number counts") {
   const std::map<RobotId, TeamStatus> statuses{
       {0, status_of(0, {{1, 9, {2, 7}, 3}, {1, 8, {1, 6}, 1}, {2, 1, {1, 5}, 1, true}})},
       {1, status_of(1, {{0, 9, {2, 7}, 2}, {2, 4, {1, 4}, 0}})},

@@ -99,8 +99,7 @@ bool settle_again(TeamNetwork& network) {
   return settle(network, 60.0);
 }
 
-TEST_CASE("a run is located once closures at two places tie it to the map",
-          "[pose_graph][later_runs]") {
+TEST_CASE("a run is located once closures at two places tie it to the map") {
   TeamNetwork network;
   const RobotId robot = GENERATE(RobotId{4}, std::numeric_limits<RobotId>::max());
   LaterRun run(network, robot, GENERATE(1U, 2U, 3U));
@@ -118,7 +117,7 @@ TEST_CASE("a run is located once closures at two places tie it to the map",
   CHECK(run.error_m() < kDrift_m);
 }
 
-TEST_CASE("a run that never sees the map is solved by itself", "[pose_graph][later_runs]") {
+TEST_CASE("a run that never sees the map is solved by itself") {
   TeamNetwork network;
   LaterRun run(network, 4, 21);
   for (KeyframeIndex i = 1; i <= 28; ++i) run.close(i, i + 30, SE3::Identity());
@@ -126,7 +125,7 @@ TEST_CASE("a run that never sees the map is solved by itself", "[pose_graph][lat
   CHECK_FALSE(run.is_located());
 }
 
-TEST_CASE("a place that looks like another does not locate a run", "[pose_graph][later_runs]") {
+TEST_CASE("a place that looks like another does not locate a run") {
   TeamNetwork network;
   LaterRun run(network, 4, GENERATE(11U, 12U, 13U, 14U, 15U, 16U));
   const SE3 error = run.random_error();
@@ -139,8 +138,7 @@ TEST_CASE("a place that looks like another does not locate a run", "[pose_graph]
   CHECK(run.error_m() < kDrift_m);
 }
 
-TEST_CASE("a robot that is located in a map brings robots that closures tie to it into the map",
-          "[pose_graph][later_runs]") {
+TEST_CASE("a robot that is located in a map brings robots that closures tie to it into the map") {
   TeamNetwork network;
   LaterRun lost(network, 4, 31), located(network, 9, 32);
   for (const KeyframeIndex i : {5U, 6U, 7U, 30U, 31U, 32U}) located.close(i);

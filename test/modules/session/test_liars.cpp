@@ -228,8 +228,8 @@ constexpr double kTooHuge = 1e14;  // refused
 
 }  // namespace
 
-TEST_CASE("one robot of four that others contradict adds at most a fifth of the noise of a closure",
-          "[pose_graph][liars]") {
+TEST_CASE(
+    "one robot of four that others contradict adds at most a fifth of the noise of a closure") {
   const auto lie = GENERATE(
       Lie{.liar = 1, .offset_m = 0.5, .closures = 100},
       Lie{.liar = 1, .offset_m = 50.0, .closures = 100},
@@ -245,31 +245,26 @@ TEST_CASE("one robot of four that others contradict adds at most a fifth of the 
 
 // Up to 16 closures of a pair that stand alone are weighed like all others; more are deferred.
 TEST_CASE(
-    "a few random false closures of one robot of four add at most half the noise of a closure",
-    "[pose_graph][liars]") {
+    "a few random false closures of one robot of four add at most half the noise of a closure") {
   check_cost({.liar = 4, .offset_m = 5.0, .closures = 100, .consistent = false}, 0.5 * kNoise_m);
 }
 
-TEST_CASE("one robot of four without a true closure adds at most the noise of a closure",
-          "[pose_graph][liars]") {
+TEST_CASE("one robot of four without a true closure adds at most the noise of a closure") {
   const RobotId liar = GENERATE(RobotId{1}, RobotId{4});
   check_cost({.liar = liar, .offset_m = 0.5, .closures = 1000, .only_lies = true}, kNoise_m);
 }
 
 // The damage jumps with the estimated noise of the team: in ten of twelve teams it is below 0.1 m,
 // and in two it is 0.16 m.
-TEST_CASE("one robot of four without a true closure that is far off adds at most twice the noise",
-          "[pose_graph][liars]") {
+TEST_CASE("one robot of four without a true closure that is far off adds at most twice the noise") {
   check_cost({.liar = 4, .offset_m = 5.0, .closures = 1000, .only_lies = true}, 2.0 * kNoise_m);
 }
 
-TEST_CASE("wrong odometry of one robot of four adds at most twice the noise of a closure",
-          "[pose_graph][liars]") {
+TEST_CASE("wrong odometry of one robot of four adds at most twice the noise of a closure") {
   check_cost({.liar = 1, .stretched = 1.1, .odometry_variance = kTiny}, kWrongOdometry_m);
 }
 
-TEST_CASE("odometry that claims no precision at all does not stop the team",
-          "[pose_graph][liars]") {
+TEST_CASE("odometry that claims no precision at all does not stop the team") {
   const double stretched = GENERATE(1.1, 10.0);
   check_cost({.liar = 4, .stretched = stretched, .odometry_variance = kHuge}, 2.0 * kNoise_m);
 }

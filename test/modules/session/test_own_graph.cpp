@@ -35,7 +35,7 @@ constexpr ClosureId kSecond{{5, 2}, {9, 2}};
 
 }  // namespace
 
-TEST_CASE("Ids do not decide which of two equally precise closures counts", "[own_graph]") {
+TEST_CASE("Ids do not decide which of two equally precise closures counts") {
   const auto closure = [](RobotId from, KeyframeIndex i, RobotId to, KeyframeIndex k) {
     return PoseEdge{.from = {from, i}, .to = {to, k}, .precision = {2.0, 3.0}};
   };
@@ -44,7 +44,7 @@ TEST_CASE("Ids do not decide which of two equally precise closures counts", "[ow
   CHECK(forward_is_better == is_better(closure(4, 5, 1, 9), closure(1, 9, 4, 5)));
 }
 
-TEST_CASE("an edge set is offered once all its closures are known", "[own_graph]") {
+TEST_CASE("an edge set is offered once all its closures are known") {
   OwnGraph graph = graph_of(5, 2);
   REQUIRE(graph.add(InlierSet{5, 9, 3, {kFirstClosure, kSecond}}));
   CHECK(graph.offers().empty());
@@ -67,7 +67,7 @@ TEST_CASE("an edge set is offered once all its closures are known", "[own_graph]
   CHECK(graph.edges(9, {3, offer.id.hash + 1}) == nullptr);
 }
 
-TEST_CASE("both robots compute equal ids of an edge set, for any order of arrival", "[own_graph]") {
+TEST_CASE("both robots compute equal ids of an edge set, for any order of arrival") {
   OwnGraph graph = graph_of(5, 3);
   OwnGraph other = graph_of(9, 5);
   for (OwnGraph* end : {&graph, &other})
@@ -82,7 +82,7 @@ TEST_CASE("both robots compute equal ids of an edge set, for any order of arriva
   CHECK(graph.offers()[1].id == other.offers().front().id);
 }
 
-TEST_CASE("a closure measured from both ends counts once, the better one", "[own_graph]") {
+TEST_CASE("a closure measured from both ends counts once, the better one") {
   OwnGraph graph = graph_of(5, 3);
   OwnGraph other = graph_of(9, 5);
   const Closure coarse = measured(kFirstClosure, 2.0);
@@ -107,7 +107,7 @@ TEST_CASE("a closure measured from both ends counts once, the better one", "[own
   }
 }
 
-TEST_CASE("both robots choose the same one of two equally good measurements", "[own_graph]") {
+TEST_CASE("both robots choose the same one of two equally good measurements") {
   Closure x = measured(kFirstClosure), y = measured(kFirstClosure);
   SECTION("from either side") {
     std::swap(y.from, y.to);
@@ -123,7 +123,7 @@ TEST_CASE("both robots choose the same one of two equally good measurements", "[
   CHECK(graph.offers().front().id == other.offers().front().id);
 }
 
-TEST_CASE("a restarted peer is removed from the graph", "[own_graph]") {
+TEST_CASE("a restarted peer is removed from the graph") {
   OwnGraph graph = graph_of(5, 3);
   REQUIRE(graph.add(measured(kFirstClosure)));
   REQUIRE(graph.add(InlierSet{5, 9, 8, {kFirstClosure}}));
@@ -136,8 +136,7 @@ TEST_CASE("a restarted peer is removed from the graph", "[own_graph]") {
   CHECK(graph.offers().size() == 1);
 }
 
-TEST_CASE("measurements of other robots, or without usable covariance, are ignored",
-          "[own_graph]") {
+TEST_CASE("measurements of other robots, or without usable covariance, are ignored") {
   OwnGraph graph = graph_of(5, 3);
   CHECK_FALSE(graph.add(measured({1, 0}, {2, 0})));
   CHECK_FALSE(graph.add(measured({5, 0}, {5, 0})));
@@ -161,7 +160,7 @@ TEST_CASE("measurements of other robots, or without usable covariance, are ignor
   CHECK(graph.own_edges().size() == 2);
 }
 
-TEST_CASE("the number of closures to one peer is limited", "[own_graph]") {
+TEST_CASE("the number of closures to one peer is limited") {
   OwnGraph graph = graph_of(5, 1);
   constexpr auto kMost = static_cast<std::uint32_t>(OwnGraph::kMaxClosures);
   for (std::uint32_t i = 0; i < kMost; ++i) REQUIRE(graph.add(measured({9, i}, {5, 0})));
@@ -175,7 +174,7 @@ TEST_CASE("the number of closures to one peer is limited", "[own_graph]") {
   CHECK(graph.add(measured({9, kMost}, {5, 0})));
 }
 
-TEST_CASE("closures inside the robot are among its own edges", "[own_graph]") {
+TEST_CASE("closures inside the robot are among its own edges") {
   OwnGraph graph = graph_of(5, 4);
   const std::uint32_t before = graph.revision();
   REQUIRE(graph.add(InlierSet{5, 5, 1, {{{5, 3}, {5, 0}}}}));

@@ -71,7 +71,7 @@ struct TwoRobots {
 
 }  // namespace
 
-TEST_CASE("between sessions a robot follows its new closures, without a message", "[pose_graph]") {
+TEST_CASE("between sessions a robot follows its new closures, without a message") {
   TwoRobots team(0.1);
   REQUIRE(team.is_before_next_session());
   const std::vector<SE3> refined = team.network.robots.at(1).trajectory->T_world_kf;
@@ -97,13 +97,13 @@ TEST_CASE("between sessions a robot follows its new closures, without a message"
   CHECK(team.network.robots.at(1).trajectory->T_world_kf.size() == kAll);
 }
 
-TEST_CASE("without refinements a robot keeps its poses until the next session", "[pose_graph]") {
+TEST_CASE("without refinements a robot keeps its poses until the next session") {
   TwoRobots team(0.0);
   REQUIRE(team.is_before_next_session());
   CHECK(team.network.robots.at(1).trajectory->T_world_kf.size() == kFirst);
 }
 
-TEST_CASE("refinements take at most a twentieth of the time", "[pose_graph]") {
+TEST_CASE("refinements take at most a twentieth of the time") {
   RefinementSchedule schedule(5.0);
   CHECK_FALSE(schedule.is_due(0, 0.0));  // no closure
   CHECK(schedule.is_due(1, 0.0));

@@ -8,7 +8,7 @@ SolverMessage solver_message(RobotId to, std::uint8_t content) {
   return {to, std::make_shared<const std::vector<std::uint8_t>>(1, content)};
 }
 
-TEST_CASE("a large message is repeated more rarely than a small one", "[pose_graph][channel]") {
+TEST_CASE("a large message is repeated more rarely than a small one") {
   ReliableChannel channel({1, 1}, {}, 1.0);
   const SolverMessage large{3, std::make_shared<const std::vector<std::uint8_t>>(1'000'000)};
   (void)channel.write(solver_message(2, 10), 0.0);
@@ -29,7 +29,7 @@ TEST_CASE("a large message is repeated more rarely than a small one", "[pose_gra
   CHECK(std::ranges::any_of(due, [](const ReliableMessage& message) { return message.to == 3; }));
 }
 
-TEST_CASE("messages are repeated until they are acknowledged", "[pose_graph][channel]") {
+TEST_CASE("messages are repeated until they are acknowledged") {
   ReliableChannel a({1, 1}, {}, 1.0), b({2, 1}, {}, 1.0);
   const auto arrives = [](ReliableChannel& at, const ReliableMessage& message, double now_s) {
     const bool is_new = at.read(message, now_s) == ReliableArrival::kNew;

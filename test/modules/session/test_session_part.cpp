@@ -86,7 +86,7 @@ struct Correspondence {
 
 }  // namespace
 
-TEST_CASE("a message that the solver cannot take yet is repeated", "[pose_graph][session]") {
+TEST_CASE("a message that the solver cannot take yet is repeated") {
   Correspondence c;
   (void)c.begin(0.0);
   const ReliableMessage first = c.write_number(0), second = c.write_number(1);
@@ -98,8 +98,7 @@ TEST_CASE("a message that the solver cannot take yet is repeated", "[pose_graph]
   CHECK(c.others.due(1000.0).empty());
 }
 
-TEST_CASE("messages before the solver begins are not lost, in any number and order",
-          "[pose_graph][session]") {
+TEST_CASE("messages before the solver begins are not lost, in any number and order") {
   constexpr std::uint32_t kMessages = 1500;
   Correspondence c;
   std::vector<ReliableMessage> messages;
@@ -112,8 +111,7 @@ TEST_CASE("messages before the solver begins are not lost, in any number and ord
   CHECK(c.others.due(1000.0).empty());
 }
 
-TEST_CASE("a robot computes with the public poses that the other robots receive, to the last bit",
-          "[pose_graph][session]") {
+TEST_CASE("a robot computes with the public poses that the other robots receive, to the last bit") {
   std::mt19937 rng(5);
   FrozenPart frozen{.graph = {.self = kSelf.robot},
                     .place = {.children = {2}, .members = {1, 2}, .root = 1},
@@ -143,7 +141,7 @@ TEST_CASE("a robot computes with the public poses that the other robots receive,
     CHECK(received[k].pose().matrix() == start[k].matrix());
 }
 
-TEST_CASE("refused messages do not keep a session alive", "[pose_graph][session]") {
+TEST_CASE("refused messages do not keep a session alive") {
   Correspondence c;
   CHECK(c.part.receive(c.write({1, 2, 3}), 0.0));  // not detectable before the solver begins
   CHECK(c.begin(0.0) == std::vector<RobotId>{2});

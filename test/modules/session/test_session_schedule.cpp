@@ -17,7 +17,7 @@ double wait_s(SessionSchedule& schedule, std::uint64_t closures, bool all_joined
   }
 }
 
-TEST_CASE("A status that has not changed is not sent", "[status_schedule]") {
+TEST_CASE("A status that has not changed is not sent") {
   StatusSchedule schedule;
   TeamStatus status;
   status.keyframes = 5;
@@ -28,8 +28,7 @@ TEST_CASE("A status that has not changed is not sent", "[status_schedule]") {
   CHECK(schedule.due(status, 1.9) == Due::kNo);
 }
 
-TEST_CASE("A changed status is sent twice per period, one with a grown graph once",
-          "[status_schedule]") {
+TEST_CASE("A changed status is sent twice per period, one with a grown graph once") {
   StatusSchedule schedule;
   TeamStatus status;
   status.keyframes = 5;
@@ -49,8 +48,7 @@ TEST_CASE("A changed status is sent twice per period, one with a grown graph onc
 
 }  // namespace
 
-TEST_CASE("Sessions become rarer while robots find closures inside themselves only",
-          "[pose_graph][session]") {
+TEST_CASE("Sessions become rarer while robots find closures inside themselves only") {
   PoseGraphConfig config;
   config.session_wait_s = 60.0;
   config.session_growth = 1.0;
@@ -66,8 +64,7 @@ TEST_CASE("Sessions become rarer while robots find closures inside themselves on
   CHECK(schedule.is_worthwhile(0.0, 12.0));  // the graph rests
 }
 
-TEST_CASE("Sessions come four times as soon while the place of a robot is not certain",
-          "[pose_graph][session]") {
+TEST_CASE("Sessions come four times as soon while the place of a robot is not certain") {
   PoseGraphConfig config;
   config.session_wait_s = 60.0;
   config.session_growth = 2.0;

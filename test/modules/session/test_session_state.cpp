@@ -14,8 +14,7 @@ constexpr SessionEvent kEvents[] = {SessionEvent::kEntered,    SessionEvent::kGa
                                     SessionEvent::kBroken,     SessionEvent::kCompleted,
                                     SessionEvent::kInterrupted};
 
-TEST_CASE("Each state and event has at most one row, and without a row nothing changes",
-          "[pose_graph][session]") {
+TEST_CASE("Each state and event has at most one row, and without a row nothing changes") {
   for (const SessionState state : kStates)
     for (const SessionEvent event : kEvents) {
       CAPTURE(int(state), int(event));
@@ -32,8 +31,7 @@ TEST_CASE("Each state and event has at most one row, and without a row nothing c
     }
 }
 
-TEST_CASE("A session can be interrupted in each state, and completed by those with the solution",
-          "[pose_graph][session]") {
+TEST_CASE("A session can be interrupted in each state, and completed by those with the solution") {
   for (const SessionState state : kStates) {
     CHECK_FALSE(is_running(next_state(state, SessionEvent::kInterrupted)));
     const bool completes = next_state(state, SessionEvent::kCompleted) == SessionState::kDone;

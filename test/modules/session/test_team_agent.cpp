@@ -34,7 +34,7 @@ void check_optimum(const TeamNetwork& network, const TeamProblem& problem) {
 
 }  // namespace
 
-TEST_CASE("one robot alone solves its own graph", "[pose_graph][agent]") {
+TEST_CASE("one robot alone solves its own graph") {
   const TeamProblem problem = random_team_problem({.robots = {4}, .keyframes = 12}, 1);
   PoseGraphConfig config;
   config.robust = GENERATE(true, false);  // not robust: from chordal initialisation
@@ -45,7 +45,7 @@ TEST_CASE("one robot alone solves its own graph", "[pose_graph][agent]") {
   CHECK(network.robots.at(4).bytes == 0);
 }
 
-TEST_CASE("the frame at the end is the odometry frame of the lowest robot", "[pose_graph][agent]") {
+TEST_CASE("the frame at the end is the odometry frame of the lowest robot") {
   const TeamProblem problem = ring(2);
   PoseGraphConfig config;
   config.robust = GENERATE(true, false);
@@ -67,8 +67,7 @@ TEST_CASE("the frame at the end is the odometry frame of the lowest robot", "[po
   CHECK(network.robots.at(7).trajectory->T_world_kf[0].isApprox(T_odom_first, 1e-6));
 }
 
-TEST_CASE("a robot that resumes, or restarts without its data, takes part again",
-          "[pose_graph][agent]") {
+TEST_CASE("a robot that resumes, or restarts without its data, takes part again") {
   const RobotId back = GENERATE(RobotId{7}, RobotId{50});
   const bool chain = GENERATE(true, false);
   const bool resumes = GENERATE(true, false);
@@ -91,8 +90,7 @@ TEST_CASE("a robot that resumes, or restarts without its data, takes part again"
   check_optimum(network, problem);
 }
 
-TEST_CASE("a robot resumed without its team continues from the last solution",
-          "[pose_graph][agent]") {
+TEST_CASE("a robot resumed without its team continues from the last solution") {
   const RobotId resumed = GENERATE(RobotId{33}, RobotId{1200});
   CAPTURE(resumed);
   const TeamProblem problem = ring(9);
@@ -125,7 +123,7 @@ TEST_CASE("a robot resumed without its team continues from the last solution",
     CHECK((T.matrix() - solution.trajectory.public_poses.at(id).matrix()).norm() < kSame);
 }
 
-TEST_CASE("decisions on closures are valid for both robots", "[pose_graph][agent]") {
+TEST_CASE("decisions on closures are valid for both robots") {
   TeamProblem problem = ring(4);
   PoseEdge wrong = problem.edges.back();
   wrong.from = {7, 3};
@@ -147,8 +145,7 @@ TEST_CASE("decisions on closures are valid for both robots", "[pose_graph][agent
   CHECK_FALSE(network.agent(50).decided().contains(wrong.id()));
 }
 
-TEST_CASE("a graph that cannot be solved ends the session for all, with a notice",
-          "[pose_graph][agent]") {
+TEST_CASE("a graph that cannot be solved ends the session for all, with a notice") {
   const bool throws = GENERATE(true, false);
   CAPTURE(throws);
   const ScriptedSolver::Options options = throws ? ScriptedSolver::Options{.fails_in_round = 4}
@@ -181,8 +178,7 @@ std::optional<SessionId> session_of(const TeamMessage& message) {
       message);
 }
 
-TEST_CASE("the member that has sent most determines the wait for the next session",
-          "[pose_graph][agent]") {
+TEST_CASE("the member that has sent most determines the wait for the next session") {
   const std::vector<RobotId> ids{7, 33, 50};
   constexpr double kBudget_kb_s = 5.0;
   std::vector<std::pair<RobotId, RobotId>> pairs(8, {33, 50});
@@ -216,7 +212,7 @@ TEST_CASE("the member that has sent most determines the wait for the next sessio
   CHECK(waited_s < 1.1 * price_s + 2.0);
 }
 
-TEST_CASE("early stopping ends a session after the given rounds", "[pose_graph][agent]") {
+TEST_CASE("early stopping ends a session after the given rounds") {
   const TeamProblem problem = ring(10);
   PoseGraphConfig config;
   config.max_rounds = 2;
@@ -226,8 +222,7 @@ TEST_CASE("early stopping ends a session after the given rounds", "[pose_graph][
   for (const RobotId id : kIds) CHECK(network.agent(id).part()->progress().round == 2);
 }
 
-TEST_CASE("robots with different methods optimise separately, with a notice",
-          "[pose_graph][agent]") {
+TEST_CASE("robots with different methods optimise separately, with a notice") {
   const TeamProblem problem = ring(13);
   TeamNetwork network;
   for (const RobotId id : kIds) {
@@ -244,7 +239,7 @@ TEST_CASE("robots with different methods optimise separately, with a notice",
   CHECK_THAT(network.robots.at(7).notices.front(), Contains("another method"));
 }
 
-TEST_CASE("refused inputs are counted, with a notice", "[pose_graph][agent]") {
+TEST_CASE("refused inputs are counted, with a notice") {
   TeamAgent agent({}, {7, 1}, gather());
   KeyframeOdometry keyframe;
   keyframe.id = {7, 5};
@@ -267,7 +262,7 @@ TEST_CASE("refused inputs are counted, with a notice", "[pose_graph][agent]") {
   CHECK(agent.step(0.2, 0).notices.empty());  // third refusal
 }
 
-TEST_CASE("false messages are refused or do no lasting harm", "[pose_graph][agent]") {
+TEST_CASE("false messages are refused or do no lasting harm") {
   const unsigned seed = GENERATE(range(1U, 7U));
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -322,8 +317,7 @@ TEST_CASE("false messages are refused or do no lasting harm", "[pose_graph][agen
   check_optimum(network, problem);
 }
 
-TEST_CASE("verdicts on unknown closures, or from robots outside the session, decide nothing",
-          "[pose_graph][agent]") {
+TEST_CASE("verdicts on unknown closures, or from robots outside the session, decide nothing") {
   const TeamProblem problem = ring(11);
   TeamNetwork network;
   for (const RobotId id : kIds) feed(network.add({id, 1}, {}, gather()), id, problem);
@@ -355,7 +349,7 @@ TEST_CASE("verdicts on unknown closures, or from robots outside the session, dec
   CHECK(victim.part()->cost().last_activity_s == last_activity_s);  // the session is over
 }
 
-TEST_CASE("a session with unknown closures is refused", "[pose_graph][agent]") {
+TEST_CASE("a session with unknown closures is refused") {
   const TeamProblem problem = ring(11);
   TeamNetwork network;
   for (const RobotId id : kIds) feed(network.add({id, 1}, {}, gather()), id, problem);
@@ -372,7 +366,7 @@ TEST_CASE("a session with unknown closures is refused", "[pose_graph][agent]") {
   CHECK(agent.part()->session().id == running.id);
 }
 
-TEST_CASE("every message may arrive late, twice and in any order", "[pose_graph][agent]") {
+TEST_CASE("every message may arrive late, twice and in any order") {
   const unsigned seed = GENERATE(1U, 2U, 3U);
   CAPTURE(seed);
   const TeamProblem problem = ring(seed);

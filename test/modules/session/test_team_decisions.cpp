@@ -100,8 +100,7 @@ void check_cost(const TeamNetwork& network, const TeamProblem& problem) {
 
 }  // namespace
 
-TEST_CASE("random false closures are rejected and leave the optimum of the true ones",
-          "[pose_graph][decisions]") {
+TEST_CASE("random false closures are rejected and leave the optimum of the true ones") {
   const unsigned seed = GENERATE(range(1U, 13U));
   CAPTURE(seed);
   TeamProblem problem = problem_of(seed);
@@ -116,8 +115,7 @@ TEST_CASE("random false closures are rejected and leave the optimum of the true 
   check_cost(network, without(problem, wrong));
 }
 
-TEST_CASE("false closures that agree with each other are rejected if others contradict them",
-          "[pose_graph][decisions]") {
+TEST_CASE("false closures that agree with each other are rejected if others contradict them") {
   const unsigned seed = GENERATE(range(1U, 5U));
   const std::uint32_t count = GENERATE(2U, 4U, 6U);
   CAPTURE(seed, count);
@@ -132,8 +130,7 @@ TEST_CASE("false closures that agree with each other are rejected if others cont
   check_cost(network, without(problem, wrong));
 }
 
-TEST_CASE("a wrong step of odometry is corrected, and closures are kept",
-          "[pose_graph][decisions]") {
+TEST_CASE("a wrong step of odometry is corrected, and closures are kept") {
   const unsigned seed = GENERATE(range(1U, 6U));
   CAPTURE(seed);
   TeamProblem problem = random_team_problem(
@@ -155,8 +152,7 @@ TEST_CASE("a wrong step of odometry is corrected, and closures are kept",
   }));
 }
 
-TEST_CASE("a session after new closures decides on all as a single session does",
-          "[pose_graph][decisions]") {
+TEST_CASE("a session after new closures decides on all as a single session does") {
   const unsigned seed = GENERATE(range(1U, 6U));
   CAPTURE(seed);
   TeamProblem all = problem_of(seed);
@@ -189,8 +185,7 @@ TEST_CASE("a session after new closures decides on all as a single session does"
       CHECK((network.trajectories().at(robot)[k].matrix() - poses[k].matrix()).norm() < kSame_m);
 }
 
-TEST_CASE("the second look of a session gets the decisions of the first, and decides",
-          "[pose_graph][decisions]") {
+TEST_CASE("the second look of a session gets the decisions of the first, and decides") {
   const TeamProblem problem = problem_of(3);
   const ClosureId closure = first_between(problem, 5, 9);
   const bool fits = GENERATE(true, false);
@@ -224,8 +219,7 @@ TEST_CASE("the second look of a session gets the decisions of the first, and dec
     CHECK(network.agent(robot).decided().at(closure) == fits);
 }
 
-TEST_CASE("decisions that a team makes without a robot do not outlast its absence",
-          "[pose_graph][decisions]") {
+TEST_CASE("decisions that a team makes without a robot do not outlast its absence") {
   const TeamProblem problem = problem_of(3);
   const ClosureId closure = first_between(problem, 2, 3);
   const MemberSolverFactory factory = [&](const Session&, SessionGraph graph, TreePlace place) {
@@ -252,8 +246,7 @@ TEST_CASE("decisions that a team makes without a robot do not outlast its absenc
   check_ends_agree(network);
 }
 
-TEST_CASE("closures to a robot out of reach that no session has kept move no robot",
-          "[pose_graph][decisions]") {
+TEST_CASE("closures to a robot out of reach that no session has kept move no robot") {
   TeamProblem problem = problem_of(3);
   TeamNetwork network;
   add_four(network, problem);

@@ -15,7 +15,7 @@ void link(TeamLinks& links, const std::vector<std::pair<RobotId, RobotId>>& pair
 
 }  // namespace
 
-TEST_CASE("a link counts if both of its robots report it", "[core]") {
+TEST_CASE("a link counts if both of its robots report it") {
   TeamLinks links;
   CHECK(links.report(1, {2}));
   CHECK_FALSE(links.report(1, {2}));
@@ -29,7 +29,7 @@ TEST_CASE("a link counts if both of its robots report it", "[core]") {
   CHECK_FALSE(links.linked(1, 2));
 }
 
-TEST_CASE("a team is the connected component of links, with shortest paths", "[core]") {
+TEST_CASE("a team is the connected component of links, with shortest paths") {
   TeamLinks links;
   // A ring of five, a tail at 3, and two separate robots.
   link(links, {{1, 2}, {2, 3}, {3, 4}, {4, 5}, {1, 5}, {3, 9}, {20, 21}});

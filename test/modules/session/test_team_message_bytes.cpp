@@ -112,7 +112,7 @@ void check_refused(const T& message, const std::map<std::string, std::function<v
 
 // Every field of these messages has a value of its own. Equal bytes after decoding and encoding
 // therefore mean that decoding restores every field.
-TEST_CASE("Decoding restores an encoded message", "[pose_graph]") {
+TEST_CASE("Decoding restores an encoded message") {
   for (const TeamMessage& message : one_of_each()) {
     CAPTURE(message.index());
     const Bytes bytes = encode(message);
@@ -125,7 +125,7 @@ TEST_CASE("Decoding restores an encoded message", "[pose_graph]") {
   CHECK(round_trip(some_reliable_message()).to == some_reliable_message().to);
 }
 
-TEST_CASE("Messages without optional content are valid", "[pose_graph]") {
+TEST_CASE("Messages without optional content are valid") {
   CHECK(round_trip(TeamStatus{.sender = kPeer2}).offers.empty());
   Session session = some_session();
   session.T_frame_world.reset();
@@ -135,7 +135,7 @@ TEST_CASE("Messages without optional content are valid", "[pose_graph]") {
   CHECK(round_trip(reliable).bytes->empty());
 }
 
-TEST_CASE("A pose of a member takes 29 bytes", "[pose_graph]") {
+TEST_CASE("A pose of a member takes 29 bytes") {
   MemberPoses many = some_poses();
   many.keyframes.clear();
   many.verdicts.clear();
@@ -144,7 +144,7 @@ TEST_CASE("A pose of a member takes 29 bytes", "[pose_graph]") {
   CHECK(encode(many).size() < 29 * 1000 + 80);
 }
 
-TEST_CASE("No truncated message is accepted", "[pose_graph]") {
+TEST_CASE("No truncated message is accepted") {
   for (const TeamMessage& message : one_of_each()) {
     const bool is_reliable = std::holds_alternative<ReliableMessage>(message);
     const Bytes bytes = encode(message);
@@ -164,7 +164,7 @@ TEST_CASE("No truncated message is accepted", "[pose_graph]") {
   }
 }
 
-TEST_CASE("Impossible counts are refused before memory is allocated", "[pose_graph]") {
+TEST_CASE("Impossible counts are refused before memory is allocated") {
   ByteWriter count;
   count.varint(GENERATE(std::uint64_t{1} << 61U, std::numeric_limits<std::uint64_t>::max()));
   const Bytes huge = count.release();
@@ -183,7 +183,7 @@ TEST_CASE("Impossible counts are refused before memory is allocated", "[pose_gra
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-TEST_CASE("An inconsistent status is refused", "[pose_graph]") {
+TEST_CASE("An inconsistent status is refused") {
   using S = TeamStatus;
   check_refused<S>(
       some_status(),
@@ -196,7 +196,7 @@ TEST_CASE("An inconsistent status is refused", "[pose_graph]") {
        {"an odometry origin out of range", [](S& m) { m.T_odom_first.translation().x() = 1e9; }}});
 }
 
-TEST_CASE("An inconsistent session is refused", "[pose_graph]") {
+TEST_CASE("An inconsistent session is refused") {
   using S = Session;
   check_refused<S>(
       some_session(),
@@ -219,7 +219,7 @@ TEST_CASE("An inconsistent session is refused", "[pose_graph]") {
        {"an invalid gradient", [](S& m) { m.gradient = kNaN; }}});
 }
 
-TEST_CASE("Invalid poses of a member are refused", "[pose_graph]") {
+TEST_CASE("Invalid poses of a member are refused") {
   using P = MemberPoses;
   check_refused<P>(
       some_poses(),
@@ -241,8 +241,7 @@ TEST_CASE("Invalid poses of a member are refused", "[pose_graph]") {
         [](P& m) { std::swap(m.verdicts[0].id.from, m.verdicts[0].id.to); }}});
 }
 
-TEST_CASE("a solver's message that is too large is reported once, with the way out",
-          "[pose_graph]") {
+TEST_CASE("a solver's message that is too large is reported once, with the way out") {
   TeamNotices notices(1);
   notices.message(kMaxTeamMessageBytes);
   CHECK(notices.take().empty());

@@ -74,7 +74,7 @@ void check_optimal(const TeamNetwork& network, const TeamProblem& problem,
 
 }  // namespace
 
-TEST_CASE("a team reaches the optimum over any links that connect it", "[pose_graph][network]") {
+TEST_CASE("a team reaches the optimum over any links that connect it") {
   struct Wiring {
     const char* name;
     std::size_t robots;
@@ -110,7 +110,7 @@ TEST_CASE("a team reaches the optimum over any links that connect it", "[pose_gr
   check_optimal(network, problem, tolerance);
 }
 
-TEST_CASE("robots without closures forward messages of other robots", "[pose_graph][network]") {
+TEST_CASE("robots without closures forward messages of other robots") {
   TeamProblem problem = problem_of({1, 2, 3, 4}, {{1, 4}}, 3);
   TeamNetwork network;
   add_all(network, problem);
@@ -124,8 +124,7 @@ TEST_CASE("robots without closures forward messages of other robots", "[pose_gra
   CHECK(network.robots.at(2).progress.members == std::vector<RobotId>{2});
 }
 
-TEST_CASE("a team reaches its optimum although links fail every two seconds",
-          "[pose_graph][network]") {
+TEST_CASE("a team reaches its optimum although links fail every two seconds") {
   const unsigned seed = GENERATE(range(1U, 9U));
   CAPTURE(seed);
   const auto ids = numbered(5);
@@ -147,8 +146,7 @@ TEST_CASE("a team reaches its optimum although links fail every two seconds",
   check_optimal(network, problem);
 }
 
-TEST_CASE("a team reaches its optimum although a fifth of all messages is lost",
-          "[pose_graph][network]") {
+TEST_CASE("a team reaches its optimum although a fifth of all messages is lost") {
   const unsigned seed = GENERATE(range(1U, 5U));
   const bool chain = GENERATE(true, false);
   const bool descends = GENERATE(false, true);
@@ -166,8 +164,7 @@ TEST_CASE("a team reaches its optimum although a fifth of all messages is lost",
   check_optimal(network, problem, descends ? kRbcdTolerance : kTolerance);
 }
 
-TEST_CASE("the others complete a session when a member stops, and it catches up when it returns",
-          "[pose_graph][network]") {
+TEST_CASE("the others complete a session when a member stops, and it catches up when it returns") {
   const RobotId gone = GENERATE(RobotId{1}, RobotId{2}, RobotId{4});
   const std::size_t after_packets = GENERATE(range<std::size_t>(0, 320, 20));
   const bool weighed = GENERATE(true, false);
@@ -230,8 +227,7 @@ TEST_CASE("the others complete a session when a member stops, and it catches up 
   CHECK(without_cost == 0);
 }
 
-TEST_CASE("a divided team continues as two teams in one frame, and unites again",
-          "[pose_graph][network]") {
+TEST_CASE("a divided team continues as two teams in one frame, and unites again") {
   const double apart_at_s = GENERATE(0.1, 0.3, 1.0, 5.0, 20.0);
   CAPTURE(apart_at_s);
   const auto ids = numbered(6);
@@ -257,7 +253,7 @@ TEST_CASE("a divided team continues as two teams in one frame, and unites again"
   check_optimal(network, problem);
 }
 
-TEST_CASE("after an interrupted session robots keep the last result", "[pose_graph][network]") {
+TEST_CASE("after an interrupted session robots keep the last result") {
   const int cut_after = GENERATE(range(20, 320, 20));
   const PgoMethod method = GENERATE(PgoMethod::kNewton, PgoMethod::kRbcd);
   CAPTURE(cut_after, to_string(method));
@@ -294,8 +290,7 @@ TEST_CASE("after an interrupted session robots keep the last result", "[pose_gra
 // Each keyframe has a step of odometry: 176 bytes, at most twice that with the spare room of a
 // vector. It has a pose in the agent, in the session and in the published trajectory: 128 bytes
 // each. The last two have a covariance: 288 bytes each. The sum is 1136 to 1312 bytes.
-TEST_CASE("a session that has ended leaves less than 1500 bytes for each keyframe",
-          "[pose_graph][network]") {
+TEST_CASE("a session that has ended leaves less than 1500 bytes for each keyframe") {
   constexpr std::uint32_t kKeyframes = 2000;
   const TeamProblem problem = problem_of(numbered(2), {{1, 2}}, 12, kKeyframes);
   TeamNetwork network;
@@ -306,7 +301,7 @@ TEST_CASE("a session that has ended leaves less than 1500 bytes for each keyfram
   CHECK(bytes < 1500.0 * 2.0 * kKeyframes);
 }
 
-TEST_CASE("fifty robots reach the optimum, in a line and with all links", "[pose_graph][network]") {
+TEST_CASE("fifty robots reach the optimum, in a line and with all links") {
   const bool in_line = GENERATE(true, false);
   CAPTURE(in_line);
   const auto ids = numbered(50);

@@ -113,7 +113,7 @@ SplitGraph parallel_lines() {
 
 constexpr double kSinglePrecision_m = 1e-5;
 
-TEST_CASE("Two nodes on their threads end in one frame", "[pose_graph][node]") {
+TEST_CASE("Two nodes on their threads end in one frame") {
   const PgoMethod method = GENERATE(PgoMethod::kRbcd, PgoMethod::kNewton);
   CAPTURE(to_string(method));
   const SplitGraph graph = parallel_lines();
@@ -142,7 +142,7 @@ TEST_CASE("Two nodes on their threads end in one frame", "[pose_graph][node]") {
   }
 }
 
-TEST_CASE("A node alone publishes its own trajectory and sends no session", "[pose_graph][node]") {
+TEST_CASE("A node alone publishes its own trajectory and sends no session") {
   const SplitGraph graph = parallel_lines();
   Robot nine({9, 12});
   int other_messages = 0;
@@ -162,7 +162,7 @@ TEST_CASE("A node alone publishes its own trajectory and sends no session", "[po
   CHECK(other_messages == 0);
 }
 
-TEST_CASE("A node sends its status only when it has changed", "[pose_graph][node]") {
+TEST_CASE("A node sends its status only when it has changed") {
   Robot two({2, 11});
   std::vector<TeamStatus> statuses;
   two.messages.subscribe([&](const auto& message) {
@@ -179,7 +179,7 @@ TEST_CASE("A node sends its status only when it has changed", "[pose_graph][node
   CHECK(statuses.back().keyframes == 1);
 }
 
-TEST_CASE("Refusals of the agent are logged at a limited rate", "[pose_graph][node]") {
+TEST_CASE("Refusals of the agent are logged at a limited rate") {
   const CapturedLog log;
   Robot two({2, 11});
   KeyframeOdometry third;

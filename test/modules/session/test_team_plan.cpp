@@ -59,7 +59,7 @@ SessionPlan planned(const std::map<RobotId, TeamStatus>& statuses, const TeamLin
 
 }  // namespace
 
-TEST_CASE("two robots agree on the newest edges that both hold", "[pose_graph][session]") {
+TEST_CASE("two robots agree on the newest edges that both hold") {
   const TeamStatus a = status_of(1, {{2, 9, {4, 40}}, {2, 8, {3, 30}}, {2, 7, {2, 20}}});
   TeamStatus b = status_of(2, {{1, 8, {3, 30}}, {1, 7, {2, 20}}});
   REQUIRE(agreed_edges(a, b));
@@ -70,8 +70,7 @@ TEST_CASE("two robots agree on the newest edges that both hold", "[pose_graph][s
   CHECK_FALSE(agreed_edges(a, b));
 }
 
-TEST_CASE("closures_between() counts the closures of the pairs of a session",
-          "[pose_graph][session]") {
+TEST_CASE("closures_between() counts the closures of the pairs of a session") {
   const TeamStatus a = status_of(1, {{2, 9, {4, 40}}, {2, 7, {3, 30}}, {3, 5, {1, 10}}});
   const TeamStatus b = status_of(2, {{1, 7, {3, 30}}});
   const auto statuses = by_robot({a, b, status_of(3, {})});
@@ -79,8 +78,7 @@ TEST_CASE("closures_between() counts the closures of the pairs of a session",
   CHECK(closures_between(plan_session(statuses, 3), statuses) == 0);
 }
 
-TEST_CASE("the plan contains the connected component, best connected robots first",
-          "[pose_graph][session]") {
+TEST_CASE("the plan contains the connected component, best connected robots first") {
   // 3 -10- 8 -2- 5 -7- 3, and separately 20 -4- 21; 30 claims edges to 3 that 3 does not know.
   const auto statuses =
       by_robot({status_of(3, {{8, 10, {1, 1}}, {5, 7, {1, 2}}}),
@@ -100,7 +98,7 @@ TEST_CASE("the plan contains the connected component, best connected robots firs
         std::vector<RobotId>{2, 3, 1, 4});
 }
 
-TEST_CASE("ties join the members of each datum to the lowest one", "[pose_graph][session]") {
+TEST_CASE("ties join the members of each datum to the lowest one") {
   auto statuses = chain_of({4, 2, 7, 5, 9}, {3, 3, 3, 3});
   for (const RobotId robot : {RobotId{4}, RobotId{7}, RobotId{9}}) statuses[robot].datum = 77;
   statuses[5].datum = 78;
@@ -124,8 +122,7 @@ TEST_CASE("ties join the members of each datum to the lowest one", "[pose_graph]
   CHECK(datum_ties(without_7, 7).empty());
 }
 
-TEST_CASE("closures and keyframes decide which of two robots in the middle is the root",
-          "[pose_graph][session]") {
+TEST_CASE("closures and keyframes decide which of two robots in the middle is the root") {
   const TeamLinks links = links_of({{1, 2}, {2, 3}, {3, 4}});
   const auto root_of = [&](const std::vector<std::uint32_t>& edges, std::uint32_t keyframes_of_3) {
     auto statuses = chain_of({1, 2, 3, 4}, edges);
@@ -139,8 +136,7 @@ TEST_CASE("closures and keyframes decide which of two robots in the middle is th
   CHECK(root_of({3, 5, 3}, 0) == 2);
 }
 
-TEST_CASE("the tree follows links with the most agreed edges, its root in the middle",
-          "[pose_graph][session]") {
+TEST_CASE("the tree follows links with the most agreed edges, its root in the middle") {
   const auto statuses = chain_of({1, 2, 3, 4, 5}, {5, 5, 5, 5});
   using Links = std::vector<std::pair<RobotId, RobotId>>;
   using Parents = std::map<RobotId, RobotId>;
@@ -154,7 +150,7 @@ TEST_CASE("the tree follows links with the most agreed edges, its root in the mi
   CHECK(parents_of(planned(statuses, {}, 1)).size() == 4);  // unknown links
 }
 
-TEST_CASE("the link with the fewest edges of a cycle is not in the tree", "[pose_graph][session]") {
+TEST_CASE("the link with the fewest edges of a cycle is not in the tree") {
   auto statuses = chain_of({1, 2, 3}, {4, 9});
   statuses[1].offers.push_back({3, 6, {2, 2}});
   statuses[3].offers.push_back({1, 6, {2, 2}});
@@ -169,7 +165,7 @@ TEST_CASE("the link with the fewest edges of a cycle is not in the tree", "[pose
   CHECK(place_in(plan, 1)->root == 3);
 }
 
-TEST_CASE("parents that do not form a tree give no place", "[pose_graph][session]") {
+TEST_CASE("parents that do not form a tree give no place") {
   SessionPlan plan = planned(chain_of({1, 2, 3}, {1, 1}), links_of({{1, 2}, {2, 3}}), 1);
   REQUIRE(place_in(plan, 1));
   CHECK_FALSE(place_in(plan, 7));
@@ -188,8 +184,7 @@ TEST_CASE("parents that do not form a tree give no place", "[pose_graph][session
   CHECK_FALSE(place_in(plan, 1));
 }
 
-TEST_CASE("plans with different trees and frames can have the same graph",
-          "[pose_graph][session]") {
+TEST_CASE("plans with different trees and frames can have the same graph") {
   const auto statuses = chain_of({1, 2, 3}, {1, 1});
   const SessionPlan x = planned(statuses, links_of({{1, 2}, {2, 3}}), 1);
   SessionPlan y = planned(statuses, links_of({{1, 3}, {2, 3}}), 1);

@@ -12,7 +12,7 @@ std::set<RobotId> first_robots(RobotId count) {
 
 }  // namespace
 
-TEST_CASE("the tree keeps to links that connect the robots", "[pose_graph][session]") {
+TEST_CASE("the tree keeps to links that connect the robots") {
   // Robots in a row with links only to the next: closures also join every second robot.
   const std::set<RobotId> robots = first_robots(8);
   PairClosures closures;
@@ -30,7 +30,7 @@ TEST_CASE("the tree keeps to links that connect the robots", "[pose_graph][sessi
     CHECK(links.linked(robot, parent));
 }
 
-TEST_CASE("the root is in the middle of the tree", "[pose_graph][session]") {
+TEST_CASE("the root is in the middle of the tree") {
   const auto row = [](RobotId count) {
     RobotTree tree;
     for (RobotId robot = 1; robot < count; ++robot) {

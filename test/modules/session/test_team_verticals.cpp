@@ -72,7 +72,7 @@ TeamPoses drive_to_the_end(const Drive& drive, const PoseGraphConfig& config) {
   return network.trajectories();
 }
 
-TEST_CASE("the solution of a team with verticals is level", "[pose_graph][agent][vertical]") {
+TEST_CASE("the solution of a team with verticals is level") {
   PoseGraphConfig config;
   config.method = GENERATE(PgoMethod::kRbcd, PgoMethod::kNewton);
   config.robust = GENERATE(true, false);
@@ -91,8 +91,7 @@ TEST_CASE("the solution of a team with verticals is level", "[pose_graph][agent]
   CHECK(std::abs(so3_log(first.linear()).z()) < 1e-6);
 }
 
-TEST_CASE("one robot without verticals disables them for the team",
-          "[pose_graph][agent][vertical]") {
+TEST_CASE("one robot without verticals disables them for the team") {
   Drive one = level_drive(0.0), none = level_drive(0.0);
   for (KeyframeOdometry& keyframe : one.odometry.at(2)) keyframe.vertical.reset();
   for (auto& [robot, keyframes] : none.odometry)

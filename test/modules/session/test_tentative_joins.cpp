@@ -79,8 +79,7 @@ bool has_notice(const TeamNetwork& network, RobotId robot, const std::string& te
 
 }  // namespace
 
-TEST_CASE("Robots that closures at one place join are tentative, and report it",
-          "[pose_graph][tentative]") {
+TEST_CASE("Robots that closures at one place join are tentative, and report it") {
   const std::uint32_t count = GENERATE(1U, 5U);  // closures at this place
   CAPTURE(count);
   std::set<std::uint32_t> at;
@@ -101,8 +100,7 @@ TEST_CASE("Robots that closures at one place join are tentative, and report it",
   }
 }
 
-TEST_CASE("Robots that share one way are certain unless a closure between them is rejected",
-          "[pose_graph][tentative]") {
+TEST_CASE("Robots that share one way are certain unless a closure between them is rejected") {
   const bool contradicted = GENERATE(false, true);
   std::set<std::uint32_t> at;
   for (std::uint32_t k = 5; k < 30; k += 2) at.insert(k);
@@ -115,8 +113,7 @@ TEST_CASE("Robots that share one way are certain unless a closure between them i
 }
 
 TEST_CASE(
-    "A place that is mistaken for another joins robots tentatively until two others correct it",
-    "[pose_graph][tentative]") {
+    "A place that is mistaken for another joins robots tentatively until two others correct it") {
   const unsigned seed = GENERATE(range(1U, 7U));
   const std::uint32_t count = GENERATE(1U, 3U);
   CAPTURE(seed, count);
@@ -148,8 +145,7 @@ TEST_CASE(
         Approx(whole.optimum(all.start)).epsilon(kCostTolerance));
 }
 
-TEST_CASE("Robots with two single closures that contradict each other are not joined",
-          "[pose_graph][tentative]") {
+TEST_CASE("Robots with two single closures that contradict each other are not joined") {
   const unsigned seed = GENERATE(range(1U, 7U));
   CAPTURE(seed);
   TeamProblem problem = team_of_three(seed, {8});
@@ -163,8 +159,7 @@ TEST_CASE("Robots with two single closures that contradict each other are not jo
   CHECK(progress_of(network, 4).tentative.empty());
 }
 
-TEST_CASE("Robots are not joined if as many places agree on another relative pose",
-          "[pose_graph][tentative]") {
+TEST_CASE("Robots are not joined if as many places agree on another relative pose") {
   const unsigned seed = GENERATE(range(1U, 7U));
   const bool alike = GENERATE(true, false);  // the false places agree with each other
   CAPTURE(seed, alike);
@@ -180,8 +175,7 @@ TEST_CASE("Robots are not joined if as many places agree on another relative pos
   CHECK(progress_of(network, 4).anchor == (alike ? 4 : 2));
 }
 
-TEST_CASE("Robots whose closures are all rejected publish in two frames, until others join them",
-          "[pose_graph][tentative]") {
+TEST_CASE("Robots whose closures are all rejected publish in two frames, until others join them") {
   const TeamProblem problem = team_of_three(3, {8, 9, 30, 31, 40, 50});
   std::set<ClosureId> later;  // at three places
   for (const PoseEdge& e : problem.edges)
@@ -247,8 +241,7 @@ TEST_CASE("Robots whose closures are all rejected publish in two frames, until o
 }
 
 TEST_CASE(
-    "A robot whose closures are all rejected is not joined by a pair that no session has seen",
-    "[pose_graph][tentative]") {
+    "A robot whose closures are all rejected is not joined by a pair that no session has seen") {
   TeamProblem problem = team_of_three(3, {8, 9});
   std::set<ClosureId> later;  // the first ones of robots 2 and 6, at three places
   for (const std::uint32_t k : {30U, 40U, 50U}) {

@@ -90,8 +90,7 @@ double error_m(const LabelledMesh& mesh, const TeamMesh& team) {
 
 }  // namespace
 
-TEST_CASE("A correction of the trajectory costs poses, and the receiver's mesh follows",
-          "[team_map]") {
+TEST_CASE("A correction of the trajectory costs poses, and the receiver's mesh follows") {
   CorrectedRobot robot;
   const std::size_t chunk_bytes = robot.chunk_bytes(), poses_bytes = robot.poses_bytes();
   const double radius_m = GENERATE(200.0, 50.0);  // ends move by 1 m and 4 m

@@ -51,18 +51,18 @@ const Eigen::Vector3f kUp = Eigen::Vector3f::UnitZ();
 
 }  // namespace
 
-TEST_CASE("Two copies of a surface become one, half way between them", "[surface_fusion]") {
+TEST_CASE("Two copies of a surface become one, half way between them") {
   const FusedBox box = fuse({square(0, kUp, 0.60F), square(3, kUp, 0.65F)});
   check_height(box, kUp, 0.625F);
   check_area(area_along(box, kUp));
 }
 
-TEST_CASE("Copies beyond the band stay two surfaces", "[surface_fusion]") {
+TEST_CASE("Copies beyond the band stay two surfaces") {
   const FusedBox box = fuse({square(0, kUp, 0.40F), square(1, kUp, 0.80F)});
   check_area(0.5 * area_along(box, kUp));
 }
 
-TEST_CASE("A wall that two robots see from two sides has two surfaces", "[surface_fusion]") {
+TEST_CASE("A wall that two robots see from two sides has two surfaces") {
   const FusedBox box = fuse({square(0, kUp, 0.62F), square(1, -kUp, 0.51F)});
   check_area(area_along(box, kUp));
   check_area(area_along(box, -kUp));
@@ -70,7 +70,7 @@ TEST_CASE("A wall that two robots see from two sides has two surfaces", "[surfac
     CHECK(std::min(std::abs(p.z() - 0.62F), std::abs(p.z() - 0.51F)) < 1e-5F);
 }
 
-TEST_CASE("Labels of robots are voted", "[surface_fusion]") {
+TEST_CASE("Labels of robots are voted") {
   const auto labels = [](LabelId a, LabelId b, LabelId c) {
     const FusedBox box =
         fuse({square(0, kUp, 0.61F, a), square(1, kUp, 0.61F, b), square(2, kUp, 0.61F, c)});
@@ -83,7 +83,7 @@ TEST_CASE("Labels of robots are voted", "[surface_fusion]") {
   CHECK(labels(0, 0, 0) == 0);
 }
 
-TEST_CASE("Boxes compute the same vertices on their common side", "[surface_fusion]") {
+TEST_CASE("Boxes compute the same vertices on their common side") {
   const Eigen::Vector3f shift(0.8F, 0.0F, 0.0F);  // half of it in each box
   RobotSurface surface = square(0, Eigen::Vector3f(0.1F, 0.2F, 1.0F).normalized(), 0.6F);
   for (Triangle& triangle : surface.triangles)

@@ -60,7 +60,7 @@ bool are_equal(const LabelledMesh& a, const LabelledMesh& b) {
 
 }  // namespace
 
-TEST_CASE("Copies of a floor are fused between them, and every part is there once", "[team_map]") {
+TEST_CASE("Copies of a floor are fused between them, and every part is there once") {
   TeamMesh team;
   add_all(team, chunks_of(floor_from(0.0F, 0.0F), 0));
   add_all(team, chunks_of(floor_from(2.0F, 0.04F), 1));
@@ -75,8 +75,7 @@ TEST_CASE("Copies of a floor are fused between them, and every part is there onc
   }
 }
 
-TEST_CASE("The fused map has the colours of its chunks, and the median of their voxels",
-          "[team_map]") {
+TEST_CASE("The fused map has the colours of its chunks, and the median of their voxels") {
   TeamMesh team;
   for (RobotId robot = 0; robot < 3; ++robot) {
     LabelledMesh floor = floor_from(0.0F, 0.0F);
@@ -97,8 +96,7 @@ TEST_CASE("The fused map has the colours of its chunks, and the median of their 
   }
 }
 
-TEST_CASE("Surface from larger voxels is there only where there is none from smaller ones",
-          "[team_map]") {
+TEST_CASE("Surface from larger voxels is there only where there is none from smaller ones") {
   TeamMesh team;
   add_all(team, chunks_of(floor_from(0.0F, 0.0F), 0));
   LabelledMesh mesh = floor_from(4.0F, 0.0F);  // a map with both sizes
@@ -112,7 +110,7 @@ TEST_CASE("Surface from larger voxels is there only where there is none from sma
   CHECK(area_of(fused(team)) == Approx(8.0 * 3.0).epsilon(0.03));
 }
 
-TEST_CASE("Chunks in another frame than most are left out and counted", "[team_map]") {
+TEST_CASE("Chunks in another frame than most are left out and counted") {
   TeamMesh alone, team;
   for (TeamMesh* both : {&alone, &team}) add_all(*both, chunks_of(floor_from(0.0F, 0.0F), 1, 1, 1));
   const std::vector<MeshChunk> apart = chunks_of(floor_from(0.0F, 1.0F), 2, 1, 0);
@@ -125,7 +123,7 @@ TEST_CASE("Chunks in another frame than most are left out and counted", "[team_m
   CHECK(fused(team).faces.size() > map.mesh.faces.size());
 }
 
-TEST_CASE("A face of a size that no mapper makes is left out", "[team_map]") {
+TEST_CASE("A face of a size that no mapper makes is left out") {
   MeshChunk chunk;
   chunk.key = {1, {0, 0, 0}, 0};
   chunk.step_m = 0.01F;
@@ -135,7 +133,7 @@ TEST_CASE("A face of a size that no mapper makes is left out", "[team_map]") {
   CHECK(fuse_chunks({}).mesh.empty());
 }
 
-TEST_CASE("A robot with many chunks does not decide the frame of three", "[team_map]") {
+TEST_CASE("A robot with many chunks does not decide the frame of three") {
   TeamMesh team;
   add_all(team, {chunks_of(floor_from(0.0F, 0.0F), 1, 1, 1).front(),
                  chunks_of(floor_from(0.0F, 0.0F), 2, 1, 1).front()});
@@ -145,7 +143,7 @@ TEST_CASE("A robot with many chunks does not decide the frame of three", "[team_
   CHECK(map.extents.size() == 2);
 }
 
-TEST_CASE("A robot with too many boxes loses its own", "[team_map]") {
+TEST_CASE("A robot with too many boxes loses its own") {
   TeamMesh alone, team;
   for (TeamMesh* both : {&alone, &team}) add_all(*both, chunks_of(floor_from(0.0F, 0.0F), 5));
   const LabelledMesh whole = fused(alone);
@@ -164,7 +162,7 @@ TEST_CASE("A robot with too many boxes loses its own", "[team_map]") {
         }) == static_cast<std::ptrdiff_t>(whole.faces.size()));
 }
 
-TEST_CASE("The plan of a map leaves out a robot far away", "[team_map]") {
+TEST_CASE("The plan of a map leaves out a robot far away") {
   const auto extent = [](float from_m, float size_m) {
     return Eigen::AlignedBox3f(Eigen::Vector3f::Constant(from_m),
                                Eigen::Vector3f::Constant(from_m + size_m));
@@ -180,7 +178,7 @@ TEST_CASE("The plan of a map leaves out a robot far away", "[team_map]") {
   CHECK(plan_of({{1, extent(0.0F, 1e6F)}}, 0.05, 16e6).isEmpty());
 }
 
-TEST_CASE("A mesh in larger voxels has the same shape with fewer faces", "[team_map]") {
+TEST_CASE("A mesh in larger voxels has the same shape with fewer faces") {
   const LabelledMesh fine = floor_from(0.0F, 0.0F), coarse = resampled(fine, 0.2);
   CHECK(10 * coarse.faces.size() < fine.faces.size());
   REQUIRE_FALSE(coarse.empty());

@@ -83,7 +83,7 @@ bool have_one_map(Mapper& a, Mapper& b) {
 
 }  // namespace
 
-TEST_CASE("Robots have the same map of their team, also those that join later", "[node][dds]") {
+TEST_CASE("Robots have the same map of their team, also those that join later") {
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
   Mapper a(domain, 3), b(domain, 4);
   REQUIRE(b.basis.receives(PeerEventKind::kJoined, 3));

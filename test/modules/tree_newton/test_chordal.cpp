@@ -4,7 +4,7 @@
 
 namespace km {
 
-TEST_CASE("chordal initialisation returns exact poses", "[pose_graph]") {
+TEST_CASE("chordal initialisation returns exact poses") {
   std::mt19937 rng(3);
   std::vector<SE3> truth(1, SE3::Identity());
   WholeGraph graph{.poses = 8, .edges = {}};
@@ -18,12 +18,12 @@ TEST_CASE("chordal initialisation returns exact poses", "[pose_graph]") {
   for (std::size_t i = 0; i < 8; ++i) CHECK(chordal[i].isApprox(truth[i], 1e-9));
 }
 
-TEST_CASE("initialisation of a graph in two parts is refused", "[pose_graph]") {
+TEST_CASE("initialisation of a graph in two parts is refused") {
   const std::vector<PoseEdge> edges{{{0, 0}, {0, 1}}, {{0, 2}, {0, 3}}};
   CHECK_THROWS_AS(chordal_initialisation(4, edges), std::invalid_argument);
 }
 
-TEST_CASE("the chordal start of recorded graphs has the cost that dpgo reports", "[pose_graph]") {
+TEST_CASE("the chordal start of recorded graphs has the cost that dpgo reports") {
   // Costs of dpgo at its chordal start, which uses the same method. The files have rounded
   // quaternions.
   const auto [file, expected] = GENERATE(

@@ -40,7 +40,7 @@ Matrix12 hessian_of(const EdgeModel& model) {
 
 }  // namespace
 
-TEST_CASE("gradient and Hessian of an edge agree with finite differences", "[newton]") {
+TEST_CASE("gradient and Hessian of an edge agree with finite differences") {
   const unsigned seed = GENERATE(1U, 2U, 3U, 4U, 5U);
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -64,7 +64,7 @@ TEST_CASE("gradient and Hessian of an edge agree with finite differences", "[new
   }
 }
 
-TEST_CASE("an edge without second derivatives has the same gradient", "[newton]") {
+TEST_CASE("an edge without second derivatives has the same gradient") {
   std::mt19937 rng(7);
   const Moved moved = random_edge(rng);
   const EdgeModel model =
@@ -76,8 +76,8 @@ TEST_CASE("an edge without second derivatives has the same gradient", "[newton]"
   CHECK(slope.g_j == model.g_j);
 }
 
-TEST_CASE("the Gauss-Newton Hessian is never indefinite, and the full one is not at zero residual",
-          "[newton]") {
+TEST_CASE(
+    "the Gauss-Newton Hessian is never indefinite, and the full one is not at zero residual") {
   const unsigned seed = GENERATE(1U, 2U, 3U);
   CAPTURE(seed);
   std::mt19937 rng(seed);

@@ -81,7 +81,7 @@ MatrixXd dense_schur(const Problem& problem) {
 
 }  // namespace
 
-TEST_CASE("the Schur complement equals that of the dense matrix", "[newton]") {
+TEST_CASE("the Schur complement equals that of the dense matrix") {
   const unsigned seed = GENERATE(1U, 2U, 3U, 4U, 5U, 6U);
   const Index block = GENERATE(1, 3, 6);
   CAPTURE(seed, block);
@@ -105,7 +105,7 @@ TEST_CASE("the Schur complement equals that of the dense matrix", "[newton]") {
   CHECK((schur - expected).norm() < 1e-11 * expected.norm());
 }
 
-TEST_CASE("the selected inverse equals the blocks of the dense inverse", "[newton]") {
+TEST_CASE("the selected inverse equals the blocks of the dense inverse") {
   const unsigned seed = GENERATE(1U, 2U, 3U, 4U);
   const Index block = GENERATE(1, 3, 6);
   const double kept = GENERATE(0.0, 0.2, 1.0);
@@ -138,7 +138,7 @@ TEST_CASE("the selected inverse equals the blocks of the dense inverse", "[newto
   CHECK(worst < 1e-10 * expected.norm());
 }
 
-TEST_CASE("forward and backward solve the dense system", "[newton]") {
+TEST_CASE("forward and backward solve the dense system") {
   const unsigned seed = GENERATE(1U, 2U, 3U);
   const double kept = GENERATE(0.0, 0.2, 1.0);
   CAPTURE(seed, kept);
@@ -160,7 +160,7 @@ TEST_CASE("forward and backward solve the dense system", "[newton]") {
   CHECK((X - expected).norm() < 1e-9 * expected.norm());
 }
 
-TEST_CASE("factorising an indefinite matrix fails", "[newton]") {
+TEST_CASE("factorising an indefinite matrix fails") {
   std::mt19937 rng(1);
   Problem problem = random_problem(rng, 20, 10, 3, 0.2);
   const auto node = std::find(problem.keep.begin(), problem.keep.end(), false);
@@ -169,12 +169,12 @@ TEST_CASE("factorising an indefinite matrix fails", "[newton]") {
   CHECK_FALSE(factor.factorise(problem.A));
 }
 
-TEST_CASE("a pair outside the graph is refused", "[newton]") {
+TEST_CASE("a pair outside the graph is refused") {
   CHECK_THROWS_AS(EliminationPlan({false, false}, {{0, 2}}), std::invalid_argument);
   CHECK_THROWS_AS(EliminationPlan({false, false}, {{1, 1}}), std::invalid_argument);
 }
 
-TEST_CASE("a cover contains an end of every closure, for any order of closures", "[newton]") {
+TEST_CASE("a cover contains an end of every closure, for any order of closures") {
   const unsigned seed = GENERATE(1U, 2U, 3U, 4U);
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -202,7 +202,7 @@ TEST_CASE("a cover contains an end of every closure, for any order of closures",
   CHECK(cover_closures(closures) == cover);
 }
 
-TEST_CASE("a pose is kept if eliminating it would couple many others", "[newton]") {
+TEST_CASE("a pose is kept if eliminating it would couple many others") {
   // Node 0 has six neighbours without couplings: its elimination would replace 6 couplings by 15.
   // Node 7 is between two nodes: its elimination replaces two couplings by one.
   std::vector<NodePair> pairs;

@@ -18,8 +18,8 @@ Eigen::Vector3d up_at(const SE3& T_world_kf) {
 
 }  // namespace
 
-TEST_CASE("a vertical prior costs the squared tilt over sigma, and rotations about z cost nothing",
-          "[pose_graph][vertical]") {
+TEST_CASE(
+    "a vertical prior costs the squared tilt over sigma, and rotations about z cost nothing") {
   const double tilt = GENERATE(0.0, 1e-3, 2e-2);
   const double heading = GENERATE(0.0, 1.0, -3.0);
   const VerticalPrior prior{0, Eigen::Vector3d::UnitZ(), kWeight};
@@ -30,8 +30,7 @@ TEST_CASE("a vertical prior costs the squared tilt over sigma, and rotations abo
   CHECK(vertical_cost(prior, lifted) == Approx(vertical_cost(prior, R)).margin(1e-9));
 }
 
-TEST_CASE("gradient and Hessian of a vertical prior agree with finite differences",
-          "[newton][vertical]") {
+TEST_CASE("gradient and Hessian of a vertical prior agree with finite differences") {
   const unsigned seed = GENERATE(1U, 2U, 3U);
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -54,8 +53,7 @@ TEST_CASE("gradient and Hessian of a vertical prior agree with finite difference
         1e-12);  // rotations about the vertical cost nothing
 }
 
-TEST_CASE("poses are levelled as a whole, by the vertical of most of their priors",
-          "[pose_graph][vertical]") {
+TEST_CASE("poses are levelled as a whole, by the vertical of most of their priors") {
   std::mt19937 rng(3);
   const SE3 tilt = make_pose(so3_exp({1.0, 0.4, 0.0}), Eigen::Vector3d::Zero());
   std::vector<SE3> poses;
@@ -75,7 +73,7 @@ TEST_CASE("poses are levelled as a whole, by the vertical of most of their prior
   CHECK(levelled(poses, priors)[0].isApprox(level[0], 1e-12));
 }
 
-TEST_CASE("levelling keeps the position of the origin and the heading", "[pose_graph][vertical]") {
+TEST_CASE("levelling keeps the position of the origin and the heading") {
   const Eigen::Vector3d origin(1.0, 2.0, 3.0);
   const SE3 truth = make_pose(so3_exp({0.0, 0.0, 0.7}), {4.0, -1.0, 0.5});
   SE3 tilted = truth;
@@ -87,8 +85,7 @@ TEST_CASE("levelling keeps the position of the origin and the heading", "[pose_g
   CHECK((L.col(2) - lifting_matrix(5).col(2)).norm() < 1e-15);
 }
 
-TEST_CASE("levelling rotates a frame that lies on its side, and one upside down",
-          "[pose_graph][vertical]") {
+TEST_CASE("levelling rotates a frame that lies on its side, and one upside down") {
   const auto roll = GENERATE(0.3, 1.6, 3.0, M_PI);
   CAPTURE(roll);
   const SE3 tilted =

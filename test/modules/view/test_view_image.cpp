@@ -29,7 +29,7 @@ cv::Mat shown(const ViewImage& image) {
   return decoded(image.jpeg, DecodedPixels::kStored);
 }
 
-TEST_CASE("Images keep their size or are reduced to the maximum width", "[view]") {
+TEST_CASE("Images keep their size or are reduced to the maximum width") {
   const ViewImage as_it_is = view_image(image_of(640, 480), camera_of(640, 480));
   CHECK(as_it_is.stamp == 77);
   CHECK(shown(as_it_is).cols == 640);
@@ -42,7 +42,7 @@ TEST_CASE("Images keep their size or are reduced to the maximum width", "[view]"
 }
 
 // The feature must lie at the centre of a bright square that is drawn around it.
-TEST_CASE("Features are where the image shows them", "[view]") {
+TEST_CASE("Features are where the image shows them") {
   TrackedImage image = image_of(1280, 800);
   StereoFrame frame = *image.frame;
   const int u = 1000, v = 202;
@@ -67,7 +67,7 @@ TEST_CASE("Features are where the image shows them", "[view]") {
   CHECK(static_cast<double>(sent.features[0][1]) == Approx(sum_y / sum).margin(0.2));
 }
 
-TEST_CASE("A noisy image fits into an update", "[view]") {
+TEST_CASE("A noisy image fits into an update") {
   TrackedImage image = image_of(640, 640);
   StereoFrame frame = *image.frame;
   std::mt19937 rng(1);
@@ -83,7 +83,7 @@ constexpr std::int8_t kUnknownCell = OccupancyGrid::kUnknown, kFreeCell = Occupa
 using Values = std::vector<std::uint8_t>;
 
 // Brute force: a cell of the reduced map is occupied if any of its cells is, else free if any is.
-TEST_CASE("A large 2D map is reduced until it fits, and no obstacle is lost", "[view]") {
+TEST_CASE("A large 2D map is reduced until it fits, and no obstacle is lost") {
   std::mt19937 rng(5);
   OccupancyGrid map{0.05, {0.0, 0.0}, 601, 333, {}};
   for (int k = 0; k < map.width * map.height; ++k) {
@@ -109,7 +109,7 @@ TEST_CASE("A large 2D map is reduced until it fits, and no obstacle is lost", "[
   CHECK(cells_of(*raster) == expected);
 }
 
-TEST_CASE("A slice of the distance field has its distances in the cells of its voxels", "[view]") {
+TEST_CASE("A slice of the distance field has its distances in the cells of its voxels") {
   constexpr float kVoxel_m = 0.1F;
   LabelledMesh slice;
   for (int y = -1; y <= 1; ++y)
@@ -136,14 +136,14 @@ TEST_CASE("A slice of the distance field has its distances in the cells of its v
   CHECK_FALSE(view_raster(LabelledMesh{}, 6));
 }
 
-TEST_CASE("Points that are no slice have no raster", "[view]") {
+TEST_CASE("Points that are no slice have no raster") {
   LabelledMesh points;
   points.vertices = {{0, 0, 0}, {1e-3F, 0, 0}, {1e30F, 1e30F, 0}};
   points.colors.resize(3);
   CHECK_FALSE(view_raster(points, 0));
 }
 
-TEST_CASE("The largest objects are sent if not all fit, and the others are counted", "[view]") {
+TEST_CASE("The largest objects are sent if not all fit, and the others are counted") {
   constexpr std::size_t kObjects = 3000;
   ObjectList list{.anchor = 2, .objects = {}};
   for (std::size_t k = 1; k <= kObjects; ++k) {

@@ -47,7 +47,7 @@ struct Watching {
   }
 };
 
-TEST_CASE("A viewer receives the updates of robots in order", "[view]") {
+TEST_CASE("A viewer receives the updates of robots in order") {
   Watching w;
   REQUIRE(w.is_read(ViewChannel::kView));
   REQUIRE(w.is_read(ViewChannel::kMesh));
@@ -76,7 +76,7 @@ TEST_CASE("A viewer receives the updates of robots in order", "[view]") {
   CHECK(w.listener.refused() == 0);
 }
 
-TEST_CASE("Images arrive only from the robots that are asked", "[view]") {
+TEST_CASE("Images arrive only from the robots that are asked") {
   Watching w;
   Publisher other(w.domain, 8);
   REQUIRE(w.is_read(ViewChannel::kView));
@@ -94,7 +94,7 @@ TEST_CASE("Images arrive only from the robots that are asked", "[view]") {
   CHECK(eventually([&] { return other.on(ViewChannel::kImages).readers() == 1; }));
 }
 
-TEST_CASE("Updates that no robot writes are counted and dropped", "[view]") {
+TEST_CASE("Updates that no robot writes are counted and dropped") {
   Watching w;
   const DdsEntity topic = create_view_topic(w.publisher.participant.handle(), ViewChannel::kView);
   const DdsQos qos = make_dds_qos();
@@ -123,7 +123,7 @@ TEST_CASE("Updates that no robot writes are counted and dropped", "[view]") {
   }));
 }
 
-TEST_CASE("Watching can be stopped", "[view]") {
+TEST_CASE("Watching can be stopped") {
   Watching w;
   std::thread stopper([&] { w.listener.stop(); });
   CHECK_FALSE(w.listener.next(1000.0 * kPatience_s));
@@ -156,8 +156,7 @@ struct Page {
 
 using Shown = std::vector<std::pair<std::uint64_t, std::uint32_t>>;
 
-TEST_CASE("A resumed robot is shown from its beginning once the former process is silent",
-          "[view]") {
+TEST_CASE("A resumed robot is shown from its beginning once the former process is silent") {
   Page page;
   page.send(kFirst, 0, 0.0);
   for (std::uint32_t k = 0; k < 4; ++k) page.send(kSecond, k, 1.0 + k);
@@ -172,7 +171,7 @@ TEST_CASE("A resumed robot is shown from its beginning once the former process i
   CHECK(page.shown.size() == 6);
 }
 
-TEST_CASE("After a robot has left another process with its id counts at once", "[view]") {
+TEST_CASE("After a robot has left another process with its id counts at once") {
   Page page;
   page.send(kFirst, 0, 0.0);
   page.send(kFirst, ViewContent(RobotSample{.name = "alice", .phase = "leaving"}), 1.0);
@@ -180,7 +179,7 @@ TEST_CASE("After a robot has left another process with its id counts at once", "
   CHECK(page.shown == Shown{{kFirst, 0}, {kSecond, 0}});
 }
 
-TEST_CASE("The number of waiting updates is bounded", "[view]") {
+TEST_CASE("The number of waiting updates is bounded") {
   Page page;
   for (std::uint32_t k = 0; k < ViewIncumbents::kMostWaiting + 100; ++k) {
     page.send(kFirst, k, 1e-3 * k);

@@ -107,7 +107,7 @@ struct Visitor {
 
 }  // namespace
 
-TEST_CASE("Without viewers nothing is sent", "[view]") {
+TEST_CASE("Without viewers nothing is sent") {
   Watched robot;
   robot.give_keyframes(100);
   robot.give_mesh(20);
@@ -116,7 +116,7 @@ TEST_CASE("Without viewers nothing is sent", "[view]") {
     CHECK(robot.sent(channel) == 0);
 }
 
-TEST_CASE("Earlier and new data are sent within their budgets", "[view]") {
+TEST_CASE("Earlier and new data are sent within their budgets") {
   const ViewConfig config = {};
   Watched robot(config);
   constexpr std::size_t kKeyframes = 3000;  // 108 kB of odometry, and 84 kB as optimised.
@@ -153,7 +153,7 @@ TEST_CASE("Earlier and new data are sent within their budgets", "[view]") {
   CHECK(rate > 0.9 * config.bytes_per_s);
 }
 
-TEST_CASE("A late viewer receives the full state", "[view]") {
+TEST_CASE("A late viewer receives the full state") {
   Watched robot;
   robot.give_keyframes(50);
   const ClosureId id = closure_id({kSelf, 3}, {4, 9});
@@ -182,8 +182,7 @@ TEST_CASE("A late viewer receives the full state", "[view]") {
   }));
 }
 
-TEST_CASE("Chunks that are removed while a viewer appears are removed for the earlier viewers",
-          "[view]") {
+TEST_CASE("Chunks that are removed while a viewer appears are removed for the earlier viewers") {
   ViewConfig config = {};
   config.bytes_per_s = 25.0;  // Slow enough that both events happen between two chunks.
   Watched robot(config);
@@ -203,7 +202,7 @@ TEST_CASE("Chunks that are removed while a viewer appears are removed for the ea
   CHECK(knows(first, 20));
 }
 
-TEST_CASE("Mesh chunks are sent no faster than configured", "[view]") {
+TEST_CASE("Mesh chunks are sent no faster than configured") {
   ViewConfig config = {};
   config.bytes_per_s = 500.0;
   Watched robot(config);
@@ -222,7 +221,7 @@ TEST_CASE("Mesh chunks are sent no faster than configured", "[view]") {
   CHECK(sent_since() > 0.8 * config.mesh_bytes_per_s() * (robot.now_s - begin_s));
 }
 
-TEST_CASE("At the end all remaining updates are sent", "[view]") {
+TEST_CASE("At the end all remaining updates are sent") {
   Watched robot;
   std::optional<Visitor> visitor(std::in_place, robot);
   robot.give_keyframes(400);
@@ -246,7 +245,7 @@ TEST_CASE("At the end all remaining updates are sent", "[view]") {
   }));
 }
 
-TEST_CASE("Images are sent while they are requested", "[view]") {
+TEST_CASE("Images are sent while they are requested") {
   ViewConfig config = {};
   config.images_per_s = 30.0;
   Watched robot(config);

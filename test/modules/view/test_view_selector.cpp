@@ -73,7 +73,7 @@ Closure closure(const ClosureId& id, int inliers) {
 
 }  // namespace
 
-TEST_CASE("The newest pose is sent a few times a second", "[view]") {
+TEST_CASE("The newest pose is sent a few times a second") {
   ViewSelector selector(kSelf);
   Watcher watcher;
   Stamp last = 0;
@@ -91,7 +91,7 @@ TEST_CASE("The newest pose is sent a few times a second", "[view]") {
 }
 
 // A graph that changes faster than it can be sent: one update per round.
-TEST_CASE("Sent poses are within the bound in the end", "[view]") {
+TEST_CASE("Sent poses are within the bound in the end") {
   std::mt19937 rng(GENERATE(1U, 2U, 3U));
   Selector selector;
   Watcher watcher, late;
@@ -121,7 +121,7 @@ TEST_CASE("Sent poses are within the bound in the end", "[view]") {
   CHECK(late.odometry.size() == 300);
 }
 
-TEST_CASE("The stage of a pair of keyframes is sent when it changes", "[view]") {
+TEST_CASE("The stage of a pair of keyframes is sent when it changes") {
   ViewSelector selector(kSelf);
   Watcher watcher;
   const ClosureId id = pair_of(10, 20);
@@ -185,7 +185,7 @@ TEST_CASE("The stage of a pair of keyframes is sent when it changes", "[view]") 
   }
 }
 
-TEST_CASE("Verified closures are sent before all other updates", "[view]") {
+TEST_CASE("Verified closures are sent before all other updates") {
   ViewSelector selector(kSelf);
   for (KeyframeIndex k = 0; k < 500; ++k) {
     selector.add(keyframe(k, SE3::Identity()));

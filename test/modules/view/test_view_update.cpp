@@ -18,14 +18,14 @@ bool is_understood(const ViewContent& content) {
   return decode_view(encode_view(content)).has_value();
 }
 
-TEST_CASE("Texts are encoded in printable ASCII", "[view]") {
+TEST_CASE("Texts are encoded in printable ASCII") {
   RobotSample state{.name = "a\nb\xC3\xA9"};
   const auto decoded = decode_view(encode_view(state));
   REQUIRE(decoded);
   CHECK(std::get<RobotSample>(*decoded).name == "a?b??");
 }
 
-TEST_CASE("Truncated and extended updates are refused", "[view]") {
+TEST_CASE("Truncated and extended updates are refused") {
   for (const Bytes& sample : samples()) {
     CAPTURE(int{sample[0]});
     REQUIRE(decode_view(sample));
@@ -45,7 +45,7 @@ ViewContent changed(T content, const Change& change) {
   return content;
 }
 
-TEST_CASE("Updates with impossible numbers are refused", "[view]") {
+TEST_CASE("Updates with impossible numbers are refused") {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
   const std::vector<std::pair<const char*, ViewContent>> impossible = {
@@ -90,7 +90,7 @@ TEST_CASE("Updates with impossible numbers are refused", "[view]") {
   })));
 }
 
-TEST_CASE("The size of an update is bounded", "[view]") {
+TEST_CASE("The size of an update is bounded") {
   CHECK(is_understood(some_keyframes(2000)));
   CHECK_THROWS_AS(encode_view(some_keyframes(2200)), std::length_error);
   ViewImage image;
@@ -104,7 +104,7 @@ TEST_CASE("The size of an update is bounded", "[view]") {
 }
 
 // Each accepted update equals the result of encoding it again, so it is safe to show.
-TEST_CASE("Corrupted updates are refused or decoded consistently", "[view]") {
+TEST_CASE("Corrupted updates are refused or decoded consistently") {
   const std::vector<Bytes> good = samples();
   InputCorrupter corrupter(GENERATE(1U, 2U));
   int accepted = 0;

@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kDerivative = 1e-6;  // entries are about 1
 
-TEST_CASE("Derivatives of the pose at an image agree with differences", "[vio][calibration]") {
+TEST_CASE("Derivatives of the pose at an image agree with differences") {
   const unsigned seed = GENERATE(range(0U, 5U));
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -35,8 +35,7 @@ TEST_CASE("Derivatives of the pose at an image agree with differences", "[vio][c
   CHECK((by_offset - image.by_calibration.leftCols<1>()).norm() < kDerivative);
 }
 
-TEST_CASE("Derivatives of a reprojection by the calibration agree with differences",
-          "[vio][calibration]") {
+TEST_CASE("Derivatives of a reprojection by the calibration agree with differences") {
   const unsigned seed = GENERATE(range(0U, 5U));
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -102,7 +101,7 @@ UncertainCalibration estimated(const std::vector<InertialFrame>& frames,
   return smoother.calibration();
 }
 
-TEST_CASE("A time offset of the stamps is estimated", "[vio][calibration]") {
+TEST_CASE("A time offset of the stamps is estimated") {
   const Stamp late = GENERATE(-30'000'000, 0, 10'000'000, 30'000'000);
   CAPTURE(late);
   SyntheticWorld world(SyntheticMotion{}, 21);
@@ -139,7 +138,7 @@ std::vector<InertialFrame> rolled_frames(SyntheticWorld& world, double readout_s
   return frames;
 }
 
-TEST_CASE("The readout time of a rolling shutter is estimated", "[vio][calibration]") {
+TEST_CASE("The readout time of a rolling shutter is estimated") {
   const double readout_s = GENERATE(-0.01, 0.0, 0.015, 0.03);
   CAPTURE(readout_s);
   SyntheticWorld world(SyntheticMotion{}, 23);

@@ -46,8 +46,7 @@ struct Run {
   }
 };
 
-TEST_CASE("Poses of an external odometry are published with keyframes by time and distance",
-          "[external_odometry]") {
+TEST_CASE("Poses of an external odometry are published with keyframes by time and distance") {
   Run run;
   for (int k = 0; k < 40; ++k) run.add(packet(k, ahead(0.05 * std::min(k, 20))));
   REQUIRE(run.states.size() == 40);
@@ -75,7 +74,7 @@ TEST_CASE("Poses of an external odometry are published with keyframes by time an
   CHECK(run.jumps == 0);
 }
 
-TEST_CASE("A body that trembles stands still and one that creeps does not", "[external_odometry]") {
+TEST_CASE("A body that trembles stands still and one that creeps does not") {
   Run trembling, creeping;
   constexpr double kSpeed_mps = 0.005;
   for (int k = 0; k <= 600; ++k) {
@@ -89,8 +88,7 @@ TEST_CASE("A body that trembles stands still and one that creeps does not", "[ex
   CHECK(creeping.keyframes[1].covariance(3, 3) == Approx(2.0 * 1e-4));
 }
 
-TEST_CASE("A keyframe's covariance is the growth of the odometry's covariance plus drift",
-          "[external_odometry]") {
+TEST_CASE("A keyframe's covariance is the growth of the odometry's covariance plus drift") {
   const Matrix6 step = (Vector6() << 1e-6, 2e-6, 3e-6, 4e-4, 5e-4, 6e-4).finished().asDiagonal();
   const SE3 motion = se3_exp((Vector6() << 0.02, -0.01, 0.1, 0.3, 0.02, -0.01).finished());
   const bool grows = GENERATE(true, false);
@@ -119,7 +117,7 @@ TEST_CASE("A keyframe's covariance is the growth of the odometry's covariance pl
           .all());
 }
 
-TEST_CASE("An odometry that jumps leaves the body where it was", "[external_odometry]") {
+TEST_CASE("An odometry that jumps leaves the body where it was") {
   Run run;
   for (int k = 0; k < 8; ++k) run.add(packet(k, ahead(0.05 * k)));
   for (int k = 8; k < 16; ++k) run.add(packet(k, ahead(100.0 + 0.05 * k)));
@@ -133,7 +131,7 @@ TEST_CASE("An odometry that jumps leaves the body where it was", "[external_odom
   CHECK(run.keyframes[3].covariance(3, 3) < 1e-3);
 }
 
-TEST_CASE("Packets without a pose, and images out of order, give nothing", "[external_odometry]") {
+TEST_CASE("Packets without a pose, and images out of order, give nothing") {
   Run run;
   SensorPacket none = packet(0, ahead(0));
   none.pose.reset();
@@ -149,7 +147,7 @@ TEST_CASE("Packets without a pose, and images out of order, give nothing", "[ext
   CHECK(run.keyframes.size() == 1);
 }
 
-TEST_CASE("An external odometry continues after a keyframe", "[external_odometry]") {
+TEST_CASE("An external odometry continues after a keyframe") {
   Run whole, first, second;
   const auto at = [](int k) {
     return packet(k, ahead(0.05 * k), 1e-4 * (k + 1) * Matrix6::Identity());

@@ -87,7 +87,7 @@ TrackErrors errors_of_tracking(const StereoRig& rig, const TexturedPlane& plane,
   return errors;
 }
 
-TEST_CASE("Features of a moving camera stay on their landmarks to a tenth of a pixel", "[vio]") {
+TEST_CASE("Features of a moving camera stay on their landmarks to a tenth of a pixel") {
   const Vector6 motion = GENERATE(twist(0, 0, 0, 0.02, 0.01, 0),     // sideways, 3 px
                                   twist(0.01, 0.02, 0.03, 0, 0, 0),  // turning only
                                   twist(0.01, -0.02, 0.01, 0.01, 0, 0.03));
@@ -100,8 +100,7 @@ TEST_CASE("Features of a moving camera stay on their landmarks to a tenth of a p
   CHECK(quantile(errors.px, 0.95) < 0.2);
 }
 
-TEST_CASE("Through a fisheye lens features stay on their landmarks, and pairs have depth",
-          "[vio]") {
+TEST_CASE("Through a fisheye lens features stay on their landmarks, and pairs have depth") {
   const TexturedPlane plane{2.0, 0.25, 1};  // cells of 19 px in the middle, 3 px at 65 degrees
   const TrackErrors errors =
       errors_of_tracking(fisheye_rig(), plane, twist(0.01, -0.02, 0.01, 0.01, 0, 0.03), true);
@@ -116,7 +115,7 @@ TEST_CASE("Through a fisheye lens features stay on their landmarks, and pairs ha
   CHECK(quantile(errors.right_px, 0.95) < 0.2);
 }
 
-TEST_CASE("Stereo matches of a plane have its depth", "[vio]") {
+TEST_CASE("Stereo matches of a plane have its depth") {
   // 63 px of disparity (126 in an image of twice the size), 13 px, 2.5 px.
   const double depth_m = GENERATE(0.4, 2.0, 10.0);
   CAPTURE(depth_m);
@@ -159,7 +158,7 @@ GrayImage rolled(const StereoRig& rig, const TexturedPlane& plane, std::size_t s
   return image;
 }
 
-TEST_CASE("Bearings of a rolling shutter are moved to the stamp", "[vio]") {
+TEST_CASE("Bearings of a rolling shutter are moved to the stamp") {
   const StereoRig rig = test_rig();
   constexpr double kDepth_m = 2.0, kReadoutFrames = 0.6;
   const TexturedPlane plane{kDepth_m, 0.06, 3};
@@ -197,7 +196,7 @@ TEST_CASE("Bearings of a rolling shutter are moved to the stamp", "[vio]") {
   CHECK(quantile(right_errors_px, 0.5) < 0.15);
 }
 
-TEST_CASE("Features with a motion of their own are dropped", "[vio]") {
+TEST_CASE("Features with a motion of their own are dropped") {
   const StereoRig rig = test_rig();
   const TexturedPlane plane;
   FeatureTracker tracker(rig, small_image_config());
@@ -238,7 +237,7 @@ TEST_CASE("Features with a motion of their own are dropped", "[vio]") {
   CHECK(tracked > 40);
 }
 
-TEST_CASE("After a second of darkness features return under new ids", "[vio]") {
+TEST_CASE("After a second of darkness features return under new ids") {
   const StereoRig rig = test_rig();
   const TexturedPlane plane;
   FeatureTracker tracker(rig, small_image_config());
@@ -266,7 +265,7 @@ StereoRig test_rgbd_rig() {
   return rgbd_rig(test_rig().cameras[0], 0.11);
 }
 
-TEST_CASE("Depth gives features the right points of a virtual camera", "[vio]") {
+TEST_CASE("Depth gives features the right points of a virtual camera") {
   const StereoRig rig = test_rgbd_rig();
   const TexturedPlane plane{2.0, 0.06, 3};
   FeatureTracker tracker(rig, small_image_config());
@@ -284,7 +283,7 @@ TEST_CASE("Depth gives features the right points of a virtual camera", "[vio]") 
   }
 }
 
-TEST_CASE("Holes and edges of the depth image give no right observation", "[vio]") {
+TEST_CASE("Holes and edges of the depth image give no right observation") {
   const StereoRig rig = test_rgbd_rig();
   const TexturedPlane plane;
   StereoFrame frame = plane.render_rgbd(rig, SE3::Identity(), 0);
@@ -335,7 +334,7 @@ GrayImage squares(int width, int height, int first) {
   return image;
 }
 
-TEST_CASE("Detected corners are at the true corners", "[vio]") {
+TEST_CASE("Detected corners are at the true corners") {
   TrackerConfig config{.max_features = 1000, .min_distance_px = 8};
   const ImagePyramid image(squares(240, 160, 30), 2, true);
   FeatureDetector detector(config);
@@ -353,7 +352,7 @@ TEST_CASE("Detected corners are at the true corners", "[vio]") {
   }
 }
 
-TEST_CASE("Corners keep their distance, avoid occupied places and cover the image", "[vio]") {
+TEST_CASE("Corners keep their distance, avoid occupied places and cover the image") {
   const StereoRig rig = test_rig();
   const GrayImage picture = TexturedPlane{}.render(rig.cameras[0], SE3::Identity());
   TrackerConfig config{.max_features = 60, .min_distance_px = 15};

@@ -50,7 +50,7 @@ double position_error(const OdometryState& state, const SyntheticWorld& world) {
       .norm();
 }
 
-TEST_CASE("Biases and a varied motion are estimated from exact data", "[vio]") {
+TEST_CASE("Biases and a varied motion are estimated from exact data") {
   SyntheticMotion motion;
   motion.gyro_bias = {0.01, -0.015, 0.005};
   motion.accel_bias = {0.02, 0.03, -0.02};
@@ -64,7 +64,7 @@ TEST_CASE("Biases and a varied motion are estimated from exact data", "[vio]") {
 }
 
 // Two images from one place determine the direction of a near landmark, and not its distance.
-TEST_CASE("A landmark without distance ties the rotations of images, and is no fault", "[vio]") {
+TEST_CASE("A landmark without distance ties the rotations of images, and is no fault") {
   std::mt19937 rng(11);
   for (int k = 0; k < 200; ++k) {
     Window window;
@@ -121,7 +121,7 @@ Eigen::MatrixXd unobservable_directions(const Window& window) {
   return N;
 }
 
-TEST_CASE("Marginalisation gives no information on heading and position", "[vio]") {
+TEST_CASE("Marginalisation gives no information on heading and position") {
   // Nothing holds the first state here, so the information along these directions is zero.
   // First-estimate derivatives keep it zero although the estimates move after each marginalisation.
   SyntheticWorld world(SyntheticMotion{}, 4);
@@ -190,7 +190,7 @@ ModelledRun run_as_modelled(unsigned seed, const VioConfig& config, std::size_t 
   return run;
 }
 
-TEST_CASE("The errors of relative poses agree with their covariance", "[vio]") {
+TEST_CASE("The errors of relative poses agree with their covariance") {
   // Mean of chi-squared with 6 degrees of freedom over the runs: 6 with this standard deviation.
   constexpr int kRuns = 60;
   const double sigma = std::sqrt(12.0 / kRuns);
@@ -215,7 +215,7 @@ TEST_CASE("The errors of relative poses agree with their covariance", "[vio]") {
   CHECK(std::abs(sum - 6.0) < 3 * sigma);
 }
 
-TEST_CASE("Image points twice as noisy as assumed multiply the error ratio by four", "[vio]") {
+TEST_CASE("Image points twice as noisy as assumed multiply the error ratio by four") {
   constexpr int kRuns = 20;
   VioConfig config = gaussian_config();
   config.calibrate = false;
@@ -232,7 +232,7 @@ TEST_CASE("Image points twice as noisy as assumed multiply the error ratio by fo
   CHECK(ratio == Approx(4.0).epsilon(0.15));
 }
 
-TEST_CASE("Too few landmarks to measure the errors never make a covariance smaller", "[vio]") {
+TEST_CASE("Too few landmarks to measure the errors never make a covariance smaller") {
   const auto landmarks = static_cast<std::size_t>(GENERATE(range(4, 24)));
   CAPTURE(landmarks);
   const ModelledRun run = run_as_modelled(1, gaussian_config(), landmarks);
@@ -244,7 +244,7 @@ TEST_CASE("Too few landmarks to measure the errors never make a covariance small
   CHECK(relative->error_ratio < 10.0);
 }
 
-TEST_CASE("A gyroscope that is noisier than assumed has less weight", "[vio]") {
+TEST_CASE("A gyroscope that is noisier than assumed has less weight") {
   const auto scale_with = [](double factor) {
     const VioConfig config = gaussian_config();
     VioConfig noisy = config;
@@ -264,7 +264,7 @@ TEST_CASE("A gyroscope that is noisier than assumed has less weight", "[vio]") {
   CHECK(tenfold <= GyroNoiseScale::kMaxScale);
 }
 
-TEST_CASE("A start from a state with its covariance keeps that covariance", "[vio]") {
+TEST_CASE("A start from a state with its covariance keeps that covariance") {
   SyntheticMotion motion;
   motion.gyro_bias = {0.005, -0.01, 0.01};
   SyntheticWorld world(motion, 10, 40);
@@ -290,7 +290,7 @@ TEST_CASE("A start from a state with its covariance keeps that covariance", "[vi
   }
 }
 
-TEST_CASE("No small step lowers the cost of an optimised window with a prior", "[vio]") {
+TEST_CASE("No small step lowers the cost of an optimised window with a prior") {
   const unsigned seed = GENERATE(range(0U, 3U));
   CAPTURE(seed);
   SyntheticWorld world(SyntheticMotion{}, seed + 20);
@@ -317,7 +317,7 @@ TEST_CASE("No small step lowers the cost of an optimised window with a prior", "
   }
 }
 
-TEST_CASE("Wrong observations are dropped and do not increase the error", "[vio]") {
+TEST_CASE("Wrong observations are dropped and do not increase the error") {
   SyntheticWorld world(SyntheticMotion{}, 6);
   auto frames = world.frames(60, 0.5);
   std::mt19937 rng(6);
@@ -336,8 +336,7 @@ TEST_CASE("Wrong observations are dropped and do not increase the error", "[vio]
 
 // From the 40th image on, all points are turned by 0.05 rad (23 px), and the gyroscope does not
 // measure a turn. The smoother drops points that contradict its estimate.
-TEST_CASE("Points that contradict the estimate are counted before they are dropped",
-          "[vio][contradiction]") {
+TEST_CASE("Points that contradict the estimate are counted before they are dropped") {
   constexpr std::size_t kFirstWrong = 40;
   const bool is_wrong = GENERATE(false, true);
   SyntheticWorld world(SyntheticMotion{}, 9);
@@ -365,7 +364,7 @@ TEST_CASE("Points that contradict the estimate are counted before they are dropp
   }
 }
 
-TEST_CASE("During a long rest the window keeps its keyframes and does not grow", "[vio][rest]") {
+TEST_CASE("During a long rest the window keeps its keyframes and does not grow") {
   SyntheticWorld world(SyntheticMotion::standing(), 12);
   constexpr std::size_t kRest = kStartImages + 20, kFilled = kRest + 5, kImages = kRest + 200;
   const auto frames = world.frames(kImages, 0.5);
@@ -413,7 +412,7 @@ double scale_after(GyroNoiseScale& noise, double sigmas, double seconds) {
   return noise.scale();
 }
 
-TEST_CASE("The scale of the gyroscope's noise follows the images within bounds", "[vio]") {
+TEST_CASE("The scale of the gyroscope's noise follows the images within bounds") {
   GyroNoiseScale noise;
   CHECK(noise.scale() == 1.0);
   CHECK(scale_after(noise, 0.5, 30.0) == 1.0);
@@ -422,7 +421,7 @@ TEST_CASE("The scale of the gyroscope's noise follows the images within bounds",
   CHECK(scale_after(noise, 0.5, 30.0) == 1.0);
 }
 
-TEST_CASE("Neither a diverged estimate nor one image changes the noise of the gyroscope", "[vio]") {
+TEST_CASE("Neither a diverged estimate nor one image changes the noise of the gyroscope") {
   const double difference_rad = GENERATE(std::numeric_limits<double>::quiet_NaN(), 1.0);
   GyroNoiseScale noise;
   noise.add(difference_rad, 3.0 * kSigma_rad * kSigma_rad, 0.05);

@@ -13,7 +13,7 @@ StartGuess guess(const std::vector<InertialFrame>& frames) {
   return guess_start(frames, synthetic_rig(), config);
 }
 
-TEST_CASE("Upright turns the specific force to the vertical", "[vio]") {
+TEST_CASE("Upright turns the specific force to the vertical") {
   const auto accel = GENERATE(Eigen::Vector3d(9.8, 1, 0), Eigen::Vector3d(0, 0, 9.81),
                               Eigen::Vector3d(0, 0, -9.81), Eigen::Vector3d(9.81, 0, 0),
                               Eigen::Vector3d(0, -9.81, 0), Eigen::Vector3d(1, 2, 3));
@@ -23,7 +23,7 @@ TEST_CASE("Upright turns the specific force to the vertical", "[vio]") {
   CHECK((R * R.transpose() - Eigen::Matrix3d::Identity()).norm() < 1e-12);
 }
 
-TEST_CASE("A start in motion finds gravity, velocities and the gyro's bias", "[vio]") {
+TEST_CASE("A start in motion finds gravity, velocities and the gyro's bias") {
   const unsigned seed = GENERATE(range(0U, 5U));
   CAPTURE(seed);
   SyntheticMotion motion;
@@ -44,7 +44,7 @@ TEST_CASE("A start in motion finds gravity, velocities and the gyro's bias", "[v
   CHECK(start.states.front().T_odom_body.translation().norm() == 0.0);
 }
 
-TEST_CASE("Images at rest with inertial data of a motion are not detected as rest", "[vio]") {
+TEST_CASE("Images at rest with inertial data of a motion are not detected as rest") {
   SyntheticWorld still(SyntheticMotion::standing(), 3), moving(SyntheticMotion{}, 3);
   auto frames = still.frames(kImages, 0.1);
   const auto other = moving.frames(kImages);
@@ -52,7 +52,7 @@ TEST_CASE("Images at rest with inertial data of a motion are not detected as res
   CHECK(guess(frames).status != StartStatus::kAtRest);
 }
 
-TEST_CASE("Inertial data that contradict the images are inconsistent", "[vio]") {
+TEST_CASE("Inertial data that contradict the images are inconsistent") {
   SyntheticWorld world(SyntheticMotion{}, 4);
   auto frames = world.frames(kImages, 0.1);
   for (InertialFrame& frame : frames)
@@ -60,7 +60,7 @@ TEST_CASE("Inertial data that contradict the images are inconsistent", "[vio]") 
   CHECK(guess(frames).status == StartStatus::kInconsistent);
 }
 
-TEST_CASE("A start distinguishes too few features from too few images", "[vio]") {
+TEST_CASE("A start distinguishes too few features from too few images") {
   SyntheticWorld world(SyntheticMotion{}, 5);
   auto frames = world.frames(kImages);
   CHECK(guess({frames.begin(), frames.begin() + 3}).status == StartStatus::kTooFewImages);
@@ -106,7 +106,7 @@ void thought_slow(OdometryState& state) {
 
 constexpr int kTenSeconds = 200;  // 10 s
 
-TEST_CASE("A slow rotation is not detected as rest", "[vio][rest]") {
+TEST_CASE("A slow rotation is not detected as rest") {
   SyntheticMotion motion = standing();
   motion.turn_amplitude(2) = 0.1;  // 0.01 rad/s at most, 0.005 at both ends
   motion.turn_frequency(2) = 0.1;
@@ -115,8 +115,7 @@ TEST_CASE("A slow rotation is not detected as rest", "[vio][rest]") {
         kTenSeconds);
 }
 
-TEST_CASE("Frozen images are not detected as rest while the body rotates or accelerates",
-          "[vio][rest]") {
+TEST_CASE("Frozen images are not detected as rest while the body rotates or accelerates") {
   const SyntheticMotion motion = standing();
   SyntheticWorld world(motion, 4);
   auto frames = world.frames(kTenSeconds, kNoisePx);
@@ -131,8 +130,7 @@ TEST_CASE("Frozen images are not detected as rest while the body rotates or acce
   CHECK(images_before_rest(frames, motion) == kTenSeconds);
 }
 
-TEST_CASE("A rest ends with the first image that shows a motion and not with passing objects",
-          "[vio][rest]") {
+TEST_CASE("A rest ends with the first image that shows a motion and not with passing objects") {
   const SyntheticMotion motion = standing();
   SyntheticWorld world(motion, 7);
   auto frames = world.frames(60, kNoisePx);

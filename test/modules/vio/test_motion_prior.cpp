@@ -26,8 +26,7 @@ ImuPreintegration virtual_preintegration(Stamp to) {
   return imu;
 }
 
-TEST_CASE("A motion at constant velocity and angular rate has no error under the prior",
-          "[vio][images]") {
+TEST_CASE("A motion at constant velocity and angular rate has no error under the prior") {
   std::mt19937 rng(5);
   const Eigen::Vector3d rate = random_vector<3>(rng), velocity = 3.0 * random_vector<3>(rng);
   OdometryState i, j;
@@ -44,7 +43,7 @@ TEST_CASE("A motion at constant velocity and angular rate has no error under the
   CHECK(predicted.v_odom.isApprox(velocity));
 }
 
-TEST_CASE("Images alone determine the motion from exact tracks", "[vio][images]") {
+TEST_CASE("Images alone determine the motion from exact tracks") {
   SyntheticWorld world(SyntheticMotion{}, 7);
   SensorRig rig = synthetic_rig();
   rig.has_imu = false;
@@ -85,8 +84,7 @@ const Recording* recording(const std::string& name, double to_s) {
   return &recordings.try_emplace(name, read_recording(*folder, 0.0, to_s, false)).first->second;
 }
 
-TEST_CASE("KITTI: images alone give every image a pose, within a percent of the path",
-          "[vio][images]") {
+TEST_CASE("KITTI: images alone give every image a pose, within a percent of the path") {
   const Recording* const data = recording("kitti_sequence_1", 10.0);
   if (data == nullptr) return;
   const OdometryRun run = run_odometry(*data, 0, data->packets.size(), {}, {});
@@ -106,8 +104,8 @@ TEST_CASE("KITTI: images alone give every image a pose, within a percent of the 
   }
 }
 
-TEST_CASE("Images alone: a loss of vision is extrapolated for a second, then odometry starts again",
-          "[vio][images]") {
+TEST_CASE(
+    "Images alone: a loss of vision is extrapolated for a second, then odometry starts again") {
   const Recording* const data = recording("euroc/MH_01_easy", 4.0);
   if (data == nullptr) return;
   const std::size_t first = 30, last = GENERATE(as<std::size_t>(), 38, 60);  // 0.4 s and 1.5 s
@@ -127,8 +125,7 @@ TEST_CASE("Images alone: a loss of vision is extrapolated for a second, then odo
   CHECK(run.states.back().stamp == data->packets.back().frame->stamp);
 }
 
-TEST_CASE("The noise of the shown motion is that of a random walk of both speeds",
-          "[vio][images]") {
+TEST_CASE("The noise of the shown motion is that of a random walk of both speeds") {
   constexpr double kAccel = 0.5, kTurn = 0.8, kStep_s = 0.05;
   std::mt19937 rng(3);
   ShownMotion shown;
@@ -149,8 +146,7 @@ TEST_CASE("The noise of the shown motion is that of a random walk of both speeds
 }
 
 // Images 10 to 12 show a blank wall.
-TEST_CASE("TartanAir: a blank wall is a loss of vision, bridged within the stated uncertainty",
-          "[vio][images]") {
+TEST_CASE("TartanAir: a blank wall is a loss of vision, bridged within the stated uncertainty") {
   const Recording* const data = recording("tartanair_hospital", 3.0);
   if (data == nullptr) return;
   const OdometryRun run = run_odometry(*data, 0, data->packets.size(), {}, {});
@@ -173,7 +169,7 @@ TEST_CASE("TartanAir: a blank wall is a loss of vision, bridged within the state
   CHECK(largest_m > 3.0 * usual_m);
 }
 
-TEST_CASE("ZED 2: odometry does not jump against the motion of the tracks", "[vio][images]") {
+TEST_CASE("ZED 2: odometry does not jump against the motion of the tracks") {
   const Recording* const data = recording("zed2_clips/desk_c", 6.0);
   if (data == nullptr) return;
   FeatureTracker tracker(data->rig.stereo, {}, false);

@@ -62,7 +62,7 @@ Vector6 moderate_twist(std::mt19937& rng) {
   return xi;
 }
 
-TEST_CASE("Two-point RANSAC finds exactly the false matches", "[vio]") {
+TEST_CASE("Two-point RANSAC finds exactly the false matches") {
   const auto seed = GENERATE(range(1U, 11U));
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -84,7 +84,7 @@ TEST_CASE("Two-point RANSAC finds exactly the false matches", "[vio]") {
   CHECK(cosine > std::cos(0.2));
 }
 
-TEST_CASE("The stereo motion is found among false matches with a biased gyroscope", "[vio]") {
+TEST_CASE("The stereo motion is found among false matches with a biased gyroscope") {
   const auto seed = GENERATE(range(1U, 11U));
   CAPTURE(seed);
   std::mt19937 rng(seed);

@@ -24,7 +24,7 @@ cv::Mat warped_texture(const Eigen::Matrix2f& A, const Eigen::Vector2f& centre, 
   return image;
 }
 
-TEST_CASE("A patch is aligned under a known warp and in other light", "[vio]") {
+TEST_CASE("A patch is aligned under a known warp and in other light") {
   const Eigen::Vector2f centre(80.0F, 60.0F);
   const cv::Mat reference = warped_texture(Eigen::Matrix2f::Identity(), centre, 1.0, 0.0);
   Eigen::Matrix2f A = Eigen::Matrix2f::Identity();
@@ -42,7 +42,7 @@ TEST_CASE("A patch is aligned under a known warp and in other light", "[vio]") {
   CHECK(found->correlation > 0.99F);
 }
 
-TEST_CASE("A patch is not aligned with other texture", "[vio]") {
+TEST_CASE("A patch is not aligned with other texture") {
   const Eigen::Vector2f centre(80.0F, 60.0F);
   const Eigen::Matrix2f I = Eigen::Matrix2f::Identity();
   const cv::Mat image = warped_texture(I, centre, 1.0, 0.0);
@@ -59,7 +59,7 @@ TEST_CASE("A patch is not aligned with other texture", "[vio]") {
   CHECK_FALSE(AlignmentPatch::cut(image, {80.0F, 119.0F}));
 }
 
-TEST_CASE("The local warp is the derivative of the image of a facing surface", "[vio]") {
+TEST_CASE("The local warp is the derivative of the image of a facing surface") {
   const bool fisheye = GENERATE(false, true);
   CAPTURE(fisheye);
   const StereoRig rig = fisheye ? fisheye_rig() : test_rig();

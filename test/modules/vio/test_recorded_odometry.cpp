@@ -23,8 +23,7 @@ OdometryRun run_in_one_piece(const Recording& data) {
   return run;
 }
 
-TEST_CASE("MH_01_easy: every image has a pose, within a centimetre, by stereo and by depth",
-          "[vio]") {
+TEST_CASE("MH_01_easy: every image has a pose, within a centimetre, by stereo and by depth") {
   const Recording* const stereo = recording();
   if (stereo == nullptr) return;
   const bool rgbd = GENERATE(false, true);
@@ -43,7 +42,7 @@ TEST_CASE("MH_01_easy: every image has a pose, within a centimetre, by stereo an
   CHECK(errors.scale == Approx(1.0).epsilon(0.03));
 }
 
-TEST_CASE("MH_01_easy: the same input gives the same states to the last bit", "[vio]") {
+TEST_CASE("MH_01_easy: the same input gives the same states to the last bit") {
   const Recording* const data = recording();
   if (data == nullptr) return;
   const OdometryRun a = run_in_one_piece(*data), b = run_in_one_piece(*data);
@@ -51,8 +50,7 @@ TEST_CASE("MH_01_easy: the same input gives the same states to the last bit", "[
     CHECK(a.states[k].T_odom_body.matrix() == b.states[k].T_odom_body.matrix());
 }
 
-TEST_CASE("MH_01_easy: over a second without images and samples the body continues at its speed",
-          "[vio]") {
+TEST_CASE("MH_01_easy: over a second without images and samples the body continues at its speed") {
   const Recording* const data = recording();
   if (data == nullptr) return;
   Recording gap = *data;
@@ -78,8 +76,7 @@ TEST_CASE("MH_01_easy: over a second without images and samples the body continu
 
 // The velocity after the dark contradicts the images if the time offset is not estimated.
 // The prior from the dark would move the pose for seconds more.
-TEST_CASE("MH_01_easy: one second after five seconds of black images odometry is accurate again",
-          "[vio]") {
+TEST_CASE("MH_01_easy: one second after five seconds of black images odometry is accurate again") {
   const auto folder = shared_data("euroc/MH_01_easy");
   if (!folder) return;
   const Recording light = read_recording(*folder, 0.0, 15.0);
@@ -97,8 +94,8 @@ TEST_CASE("MH_01_easy: one second after five seconds of black images odometry is
 }
 
 TEST_CASE(
-    "MH_01_easy: odometry resumed from a keyframe is as accurate as odometry without interruption",
-    "[vio]") {
+    "MH_01_easy: odometry resumed from a keyframe is as accurate as odometry without "
+    "interruption") {
   const Recording* const data = recording();
   if (data == nullptr) return;
   const OdometryRun whole = run_odometry(*data, 0, data->packets.size(), TrackerConfig{}, {});
@@ -127,8 +124,7 @@ TEST_CASE(
         1.05 * static_cast<double>(ratios.size()));
 }
 
-TEST_CASE("MH_01_easy: odometry resumed from a keyframe knows the time offset of the run before",
-          "[vio][calibration]") {
+TEST_CASE("MH_01_easy: odometry resumed from a keyframe knows the time offset of the run before") {
   const Recording* const data = recording();
   if (data == nullptr) return;
   const double late_s = GENERATE(-0.02, 0.02);
@@ -158,7 +154,7 @@ TEST_CASE("MH_01_easy: odometry resumed from a keyframe knows the time offset of
   CHECK(next.covariance(0, 0) < anew.covariance(0, 0));
 }
 
-TEST_CASE("V1_01_easy: two minutes at rest, rotors idling", "[vio][rest]") {
+TEST_CASE("V1_01_easy: two minutes at rest, rotors idling") {
   const auto folder = shared_data("euroc/V1_01_easy");
   if (!folder) return;
   const Recording data = standing_recording(*folder, 120.0);
@@ -174,7 +170,7 @@ TEST_CASE("V1_01_easy: two minutes at rest, rotors idling", "[vio][rest]") {
   }
 }
 
-TEST_CASE("MH_01_easy: a body set down stays there whatever the images show", "[vio][rest]") {
+TEST_CASE("MH_01_easy: a body set down stays there whatever the images show") {
   // It moves until 15.5 s. From 16 s on there is an image a second.
   const auto folder = shared_data("euroc/MH_01_easy");
   if (!folder) return;
@@ -187,7 +183,7 @@ TEST_CASE("MH_01_easy: a body set down stays there whatever the images show", "[
     CHECK((there.inverse() * run.states[k].T_odom_body).translation().norm() < 1e-3);
 }
 
-TEST_CASE("The odometry node publishes the results of odometry in order of time", "[vio][node]") {
+TEST_CASE("The odometry node publishes the results of odometry in order of time") {
   const Recording* const data = recording();
   if (data == nullptr) return;
   Topic<SensorPacket> packets;

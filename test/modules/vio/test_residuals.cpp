@@ -29,7 +29,7 @@ OdometryState perturbed(const OdometryState& state, double size, std::mt19937& r
   return moved(state, d);
 }
 
-TEST_CASE("Reprojection Jacobians agree with differences", "[vio]") {
+TEST_CASE("Reprojection Jacobians agree with differences") {
   const unsigned seed = GENERATE(range(0U, 10U));
   const std::size_t camera = GENERATE(0U, 1U);
   CAPTURE(seed, camera);
@@ -52,7 +52,7 @@ TEST_CASE("Reprojection Jacobians agree with differences", "[vio]") {
                    numeric_jacobian<3>([&](const Eigen::Vector3d& d) { return error(T, p + d); }));
 }
 
-TEST_CASE("A reprojection error is in standard deviations of the image point", "[vio]") {
+TEST_CASE("A reprojection error is in standard deviations of the image point") {
   const Camera camera = synthetic_rig().stereo.cameras[0];
   const ViewModel view = view_model(camera, 0.5);
   const SE3 T = SE3::Identity();
@@ -76,7 +76,7 @@ void check_imu_derivatives(const ImuFactor& factor, const OdometryState& i,
                                  [&](const Vector15& d) { return factor.error(i, moved(j, d)); }));
 }
 
-TEST_CASE("Inertial Jacobians agree with differences", "[vio]") {
+TEST_CASE("Inertial Jacobians agree with differences") {
   const unsigned seed = GENERATE(range(0U, 10U));
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -90,7 +90,7 @@ TEST_CASE("Inertial Jacobians agree with differences", "[vio]") {
   check_imu_derivatives(factor, i, j);
 }
 
-TEST_CASE("A factor at rest holds the state with any gravity and biases", "[vio][rest]") {
+TEST_CASE("A factor at rest holds the state with any gravity and biases") {
   const unsigned seed = GENERATE(range(0U, 5U));
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -105,7 +105,7 @@ TEST_CASE("A factor at rest holds the state with any gravity and biases", "[vio]
   CHECK(factor.error(i, moved(i, walked)).squaredNorm() == Approx(6.0));
 }
 
-TEST_CASE("At its first estimates a prior's offset has the identity as derivative", "[vio]") {
+TEST_CASE("At its first estimates a prior's offset has the identity as derivative") {
   std::mt19937 rng(11);
   StatePrior prior;
   std::vector<const OdometryState*> states;
@@ -153,7 +153,7 @@ double prediction_error(Stamp step) {
                    (truth.v_odom - predicted.v_odom).norm()});
 }
 
-TEST_CASE("Preintegration predicts a motion known in closed form to second order", "[vio]") {
+TEST_CASE("Preintegration predicts a motion known in closed form to second order") {
   // Half a second of samples at 200 Hz, rates up to 0.5 rad/s: the step error is
   // dt^2 / 12 * second derivative, summed up below 1e-5.
   const double coarse = prediction_error(5 * kMillisecond);
@@ -161,7 +161,7 @@ TEST_CASE("Preintegration predicts a motion known in closed form to second order
   CHECK(coarse / prediction_error(kMillisecond) > 20.0);  // 25 for order two, 5 for order one
 }
 
-TEST_CASE("Preintegration refuses an interval that its samples do not cover", "[vio]") {
+TEST_CASE("Preintegration refuses an interval that its samples do not cover") {
   const SyntheticMotion motion;
   const auto samples = motion.samples(10, 20 * kMillisecond + 10, 5 * kMillisecond);
   ImuPreintegration imu(ImuNoise{}, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
@@ -172,7 +172,7 @@ TEST_CASE("Preintegration refuses an interval that its samples do not cover", "[
   CHECK(imu.dt_s() == 0.0);
 }
 
-TEST_CASE("First-order bias correction agrees with a new integration", "[vio]") {
+TEST_CASE("First-order bias correction agrees with a new integration") {
   const unsigned seed = GENERATE(range(0U, 5U));
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -191,7 +191,7 @@ TEST_CASE("First-order bias correction agrees with a new integration", "[vio]") 
   CHECK((imu.motion().dv - anew.dv).norm() > 1e-5);  // the correction does something
 }
 
-TEST_CASE("The covariance of preintegration agrees with Monte Carlo", "[vio]") {
+TEST_CASE("The covariance of preintegration agrees with Monte Carlo") {
   constexpr int kTrials = 3000;
   const SyntheticMotion motion;
   const Stamp end = 300 * kMillisecond, step = 5 * kMillisecond;
@@ -243,7 +243,7 @@ Quadratic random_quadratic(unsigned seed, int rows) {
   return {J.transpose() * J, J.transpose() * residual};
 }
 
-TEST_CASE("Marginalisation does not change the batch solution of a linear problem", "[vio]") {
+TEST_CASE("Marginalisation does not change the batch solution of a linear problem") {
   const unsigned seed = GENERATE(range(0U, 10U));
   CAPTURE(seed);
   const Quadratic q = random_quadratic(seed, 30);

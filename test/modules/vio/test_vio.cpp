@@ -116,7 +116,7 @@ VioResult feed(Vio& vio, Ride& ride, int first, int last) {
   return all;
 }
 
-TEST_CASE("Keyframes are numbered without gaps and chain by their relative poses", "[vio]") {
+TEST_CASE("Keyframes are numbered without gaps and chain by their relative poses") {
   Ride ride;
   Vio vio = ride.restless();
   const VioResult result = feed(vio, ride, 0, 100);
@@ -140,7 +140,7 @@ TEST_CASE("Keyframes are numbered without gaps and chain by their relative poses
   CHECK(std::sqrt(stretches / information) == Approx(config.tilt_sigma));
 }
 
-TEST_CASE("Every image is located by the last keyframe at or before it", "[vio]") {
+TEST_CASE("Every image is located by the last keyframe at or before it") {
   Ride ride;
   Vio vio = ride.restless();
   const VioResult result = feed(vio, ride, 0, 100);
@@ -164,7 +164,7 @@ TEST_CASE("Every image is located by the last keyframe at or before it", "[vio]"
   CHECK(of_keyframes == result.keyframes.size());
 }
 
-TEST_CASE("Packets without a usable image are refused and counted", "[vio]") {
+TEST_CASE("Packets without a usable image are refused and counted") {
   Ride ride;
   Vio vio = ride.vio();
   REQUIRE(feed(vio, ride, 0, 20).states.size() == 20);
@@ -187,7 +187,7 @@ TEST_CASE("Packets without a usable image are refused and counted", "[vio]") {
   CHECK(vio.statistics().starts == 1);
 }
 
-TEST_CASE("Invalid inertial samples are refused and the image still has a pose", "[vio]") {
+TEST_CASE("Invalid inertial samples are refused and the image still has a pose") {
   Ride ride;
   Vio vio = ride.vio();
   REQUIRE(feed(vio, ride, 0, 20).states.size() == 20);
@@ -205,7 +205,7 @@ TEST_CASE("Invalid inertial samples are refused and the image still has a pose",
   CHECK(feed(vio, ride, 21, 30).states.size() == 9);
 }
 
-TEST_CASE("Images carry the pose over a gap in the inertial samples", "[vio]") {
+TEST_CASE("Images carry the pose over a gap in the inertial samples") {
   Ride ride;
   Vio vio = ride.vio();
   const VioResult before = feed(vio, ride, 0, 30);
@@ -225,7 +225,7 @@ TEST_CASE("Images carry the pose over a gap in the inertial samples", "[vio]") {
   CHECK(vio.statistics().starts == 1);
 }
 
-TEST_CASE("A long gap in the inertial samples leads to a new start from the last pose", "[vio]") {
+TEST_CASE("A long gap in the inertial samples leads to a new start from the last pose") {
   Ride ride;
   Vio vio = ride.vio();
   const VioResult before = feed(vio, ride, 0, 30);
@@ -251,7 +251,7 @@ TEST_CASE("A long gap in the inertial samples leads to a new start from the last
   CHECK(after.keyframes.front().covariance(5, 5) > 0.1);
 }
 
-TEST_CASE("After a long pause of the images odometry starts again from the last pose", "[vio]") {
+TEST_CASE("After a long pause of the images odometry starts again from the last pose") {
   constexpr int kPause = 13 * 60 * 20;  // 13 minutes in images at 20 Hz
   const bool are_in_one_packet = GENERATE(true, false);
   CAPTURE(are_in_one_packet);
@@ -275,7 +275,7 @@ TEST_CASE("After a long pause of the images odometry starts again from the last 
   CHECK(jump.translation().norm() < 5e-3);
 }
 
-TEST_CASE("Odometry starts at once from a keyframe of an earlier process", "[vio]") {
+TEST_CASE("Odometry starts at once from a keyframe of an earlier process") {
   Ride ride;
   Vio former = ride.restless();
   const VioResult before = feed(former, ride, 0, 60);
@@ -302,7 +302,7 @@ TEST_CASE("Odometry starts at once from a keyframe of an earlier process", "[vio
   CHECK(after.keyframes.front().covariance(5, 5) < 1e-3);
 }
 
-TEST_CASE("An impossible motion is detected and odometry starts again", "[vio]") {
+TEST_CASE("An impossible motion is detected and odometry starts again") {
   Ride ride;
   Vio vio = ride.vio();
   REQUIRE(feed(vio, ride, 0, 30).states.size() == 30);
@@ -322,7 +322,7 @@ TEST_CASE("An impossible motion is detected and odometry starts again", "[vio]")
   CHECK(after.states.back().T_odom_body.translation().norm() < 1.0);
 }
 
-TEST_CASE("Poses are finite and covariances valid with any samples", "[vio]") {
+TEST_CASE("Poses are finite and covariances valid with any samples") {
   const unsigned seed = GENERATE(range(0U, 8U));
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -353,7 +353,7 @@ TEST_CASE("Poses are finite and covariances valid with any samples", "[vio]") {
   }
 }
 
-TEST_CASE("Without features odometry waits for images to start with", "[vio]") {
+TEST_CASE("Without features odometry waits for images to start with") {
   Ride ride;
   Vio vio = ride.vio();
   VioProblem worst = VioProblem::kNone;
@@ -372,8 +372,7 @@ TEST_CASE("Without features odometry waits for images to start with", "[vio]") {
   CHECK_FALSE(feed(vio, ride, 70, 140).states.empty());
 }
 
-TEST_CASE("During a minute at rest the pose does not move and no keyframes are made",
-          "[vio][rest]") {
+TEST_CASE("During a minute at rest the pose does not move and no keyframes are made") {
   Ride ride(Glide{.begin_s = 1e3});
   Vio vio = ride.vio();
   const VioResult result = feed(vio, ride, 0, 1200);
@@ -397,7 +396,7 @@ TEST_CASE("During a minute at rest the pose does not move and no keyframes are m
   CHECK((result.states.back().gyro_bias - Ride::kGyroBias).norm() < 2e-3);
 }
 
-TEST_CASE("After a rest the next keyframe is measured from the one before it", "[vio][rest]") {
+TEST_CASE("After a rest the next keyframe is measured from the one before it") {
   const Glide glide{.begin_s = 30.0};
   Ride ride(glide);
   Vio vio = ride.vio();
@@ -419,7 +418,7 @@ TEST_CASE("After a rest the next keyframe is measured from the one before it", "
   CHECK(T.translation().norm() == Approx(glide.distance_m).epsilon(0.02));
 }
 
-TEST_CASE("Slow motion does not shorten the trajectory", "[vio][rest]") {
+TEST_CASE("Slow motion does not shorten the trajectory") {
   // 2.5, 10 and 25 mm/s on average
   const auto [distance_m, duration_s] =
       GENERATE(table<double, double>({{0.05, 20.0}, {0.1, 10.0}, {0.25, 10.0}}));
@@ -438,15 +437,14 @@ TEST_CASE("Slow motion does not shorten the trajectory", "[vio][rest]") {
             .margin(kMargin_m));
 }
 
-TEST_CASE("A speed persists for about a second", "[vio]") {
+TEST_CASE("A speed persists for about a second") {
   CHECK(coasting_s(0.0) == 0.0);
   CHECK(coasting_s(0.1) == Approx(0.05).epsilon(0.05));  // both ends together cover all of the time
   CHECK(coasting_s(2.0) < 1.0);
   CHECK(coasting_s(1e9) == Approx(1.0));
 }
 
-TEST_CASE("The covariance across a new start grows with the time without images and the speed",
-          "[vio]") {
+TEST_CASE("The covariance across a new start grows with the time without images and the speed") {
   const Matrix6 at_once = restart_covariance();
   CHECK(at_once.isDiagonal());
   CHECK(at_once(2, 2) == Approx(0.09));

@@ -19,7 +19,7 @@ struct Watched {
   }
 };
 
-TEST_CASE("A loss of vision is reported with its first image and its end", "[vio][vision]") {
+TEST_CASE("A loss of vision is reported with its first image and its end") {
   Watched run;
   run.add(20, 50);
   run.add(100, 3);
@@ -40,8 +40,7 @@ TEST_CASE("A loss of vision is reported with its first image and its end", "[vio
   CHECK(run.watch.lost_s() == Approx(5.0 + 39 * 0.05));
 }
 
-TEST_CASE("A few images without landmarks and a start without vision are no loss",
-          "[vio][vision]") {
+TEST_CASE("A few images without landmarks and a start without vision are no loss") {
   Watched run;
   run.add(100, 0);
   CHECK(run.events.empty());
@@ -53,8 +52,7 @@ TEST_CASE("A few images without landmarks and a start without vision are no loss
   CHECK(run.watch.lost_s() == 0.0);
 }
 
-TEST_CASE("Without an inertial sensor a single image without landmarks is a loss",
-          "[vio][vision]") {
+TEST_CASE("Without an inertial sensor a single image without landmarks is a loss") {
   Watched run{.watch = VisionWatch(false)};
   run.add(20, 50);
   run.add(1, VisionWatch::kMinLandmarks - 1);
@@ -73,8 +71,7 @@ ImageFit random_fit(std::mt19937& rng, int points, double rate) {
   return fit;
 }
 
-TEST_CASE("A right estimate is not contradicted by the points that trackers lose",
-          "[vio][contradiction]") {
+TEST_CASE("A right estimate is not contradicted by the points that trackers lose") {
   const int points = GENERATE(8, 40, 300);
   std::mt19937 rng(7);
   EstimateWatch watch;
@@ -84,8 +81,7 @@ TEST_CASE("A right estimate is not contradicted by the points that trackers lose
   }
 }
 
-TEST_CASE("A wrong estimate is contradicted within half a second of images",
-          "[vio][contradiction]") {
+TEST_CASE("A wrong estimate is contradicted within half a second of images") {
   EstimateWatch watch;
   for (int k = 0; k < 1000; ++k) watch.add({.points = 60, .contradicting = 2});
   int images = 0;

@@ -5,7 +5,7 @@
 namespace km {
 namespace {
 
-TEST_CASE("A message of one robot arrives at the other unchanged and once", "[dds]") {
+TEST_CASE("A message of one robot arrives at the other unchanged and once") {
   Two two;
   auto& [domain, a, b] = two;
   const std::vector<std::uint8_t> payload(70000, 42);
@@ -19,7 +19,7 @@ TEST_CASE("A message of one robot arrives at the other unchanged and once", "[dd
   CHECK(a.received.messages().empty());  // a robot does not receive its own messages
 }
 
-TEST_CASE("A robot that joins late gets every event, request, and the newest state", "[dds]") {
+TEST_CASE("A robot that joins late gets every event, request, and the newest state") {
   const auto kind = GENERATE(TopicKind::kEvent, TopicKind::kState, TopicKind::kRequest);
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
   TestRobot a(domain, 3, kind), witness(domain, 4, kind);
@@ -40,7 +40,7 @@ TEST_CASE("A robot that joins late gets every event, request, and the newest sta
     if (ping.index < 2) CHECK(ping.payload == std::vector<std::uint8_t>{2});
 }
 
-TEST_CASE("A request expires after the lease of a silent robot", "[dds]") {
+TEST_CASE("A request expires after the lease of a silent robot") {
   DdsConfig config = loopback_config();
   config.lease_s = 3.0;  // the shortest accepted
   const auto domain = std::make_shared<const DdsDomain>(config);
@@ -55,7 +55,7 @@ TEST_CASE("A request expires after the lease of a silent robot", "[dds]") {
   CHECK(indices(late.received.wait_for(1)) == std::vector<std::uint32_t>{1});
 }
 
-TEST_CASE("A repeated message is dropped", "[dds]") {
+TEST_CASE("A repeated message is dropped") {
   Two two;
   auto& [domain, a, b] = two;
   for (std::uint32_t i = 0; i < 20; ++i) a.ping(i);
@@ -69,8 +69,7 @@ TEST_CASE("A repeated message is dropped", "[dds]") {
   CHECK(b.traffic(Direction::kIn).count.messages == 20);
 }
 
-TEST_CASE("An addressed message reaches its addressee and no other robot gets a byte of it",
-          "[dds]") {
+TEST_CASE("An addressed message reaches its addressee and no other robot gets a byte of it") {
   const auto kind = GENERATE(TopicKind::kRequest, TopicKind::kEvent);
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
   TestRobot a(domain, 3, kind, kind), b(domain, 4, kind, kind), c(domain, 5, kind, kind);
@@ -90,7 +89,7 @@ TEST_CASE("An addressed message reaches its addressee and no other robot gets a 
   CHECK(a.traffic(Direction::kOut).count.messages == 0);
 }
 
-TEST_CASE("Earlier messages for a robot that joins late are counted once", "[dds]") {
+TEST_CASE("Earlier messages for a robot that joins late are counted once") {
   const auto kind = GENERATE(TopicKind::kEvent, TopicKind::kState);
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
   TestRobot a(domain, 3, kind), b(domain, 4, kind);
@@ -108,7 +107,7 @@ TEST_CASE("Earlier messages for a robot that joins late are counted once", "[dds
   for (const PeerTraffic& row : a.bridge.traffic().peers) CHECK(row.retransmitted_bytes == 0);
 }
 
-TEST_CASE("Messages of a hostile peer are counted by reason and change nothing", "[dds]") {
+TEST_CASE("Messages of a hostile peer are counted by reason and change nothing") {
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
   TestRobot a(domain, 3), b(domain, 4), foe(domain, 9);
   meet({&a, &b, &foe});
@@ -136,8 +135,7 @@ TEST_CASE("Messages of a hostile peer are counted by reason and change nothing",
   CHECK(b.bridge.error() == nullptr);
 }
 
-TEST_CASE("Messages of a new incarnation wait until all nodes know that the robot has restarted",
-          "[dds]") {
+TEST_CASE("Messages of a new incarnation wait until all nodes know that the robot has restarted") {
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
   TestRobot a(domain, 3);
   std::mutex mutex;
@@ -168,7 +166,7 @@ TEST_CASE("Messages of a new incarnation wait until all nodes know that the robo
   CHECK(a.received.wait_for(2).size() == 2);
 }
 
-TEST_CASE("A subscriber that throws does not stop the robot from receiving", "[dds]") {
+TEST_CASE("A subscriber that throws does not stop the robot from receiving") {
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
   TestRobot a(domain, 3), b(domain, 4);
   b.pings.from_peers().subscribe([](const auto& ping) {
@@ -182,7 +180,7 @@ TEST_CASE("A subscriber that throws does not stop the robot from receiving", "[d
       [&] { return b.traffic(Direction::kIn).refused["its handling threw an exception"] == 1; }));
 }
 
-TEST_CASE("Duplicates agree with a set of all numbers, in any order", "[sequence]") {
+TEST_CASE("Duplicates agree with a set of all numbers, in any order") {
   const auto seed = GENERATE(range(0U, 50U));
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -195,7 +193,7 @@ TEST_CASE("Duplicates agree with a set of all numbers, in any order", "[sequence
   }
 }
 
-TEST_CASE("A stream that skips every other number does not exhaust the memory", "[sequence]") {
+TEST_CASE("A stream that skips every other number does not exhaust the memory") {
   constexpr std::uint32_t kCount = 10 * SequenceTracker::kMaxIntervals;
   SequenceTracker tracker;
   for (std::uint32_t i = 0; i < kCount; ++i) CHECK(tracker.is_new(2 * i + 1));

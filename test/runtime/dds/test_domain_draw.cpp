@@ -15,8 +15,7 @@ unsigned own_number() {
   return 1000 + static_cast<unsigned>(getpid()) * 16;
 }
 
-TEST_CASE("No domain is drawn twice, and a host without a free domain is reported",
-          "[domain_draw]") {
+TEST_CASE("No domain is drawn twice, and a host without a free domain is reported") {
   const unsigned first = own_number();
   std::set<unsigned> drawn;
   for (unsigned i = 0; i < 5; ++i) drawn.insert(draw_domain(first, first + 4));
@@ -26,7 +25,7 @@ TEST_CASE("No domain is drawn twice, and a host without a free domain is reporte
   CHECK_THROWS_WITH(draw_domain(first, first + 4), Contains("are taken") && Contains("--domain"));
 }
 
-TEST_CASE("A domain with a participant of a program that drew none is not drawn", "[domain_draw]") {
+TEST_CASE("A domain with a participant of a program that drew none is not drawn") {
   // Multicast, and unicast of the first and the fourth participant.
   const unsigned offset = GENERATE(0U, 10U, 16U);
   const int participant = socket(AF_INET, SOCK_DGRAM, 0);
@@ -41,8 +40,7 @@ TEST_CASE("A domain with a participant of a program that drew none is not drawn"
   close(participant);
 }
 
-TEST_CASE("A domain stays taken until the children of the process that drew it have ended",
-          "[domain_draw]") {
+TEST_CASE("A domain stays taken until the children of the process that drew it have ended") {
   const unsigned domain = own_number() + 8;
   const pid_t team = fork();
   if (team == 0) {

@@ -22,7 +22,7 @@ DdsConfig profile(const std::string& name, const std::vector<std::string>& overr
   return config;
 }
 
-TEST_CASE("Every shipped profile gives a participant, by multicast and by peers", "[profiles]") {
+TEST_CASE("Every shipped profile gives a participant, by multicast and by peers") {
   const std::string name = GENERATE("wired", "wifi", "intermittent");
   const std::string discovery = GENERATE("multicast", "peers");
   CAPTURE(name, discovery);
@@ -33,18 +33,18 @@ TEST_CASE("Every shipped profile gives a participant, by multicast and by peers"
   CHECK_NOTHROW(DdsParticipant(config, {1, "a", kProtocolVersion, 1}));
 }
 
-TEST_CASE("The profiles leave room for more than ten robots on one host", "[profiles]") {
+TEST_CASE("The profiles leave room for more than ten robots on one host") {
   const std::string name = GENERATE("wired", "wifi", "intermittent");
   CHECK(profile(name, {}).max_participant_index >= 32);
   // Ports of the last one stay below those of the next domain and inside 16 bits.
   CHECK(11 + 2 * profile(name, {}).max_participant_index < 250);
 }
 
-TEST_CASE("The wired profile is the default configuration", "[profiles]") {
+TEST_CASE("The wired profile is the default configuration") {
   CHECK(to_yaml(profile("wired", {})) == to_yaml(DdsConfig{}));
 }
 
-TEST_CASE("Found by address a robot takes a fixed port, by multicast any", "[profiles]") {
+TEST_CASE("Found by address a robot takes a fixed port, by multicast any") {
   DdsConfig config;
   CHECK_THAT(cyclone_xml(config, kCable), Contains("<ParticipantIndex>none<") &&
                                               Contains("<AllowMulticast>spdp<") &&
@@ -60,21 +60,20 @@ TEST_CASE("Found by address a robot takes a fixed port, by multicast any", "[pro
                    "<Peer address='10.0.0.2:7912'/><Peer address='10.0.0.3:9999'/></Peers>"));
 }
 
-TEST_CASE("The loopback interface is configured to carry multicast", "[profiles]") {
+TEST_CASE("The loopback interface is configured to carry multicast") {
   const DdsConfig config;
   CHECK_THAT(cyclone_xml(config, kLoopback), Contains("name='lo' multicast='true'"));
   CHECK_THAT(cyclone_xml(config, kCable), !Contains("multicast='true'"));
 }
 
-TEST_CASE("Text of a configuration cannot break out of the XML document", "[profiles]") {
+TEST_CASE("Text of a configuration cannot break out of the XML document") {
   DdsConfig config;
   config.team = "a</Tag><evil b='\"&";
   CHECK_THAT(cyclone_xml(config, kCable),
              Contains("<Tag>a&lt;/Tag&gt;&lt;evil b=&apos;&quot;&amp;</Tag>"));
 }
 
-TEST_CASE("Datagrams, also repeated ones and fragments, fit into packets of the interface",
-          "[profiles]") {
+TEST_CASE("Datagrams, also repeated ones and fragments, fit into packets of the interface") {
   NetworkInterface tunnel = kTunnel;
   tunnel.mtu = 1280;
   CHECK_THAT(cyclone_xml(profile(GENERATE("wired", "wifi"), {}), tunnel),
@@ -83,7 +82,7 @@ TEST_CASE("Datagrams, also repeated ones and fragments, fit into packets of the 
   CHECK_THAT(cyclone_xml({}, kCable), Contains("<MaxMessageSize>65500B<"));  // MTU unknown
 }
 
-TEST_CASE("An interface without a carrier, or away from the peers, is not chosen", "[profiles]") {
+TEST_CASE("An interface without a carrier, or away from the peers, is not chosen") {
   NetworkInterface docker{"docker0", "172.17.0.1", true, false};
   NetworkInterface tunnel = kTunnel;
   const auto with = [&](bool has_carrier, int routes) {
@@ -102,7 +101,7 @@ TEST_CASE("An interface without a carrier, or away from the peers, is not chosen
   CHECK(select_interface(with(false, 0), "docker0").name == "docker0");
 }
 
-TEST_CASE("The interface is the one named, else the likeliest", "[profiles]") {
+TEST_CASE("The interface is the one named, else the likeliest") {
   CHECK(select_interface({kLoopback, kCable, kRadio}, "wlan0").name == "wlan0");
   CHECK(select_interface({kLoopback, kCable, kRadio}, "").name == "eth0");
   CHECK(select_interface({kLoopback, kTunnel, kRadio}, "").name == "wlan0");
@@ -113,7 +112,7 @@ TEST_CASE("The interface is the one named, else the likeliest", "[profiles]") {
   CHECK_THROWS_AS(select_interface({}, ""), ConfigError);
 }
 
-TEST_CASE("Hosts that are unknown are all named", "[dds]") {
+TEST_CASE("Hosts that are unknown are all named") {
   CHECK_NOTHROW(check_hosts({}));
   CHECK_NOTHROW(check_hosts({"10.0.0.2", "127.0.0.1:7410"}));
   if (gethostbyname("localhost") == nullptr)

@@ -55,8 +55,7 @@ std::vector<int> summary(Process& robot) {
   return numbers;
 }
 
-TEST_CASE("On a host with several interfaces the robot uses the configured one",
-          "[dds][namespaces]") {
+TEST_CASE("On a host with several interfaces the robot uses the configured one") {
   if (!VirtualNetwork::available()) return;
   VirtualNetwork network(2);
   for (const int host : {1, 2}) network.add_dead_interface(host);
@@ -65,8 +64,7 @@ TEST_CASE("On a host with several interfaces the robot uses the configured one",
   CHECK(robots.b->wait_for("joined 3"));
 }
 
-TEST_CASE("Without configuration a robot uses the interface with a carrier, and moves to it",
-          "[dds][namespaces]") {
+TEST_CASE("Without configuration a robot uses the interface with a carrier, and moves to it") {
   if (!VirtualNetwork::available()) return;
   const bool is_late = GENERATE(false, true);  // the cable is connected after the start
   CAPTURE(is_late);
@@ -86,8 +84,7 @@ TEST_CASE("Without configuration a robot uses the interface with a carrier, and 
   CHECK(robots.b->wait_for("joined 3"));
 }
 
-TEST_CASE("A robot that is received but does not receive this one is unmet, with the cause",
-          "[dds][namespaces]") {
+TEST_CASE("A robot that is received but does not receive this one is unmet, with the cause") {
   if (!VirtualNetwork::available()) return;
   const VirtualNetwork network(2);
   // Only its multicast leaves host 1, and nothing arrives from host 2.
@@ -100,7 +97,7 @@ TEST_CASE("A robot that is received but does not receive this one is unmet, with
   CHECK_THAT(line->text, Contains("robot3 (id 3): ") && Contains("firewall"));
 }
 
-TEST_CASE("Large messages pass a network that drops fragments of packets", "[dds][namespaces]") {
+TEST_CASE("Large messages pass a network that drops fragments of packets") {
   if (!VirtualNetwork::available()) return;
   VirtualNetwork network(2);
   for (const int host : {1, 2}) {
@@ -114,7 +111,7 @@ TEST_CASE("Large messages pass a network that drops fragments of packets", "[dds
   CHECK(packets_split_by(network.host(1)) == 0);
 }
 
-TEST_CASE("On a host with only loopback robots meet without configuration", "[dds][namespaces]") {
+TEST_CASE("On a host with only loopback robots meet without configuration") {
   if (!VirtualNetwork::available()) return;
   const std::string discovery = GENERATE("multicast", "peers");
   VirtualNetwork network(1);
@@ -126,7 +123,7 @@ TEST_CASE("On a host with only loopback robots meet without configuration", "[dd
   CHECK(b->wait_for("joined 3"));
 }
 
-TEST_CASE("A link that fails and returns loses no event", "[dds][namespaces]") {
+TEST_CASE("A link that fails and returns loses no event") {
   if (!VirtualNetwork::available()) return;
   const std::string discovery = GENERATE("multicast", "peers");
   VirtualNetwork network(2);
@@ -176,8 +173,7 @@ void check_received(const Pair& robots, int last) {
   check_received(robots, last, {"ping", "one"});
 }
 
-TEST_CASE("A robot whose own address changes returns to its team, and nothing is lost",
-          "[dds][namespaces]") {
+TEST_CASE("A robot whose own address changes returns to its team, and nothing is lost") {
   if (!VirtualNetwork::available()) return;
   const std::string discovery = GENERATE("multicast", "peers");
   const std::string address = GENERATE("10.77.0.102/24", "10.78.0.2/24");
@@ -218,8 +214,7 @@ TEST_CASE("A robot whose own address changes returns to its team, and nothing is
   }
 }
 
-TEST_CASE("A robot waits for an interface that is not up, and for one that has gone",
-          "[dds][namespaces]") {
+TEST_CASE("A robot waits for an interface that is not up, and for one that has gone") {
   if (!VirtualNetwork::available()) return;
   const std::vector<std::string> interface =
       GENERATE(std::vector<std::string>{"interface=eth0"}, std::vector<std::string>());
@@ -259,8 +254,7 @@ TEST_CASE("A robot waits for an interface that is not up, and for one that has g
 }
 
 TEST_CASE(
-    "With keys an outage longer than the lease repeats the history, and duplicates are dropped",
-    "[dds][namespaces]") {
+    "With keys an outage longer than the lease repeats the history, and duplicates are dropped") {
   if (!VirtualNetwork::available()) return;
   VirtualNetwork network(2);
   const Pair robots(

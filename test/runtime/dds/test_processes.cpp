@@ -5,8 +5,7 @@
 namespace km {
 namespace {
 
-TEST_CASE("Robots with keys return after a forged packet has declared that they are gone",
-          "[dds][processes]") {
+TEST_CASE("Robots with keys return after a forged packet has declared that they are gone") {
   const auto settings =
       own_team() + std::vector<std::string>{"interface=lo", "spdp_interval_s=0.2"};
   const TeamOfTwo keys;
@@ -26,8 +25,7 @@ TEST_CASE("Robots with keys return after a forged packet has declared that they 
   CHECK(a->wait_for("one 4 7"));
 }
 
-TEST_CASE("Robots meet after forged packets have replaced the announcement of one of them",
-          "[dds][processes]") {
+TEST_CASE("Robots meet after forged packets have replaced the announcement of one of them") {
   const auto settings =
       own_team() + std::vector<std::string>{"interface=lo", "spdp_interval_s=0.2"};
   const TeamOfTwo keys;
@@ -58,8 +56,7 @@ TEST_CASE("Robots meet after forged packets have replaced the announcement of on
   CHECK(b->wait_for("ping 3 9"));
 }
 
-TEST_CASE("Robots meet although a program has announced more participants than they remember",
-          "[dds][processes]") {
+TEST_CASE("Robots meet although a program has announced more participants than they remember") {
   const auto settings =
       own_team() + std::vector<std::string>{"interface=lo", "spdp_interval_s=0.2"};
   const TeamOfTwo keys;
@@ -77,7 +74,7 @@ TEST_CASE("Robots meet although a program has announced more participants than t
   CHECK(b->wait_for("joined 3"));
 }
 
-TEST_CASE("Teams in one domain do not see each other", "[dds][processes]") {
+TEST_CASE("Teams in one domain do not see each other") {
   const auto team = own_team() + std::vector<std::string>{"interface=lo"};
   const auto a = start_peer(3, team);
   const auto other = start_peer(5, team + std::vector<std::string>{"team=other"});

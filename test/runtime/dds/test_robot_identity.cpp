@@ -4,7 +4,7 @@
 namespace km {
 namespace {
 
-TEST_CASE("An identity survives its user data", "[identity]") {
+TEST_CASE("An identity survives its user data") {
   const RobotIdentity identity{65535, "Alpha 1", 7, 0x0123456789ABCDEFULL};
   const std::string data = to_user_data(identity);
   CHECK(data == "robot=65535;name=Alpha 1;proto=7;boot=0123456789abcdef");
@@ -18,11 +18,11 @@ TEST_CASE("An identity survives its user data", "[identity]") {
   CHECK(with_keys.value->credentials == "AbC-_9");
 }
 
-TEST_CASE("Keys of a later protocol are ignored", "[identity]") {
+TEST_CASE("Keys of a later protocol are ignored") {
   CHECK(parse_user_data("robot=1;name=a;proto=1;boot=1;colour=red;=;;").value.has_value());
 }
 
-TEST_CASE("User data that is not an identity is refused with the reason", "[identity]") {
+TEST_CASE("User data that is not an identity is refused with the reason") {
   const auto refusal = [](const std::string& data) {
     const auto parsed = parse_user_data(data);
     return std::string(parsed.value ? "accepted" : parsed.refusal);
@@ -45,13 +45,13 @@ TEST_CASE("User data that is not an identity is refused with the reason", "[iden
         "user data too long");
 }
 
-TEST_CASE("A name that cannot be sent is refused at home", "[identity]") {
+TEST_CASE("A name that cannot be sent is refused at home") {
   CHECK_THROWS_AS(to_user_data({1, "", 1, 1}), std::invalid_argument);
   CHECK_THROWS_AS(to_user_data({1, "a;b", 1, 1}), std::invalid_argument);
   CHECK_THROWS_AS(to_user_data({1, "tab\t", 1, 1}), std::invalid_argument);
 }
 
-TEST_CASE("An incarnation can be resumed as often as its counter permits", "[identity]") {
+TEST_CASE("An incarnation can be resumed as often as its counter permits") {
   const std::uint64_t first = random_boot_id();
   std::uint64_t boot = first;
   constexpr std::uint32_t kMost = 65535;

@@ -25,7 +25,7 @@ std::vector<int> sent(Schedule& schedule, double now_s, std::vector<RobotId> rea
   return messages;
 }
 
-TEST_CASE("Messages are sent by priority and in order within a priority", "[budget]") {
+TEST_CASE("Messages are sent by priority and in order within a priority") {
   const bool limited = GENERATE(false, true);
   Schedule schedule({.bytes_per_s = limited ? 1e9 : 0.0});
   int message = 0;
@@ -41,7 +41,7 @@ TEST_CASE("Messages are sent by priority and in order within a priority", "[budg
   CHECK(schedule.size() == 0);
 }
 
-TEST_CASE("The bytes sent equal the budget for messages of any size", "[budget]") {
+TEST_CASE("The bytes sent equal the budget for messages of any size") {
   const std::uint64_t bytes = GENERATE(100U, 1000U, 30'000U);
   const std::size_t readers = GENERATE(1U, 3U);
   CAPTURE(bytes, readers);
@@ -64,7 +64,7 @@ TEST_CASE("The bytes sent equal the budget for messages of any size", "[budget]"
   CHECK(sent_bytes <= budget + message);
 }
 
-TEST_CASE("Statuses never wait, and are counted", "[budget]") {
+TEST_CASE("Statuses never wait, and are counted") {
   Schedule schedule({.bytes_per_s = 1000.0});
   for (int k = 0; k < 10; ++k) schedule.push(entry(kPresence, k), 0.0);
   schedule.push(entry(kClosures, 10), 0.0);
@@ -73,7 +73,7 @@ TEST_CASE("Statuses never wait, and are counted", "[budget]") {
   CHECK(sent(schedule, 1.01) == std::vector<int>{10});
 }
 
-TEST_CASE("Bags of words that have waited follow new ones", "[budget]") {
+TEST_CASE("Bags of words that have waited follow new ones") {
   Schedule schedule({.bytes_per_s = 1000.0});
   for (int k = 0; k < 60; ++k) schedule.push(entry(kWords, k), 0.0);
   CHECK(sent(schedule, 0.0) == std::vector<int>{0});
@@ -83,7 +83,7 @@ TEST_CASE("Bags of words that have waited follow new ones", "[budget]") {
   CHECK(schedule.held_back().at("t").delayed == TrafficCount{2, 200});
 }
 
-TEST_CASE("Only the newest of a waiting state is kept, at the position of the first", "[budget]") {
+TEST_CASE("Only the newest of a waiting state is kept, at the position of the first") {
   Schedule schedule({.bytes_per_s = 1000.0});
   const auto state = [&](std::uint64_t key, int message, std::optional<RobotId> to = {}) {
     Entry next = entry(kPoses, message);
@@ -111,7 +111,7 @@ TEST_CASE("Only the newest of a waiting state is kept, at the position of the fi
   CHECK(held.dropped == TrafficCount{});
 }
 
-TEST_CASE("Requests that are too old to be answered are dropped", "[budget]") {
+TEST_CASE("Requests that are too old to be answered are dropped") {
   Schedule schedule({.bytes_per_s = 100.0});
   for (int k = 0; k < 10; ++k) {
     Entry request = entry(kVerification, k);
@@ -125,7 +125,7 @@ TEST_CASE("Requests that are too old to be answered are dropped", "[budget]") {
   CHECK(schedule.held_back().at("t").dropped == TrafficCount{6, 600});
 }
 
-TEST_CASE("A run's total is kept, and the most important has some of it left", "[budget]") {
+TEST_CASE("A run's total is kept, and the most important has some of it left") {
   Schedule schedule({.bytes_per_run = 10'000.0});
   std::size_t went = 0;
   const auto offer = [&](SendPriority priority) {
@@ -143,8 +143,7 @@ TEST_CASE("A run's total is kept, and the most important has some of it left", "
   CHECK(offer(kPresence) == 300);
 }
 
-TEST_CASE("Messages without room and messages left at the end are dropped and counted",
-          "[budget]") {
+TEST_CASE("Messages without room and messages left at the end are dropped and counted") {
   Schedule schedule({.bytes_per_s = 1.0});
   constexpr std::size_t kMany = Schedule::kMaxMessages + 10;
   for (std::size_t k = 0; k < kMany; ++k) schedule.push(entry(kMesh, static_cast<int>(k)), 0.0);
@@ -162,7 +161,7 @@ TEST_CASE("Messages without room and messages left at the end are dropped and co
   CHECK(schedule.size() == 1);
 }
 
-TEST_CASE("Bytes that DDS sends by itself are charged to the budget", "[budget]") {
+TEST_CASE("Bytes that DDS sends by itself are charged to the budget") {
   Schedule schedule({.bytes_per_s = 1000.0});
   schedule.settle(500, 0.0);
   schedule.push(entry(kClosures, 1), 0.0);
@@ -173,7 +172,7 @@ TEST_CASE("Bytes that DDS sends by itself are charged to the budget", "[budget]"
   CHECK(sent(schedule, 0.62) == std::vector<int>{2});
 }
 
-TEST_CASE("Messages without a reader wait and delay no others", "[budget]") {
+TEST_CASE("Messages without a reader wait and delay no others") {
   Schedule schedule({.bytes_per_s = 1000.0});
   schedule.push(entry(kWords, 1), 0.0);
   schedule.push(entry(kMesh, 2), 0.0);
@@ -186,7 +185,7 @@ TEST_CASE("Messages without a reader wait and delay no others", "[budget]") {
   CHECK(schedule.held_back().at("t").waiting == TrafficCount{1, 100});
 }
 
-TEST_CASE("Without a budget nothing is dropped, replaced or counted", "[budget]") {
+TEST_CASE("Without a budget nothing is dropped, replaced or counted") {
   Schedule schedule({});
   constexpr std::size_t kMany = Schedule::kMaxMessages + 10;
   for (std::size_t k = 0; k < kMany; ++k) {
@@ -205,7 +204,7 @@ std::vector<int> drain(FairQueue<int>& queue, double now_s) {
   return served;
 }
 
-TEST_CASE("Peers are served in turn, each in order", "[fair_queue]") {
+TEST_CASE("Peers are served in turn, each in order") {
   FairQueue<int> queue({});
   for (const int i : {1, 2, 3, 4}) CHECK(queue.push(7, 70 + i, 1, 0.0));
   for (const int i : {1, 2}) CHECK(queue.push(9, 90 + i, 1, 0.0));
@@ -216,7 +215,7 @@ TEST_CASE("Peers are served in turn, each in order", "[fair_queue]") {
   CHECK_FALSE(queue.wait_s(0.0));
 }
 
-TEST_CASE("A peer that has no room loses its own newest, or its oldest", "[fair_queue]") {
+TEST_CASE("A peer that has no room loses its own newest, or its oldest") {
   const bool newest_wins = GENERATE(false, true);
   QueueQuota quota{.newest_wins = newest_wins};
   SECTION("by number") {
@@ -234,14 +233,14 @@ TEST_CASE("A peer that has no room loses its own newest, or its oldest", "[fair_
   CHECK(queue.push(7, 5, 10, 0.0));
 }
 
-TEST_CASE("A message larger than the bound is refused", "[fair_queue]") {
+TEST_CASE("A message larger than the bound is refused") {
   FairQueue<int> queue({.bytes = 100, .newest_wins = GENERATE(false, true)});
   CHECK_FALSE(queue.push(7, 1, 101, 0.0));
   CHECK(queue.size() == 0);
   CHECK(queue.push(7, 2, 100, 0.0));
 }
 
-TEST_CASE("Each peer's messages are served as a burst and then at the rate", "[fair_queue]") {
+TEST_CASE("Each peer's messages are served as a burst and then at the rate") {
   FairQueue<int> queue({.per_second = 10.0, .burst = 5.0});
   for (int i = 0; i < 1000; ++i) {
     queue.push(7, i, 1, 100.0);
@@ -266,8 +265,7 @@ int statuses_in_an_hour(std::size_t others) {
   return sent;
 }
 
-TEST_CASE("statuses that a robot receives in an hour do not grow with a large team",
-          "[dds][status]") {
+TEST_CASE("statuses that a robot receives in an hour do not grow with a large team") {
   CHECK(statuses_in_an_hour(0) == Approx(kTicksInAnHour / 2).epsilon(0.01));
   CHECK(statuses_in_an_hour(10) == Approx(kTicksInAnHour / 2).epsilon(0.01));
   CHECK(statuses_in_an_hour(11) == Approx(kTicksInAnHour / 3).epsilon(0.01));
@@ -275,7 +273,7 @@ TEST_CASE("statuses that a robot receives in an hour do not grow with a large te
   CHECK(statuses_in_an_hour(99) * 99 <= 1.05 * statuses_in_an_hour(10) * 10);
 }
 
-TEST_CASE("a change that other robots wait for is sent at once", "[dds][status]") {
+TEST_CASE("a change that other robots wait for is sent at once") {
   StatusPace pace;
   for (int tick = 0; tick <= 20; ++tick) (void)pace.is_due(0, 99);
   CHECK(pace.is_due(1, 99));

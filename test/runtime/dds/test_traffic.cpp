@@ -14,7 +14,7 @@ PeerTraffic row(Direction direction, std::optional<RobotId> peer, TrafficCount c
           .retransmitted_bytes = retransmitted};
 }
 
-TEST_CASE("Traffic is written when it changes, cumulatively", "[traffic]") {
+TEST_CASE("Traffic is written when it changes, cumulatively") {
   std::ostringstream csv;
   TrafficCsv writer(csv);
   TrafficSnapshot snapshot;
@@ -31,7 +31,7 @@ TEST_CASE("Traffic is written when it changes, cumulatively", "[traffic]") {
         "3.5,out,bow,place_recognition,*,0,0,30\n");
 }
 
-TEST_CASE("Traffic of a resumed run is added to the former traffic", "[traffic]") {
+TEST_CASE("Traffic of a resumed run is added to the former traffic") {
   const std::string former =
       "time_s,direction,topic,category,peer,messages,bytes,retransmitted_bytes\n"
       "1,out,bow,place_recognition,7,1,100,0\n"
@@ -63,8 +63,7 @@ TEST_CASE("Traffic of a resumed run is added to the former traffic", "[traffic]"
   CHECK(csv.str() == "7,waiting,bow,place_recognition,*,1,10,0\n");
 }
 
-TEST_CASE("Messages that a budget delays or drops are in the table beside those sent",
-          "[traffic]") {
+TEST_CASE("Messages that a budget delays or drops are in the table beside those sent") {
   std::ostringstream csv;
   TrafficCsv writer(csv);
   const HeldBack held{

@@ -41,7 +41,7 @@ struct Receiver {
   Overlay overlay{b.peer(), overlay_keys(b.seal)};
 };
 
-TEST_CASE("The signature of a message is valid for one message of one robot only", "[overlay]") {
+TEST_CASE("The signature of a message is valid for one message of one robot only") {
   const ToyTeam team;
   const ToyMember a(team, kA, "alpha"), c(team, kC, "gamma");
   const OverlayStream stream =
@@ -99,7 +99,7 @@ TEST_CASE("The signature of a message is valid for one message of one robot only
   }
 }
 
-TEST_CASE("An introduction is a robot name with credentials and nothing else", "[overlay]") {
+TEST_CASE("An introduction is a robot name with credentials and nothing else") {
   const ToyTeam team;
   const ToyMember a(team, kA, "alpha");
   const auto text = [](const std::string& content) {
@@ -117,8 +117,7 @@ TEST_CASE("An introduction is a robot name with credentials and nothing else", "
   CHECK_FALSE(text("alpha;" + a.seal.credentials() + "x"));
 }
 
-TEST_CASE("A robot out of reach is accepted only with a valid certificate of its team",
-          "[overlay]") {
+TEST_CASE("A robot out of reach is accepted only with a valid certificate of its team") {
   Receiver receiver;
   Overlay& overlay = receiver.overlay;
   const auto is_forged = [&](const ToyMember& robot, const char* why) {
@@ -151,8 +150,7 @@ TEST_CASE("A robot out of reach is accepted only with a valid certificate of its
   CHECK(overlay.take_output().delivered.empty());
 }
 
-TEST_CASE("A message that a neighbour forges or changes is refused before it is stored",
-          "[overlay]") {
+TEST_CASE("A message that a neighbour forges or changes is refused before it is stored") {
   Receiver receiver;
   Overlay& overlay = receiver.overlay;
   REQUIRE(receiver.introduce(receiver.a) == OverlayArrival::kNew);
@@ -193,7 +191,7 @@ TEST_CASE("A message that a neighbour forges or changes is refused before it is 
   CHECK(output.packets.empty());
 }
 
-TEST_CASE("Messages of a revoked robot are refused and the robot is removed", "[overlay]") {
+TEST_CASE("Messages of a revoked robot are refused and the robot is removed") {
   Receiver receiver;
   Overlay& overlay = receiver.overlay;
   REQUIRE(receiver.introduce(receiver.a) == OverlayArrival::kNew);
@@ -208,8 +206,7 @@ TEST_CASE("Messages of a revoked robot are refused and the robot is removed", "[
   CHECK(receiver.introduce(receiver.a) == OverlayArrival::kForged);
 }
 
-TEST_CASE("A revoked robot leaves the links at once, although another robot still receives it",
-          "[overlay]") {
+TEST_CASE("A revoked robot leaves the links at once, although another robot still receives it") {
   Network network(3, true);
   network.link({{kA, kB}, {kB, kC}, {kA, kC}});
   network.run(5.0);
@@ -226,8 +223,7 @@ TEST_CASE("A revoked robot leaves the links at once, although another robot stil
   CHECK(network.at(kC).robots().links().component(kC) == std::set<RobotId>{kB, kC});
 }
 
-TEST_CASE("A directly received message is stored for other robots only with its signature",
-          "[overlay]") {
+TEST_CASE("A directly received message is stored for other robots only with its signature") {
   Receiver receiver;
   Overlay& overlay = receiver.overlay;
   const auto keep = [&](const OverlayMessage& message) {
@@ -245,7 +241,7 @@ TEST_CASE("A directly received message is stored for other robots only with its 
   CHECK(keep(other) == OverlayArrival::kForged);
 }
 
-TEST_CASE("Messages that a robot signed with a former key are sent again", "[overlay]") {
+TEST_CASE("Messages that a robot signed with a former key are sent again") {
   Receiver receiver;
   Overlay& overlay = receiver.overlay;
   CHECK(overlay.keep_bag(receiver.c.identity, 0,
@@ -262,8 +258,7 @@ TEST_CASE("Messages that a robot signed with a former key are sent again", "[ove
       (renewed ? OverlayArrival::kNew : OverlayArrival::kRepeated));
 }
 
-TEST_CASE("A neighbour that changes forwarded messages is refused and blocks no other neighbour",
-          "[overlay]") {
+TEST_CASE("A neighbour that changes forwarded messages is refused and blocks no other neighbour") {
   Network network(4, true);
   network.link(kA, kC);
   network.link(kC, kB);

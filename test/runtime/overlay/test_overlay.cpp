@@ -12,8 +12,7 @@ std::vector<std::uint32_t> first(std::uint32_t count) {
 
 }  // namespace
 
-TEST_CASE("Robots that all receive each other forward nothing and report no stored messages",
-          "[overlay]") {
+TEST_CASE("Robots that all receive each other forward nothing and report no stored messages") {
   const bool has_keys = GENERATE(false, true);
   CAPTURE(has_keys);
   Network network(3, has_keys);
@@ -33,8 +32,7 @@ TEST_CASE("Robots that all receive each other forward nothing and report no stor
   }
 }
 
-TEST_CASE("Bags pass along a chain and only one of two robots in between forwards them",
-          "[overlay]") {
+TEST_CASE("Bags pass along a chain and only one of two robots in between forwards them") {
   const bool has_keys = GENERATE(false, true);
   CAPTURE(has_keys);
   Network network(4, has_keys);
@@ -63,7 +61,7 @@ TEST_CASE("Bags pass along a chain and only one of two robots in between forward
   CHECK(forwarded == (network.read(kD, OverlayStream::kBag).empty() ? 100 : 200));
 }
 
-TEST_CASE("A lost message is sent again and delivered once", "[overlay]") {
+TEST_CASE("A lost message is sent again and delivered once") {
   const bool has_keys = GENERATE(false, true);
   CAPTURE(has_keys);
   Network network(3, has_keys);
@@ -82,7 +80,7 @@ TEST_CASE("A lost message is sent again and delivered once", "[overlay]") {
   CHECK(closures == first(20));
 }
 
-TEST_CASE("A closure reaches a robot once when it returns into range", "[overlay]") {
+TEST_CASE("A closure reaches a robot once when it returns into range") {
   const bool has_keys = GENERATE(false, true);
   CAPTURE(has_keys);
   Network network(3, has_keys);
@@ -112,8 +110,7 @@ TEST_CASE("A closure reaches a robot once when it returns into range", "[overlay
   CHECK(network.read(kC, OverlayStream::kClosure).empty());
 }
 
-TEST_CASE("The overlay forwards no events between robots that soon receive each other directly",
-          "[overlay]") {
+TEST_CASE("The overlay forwards no events between robots that soon receive each other directly") {
   Network network(3);
   for (std::uint32_t i = 0; i < 20; ++i)
     network.at(kB).wrote(OverlayStream::kClosure, {kA}, i, {1}, 0.0);
@@ -130,7 +127,7 @@ TEST_CASE("The overlay forwards no events between robots that soon receive each 
   for (const RobotId robot : {kA, kB, kC}) CHECK(network.all_read(robot).empty());
 }
 
-TEST_CASE("A message sent just before a link failed becomes a reliable message", "[overlay]") {
+TEST_CASE("A message sent just before a link failed becomes a reliable message") {
   Network network(3);
   network.link(kA, kB);
   network.link(kA, kC);
@@ -144,7 +141,7 @@ TEST_CASE("A message sent just before a link failed becomes a reliable message",
   CHECK(network.read(kA, OverlayStream::kClosure).size() == 1);
 }
 
-TEST_CASE("A message to one incarnation of a robot does not reach the next", "[overlay]") {
+TEST_CASE("A message to one incarnation of a robot does not reach the next") {
   const bool has_keys = GENERATE(false, true);
   CAPTURE(has_keys);
   Network network(3, has_keys);
@@ -181,7 +178,7 @@ TEST_CASE("A message to one incarnation of a robot does not reach the next", "[o
   CHECK(read.front()->content.front() == 2);
 }
 
-TEST_CASE("A reply that DDS keeps for a known robot is not carried by the overlay", "[overlay]") {
+TEST_CASE("A reply that DDS keeps for a known robot is not carried by the overlay") {
   Network network(3);
   network.link(kA, kB);
   CHECK(network.at(kA).ways_to(kB) == OverlayWays{.direct = true, .relay = false});
@@ -196,8 +193,7 @@ TEST_CASE("A reply that DDS keeps for a known robot is not carried by the overla
   CHECK(network.at(kA).ways_to(kC) == OverlayWays{.direct = false, .relay = true});
 }
 
-TEST_CASE("A robot that has stored a keyframe replies for its owner after the owner has gone",
-          "[overlay]") {
+TEST_CASE("A robot that has stored a keyframe replies for its owner after the owner has gone") {
   const bool has_keys = GENERATE(false, true);
   CAPTURE(has_keys);
   Network network(3, has_keys);
@@ -237,7 +233,7 @@ TEST_CASE("A robot that has stored a keyframe replies for its owner after the ow
   }
 }
 
-TEST_CASE("A new incarnation of a robot out of range replaces the former", "[overlay]") {
+TEST_CASE("A new incarnation of a robot out of range replaces the former") {
   const bool has_keys = GENERATE(false, true);
   CAPTURE(has_keys);
   Network network(4, has_keys);
@@ -277,8 +273,7 @@ TEST_CASE("A new incarnation of a robot out of range replaces the former", "[ove
   }
 }
 
-TEST_CASE("A neighbour cannot change the state of this robot or of one received directly",
-          "[overlay]") {
+TEST_CASE("A neighbour cannot change the state of this robot or of one received directly") {
   Overlay overlay({kB, 2});
   overlay.connected({.robot = kC, .name = "c", .boot = 3}, 0.0);
   const auto receive = [&](RobotId from, OverlayMessage message) {
@@ -312,7 +307,7 @@ TEST_CASE("A neighbour cannot change the state of this robot or of one received 
   CHECK(receive(kC, of_connected) == OverlayArrival::kRepeated);
 }
 
-TEST_CASE("Robots that a neighbour invents cannot exceed the common storage", "[overlay]") {
+TEST_CASE("Robots that a neighbour invents cannot exceed the common storage") {
   Overlay overlay({kB, 2});
   const RobotIdentity neighbour{.robot = kC, .name = "c", .boot = 3};
   overlay.connected(neighbour, 0.0);
@@ -338,7 +333,7 @@ TEST_CASE("Robots that a neighbour invents cannot exceed the common storage", "[
   CHECK(overlay.summary().holds.front().bags == 1);
 }
 
-TEST_CASE("A new robot takes the place of the one that has been lost for longest", "[overlay]") {
+TEST_CASE("A new robot takes the place of the one that has been lost for longest") {
   Overlay overlay({kA, 1});
   const auto connect = [&](RobotId robot, double now_s) {
     overlay.connected({.robot = robot, .name = name_of(robot), .boot = 1}, now_s);
@@ -354,8 +349,7 @@ TEST_CASE("A new robot takes the place of the one that has been lost for longest
   CHECK_FALSE(connect(20, 6.0));
 }
 
-TEST_CASE("A full store discards the oldest messages, and a late robot gets the others",
-          "[overlay]") {
+TEST_CASE("A full store discards the oldest messages, and a late robot gets the others") {
   Network network(3);
   network.link(kA, kB);
   constexpr std::size_t kSize = 100'000;
@@ -373,8 +367,7 @@ TEST_CASE("A full store discards the oldest messages, and a late robot gets the 
   CHECK(std::ranges::is_sorted(bags));
 }
 
-TEST_CASE("Closures of a day between five robots in a line arrive once, in constant memory",
-          "[overlay]") {
+TEST_CASE("Closures of a day between five robots in a line arrive once, in constant memory") {
   constexpr double kInterval_s = 40.0;
   constexpr RobotId kRobots = 5;
   constexpr std::uint32_t kCount = 86400 / 40;
@@ -410,7 +403,7 @@ TEST_CASE("Closures of a day between five robots in a line arrive once, in const
   for (RobotId robot = 0; robot < kRobots; ++robot) CHECK(network.at(robot).given_up() == 0);
 }
 
-TEST_CASE("Requests to a robot that never returns leave room for requests to others", "[overlay]") {
+TEST_CASE("Requests to a robot that never returns leave room for requests to others") {
   Network network(4);
   for (const RobotId robot : {kA, kB, kD}) network.link(robot, kC);
   network.run(8.0);
@@ -425,7 +418,7 @@ TEST_CASE("Requests to a robot that never returns leave room for requests to oth
   CHECK(network.read(kD, OverlayStream::kRequest) == std::vector<std::uint32_t>{17});
 }
 
-TEST_CASE("A closure that is too large leaves the former one in place", "[overlay]") {
+TEST_CASE("A closure that is too large leaves the former one in place") {
   Network network(3);
   network.link(kA, kC);
   network.run(1.0);

@@ -36,7 +36,7 @@ OverlayMessage round_trip(const OverlayMessage& message) {
 
 }  // namespace
 
-TEST_CASE("A message of the overlay arrives unchanged, from its origin or forwarded", "[overlay]") {
+TEST_CASE("A message of the overlay arrives unchanged, from its origin or forwarded") {
   const TeamPeer origin = GENERATE(kSelf, kFar);
   for (int k = 0; k <= static_cast<int>(OverlayStream::kInlierSet); ++k) {
     CAPTURE(k);
@@ -55,7 +55,7 @@ TEST_CASE("A message of the overlay arrives unchanged, from its origin or forwar
   }
 }
 
-TEST_CASE("An inconsistent message of the overlay is refused", "[overlay]") {
+TEST_CASE("An inconsistent message of the overlay is refused") {
   const auto refusal_of = [](const OverlayMessage& message) -> std::string {
     const auto result = decoded(encoded_by<PlacesLanePacket>(kSelf, {packet_of(message)}));
     return result.value ? "" : result.refusal;
@@ -80,7 +80,7 @@ TEST_CASE("An inconsistent message of the overlay is refused", "[overlay]") {
   CHECK(refusal_of(message) == reason);
 }
 
-TEST_CASE("Reports of links are restored, and malformed ones are refused", "[overlay]") {
+TEST_CASE("Reports of links are restored, and malformed ones are refused") {
   const std::vector<TeamPeer> links{{1, 5}, {200, 6}, {60000, 7}};
   CHECK(decode_links(encode_links(links)) == links);
   CHECK(decode_links({}) == std::vector<TeamPeer>());

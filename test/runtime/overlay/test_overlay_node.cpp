@@ -148,7 +148,7 @@ struct Chain {
 
 }  // namespace
 
-TEST_CASE("Relayed messages arrive on the topics of directly received ones", "[overlay]") {
+TEST_CASE("Relayed messages arrive on the topics of directly received ones") {
   const bool has_keys = GENERATE(false, true);
   CAPTURE(has_keys);
   Chain chain(has_keys);

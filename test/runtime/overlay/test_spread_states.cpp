@@ -29,7 +29,7 @@ OverlayMessage introduction(TeamPeer origin) {
 
 }  // namespace
 
-TEST_CASE("all robots receive each state once, over any links", "[overlay]") {
+TEST_CASE("all robots receive each state once, over any links") {
   const Links links = GENERATE(line(6), Links{{1, 6}, {2, 6}, {3, 6}, {4, 6}, {5, 6}},
                                Links{{1, 2}, {2, 3}, {3, 4}, {4, 5}, {5, 6}, {1, 6}},
                                Links{{1, 2}, {1, 3}, {2, 3}, {3, 4}, {4, 5}, {4, 6}, {5, 6}});
@@ -42,7 +42,7 @@ TEST_CASE("all robots receive each state once, over any links", "[overlay]") {
   }
 }
 
-TEST_CASE("robots that meet one after the other forward nothing", "[overlay]") {
+TEST_CASE("robots that meet one after the other forward nothing") {
   constexpr RobotId kRobots = 16;
   Links links;
   for (RobotId a = 0; a < kRobots; ++a)
@@ -63,7 +63,7 @@ TEST_CASE("robots that meet one after the other forward nothing", "[overlay]") {
     CHECK(network.at(id).robots().links().component(id).size() == kRobots);
 }
 
-TEST_CASE("the states of a full team reach all robots of a line", "[overlay]") {
+TEST_CASE("the states of a full team reach all robots of a line") {
   Network network(kMaxTeam + 1);
   network.link(line(kMaxTeam));
   network.run(100.0);
@@ -73,7 +73,7 @@ TEST_CASE("the states of a full team reach all robots of a line", "[overlay]") {
   CHECK(network.packets() == kMaxTeam - 1);
 }
 
-TEST_CASE("a lost state is sent again when the hashes show its loss", "[overlay]") {
+TEST_CASE("a lost state is sent again when the hashes show its loss") {
   Network network(5, line(4));
   network.lose(1.0);
   network.publish(1, kPoses);
@@ -88,7 +88,7 @@ TEST_CASE("a lost state is sent again when the hashes show its loss", "[overlay]
   CHECK(network.packets() == 0);
 }
 
-TEST_CASE("calls take the shortest path, and another one after an outage", "[overlay]") {
+TEST_CASE("calls take the shortest path, and another one after an outage") {
   Network network(6, {{1, 2}, {2, 3}, {3, 4}, {4, 5}, {5, 1}});
   const auto hops_to_3 = [&] {
     network.forget();
@@ -103,7 +103,7 @@ TEST_CASE("calls take the shortest path, and another one after an outage", "[ove
   CHECK_FALSE(network.call(1, OverlayStream::kSolver, 3));
 }
 
-TEST_CASE("a call does not circulate for ever, whatever links robots report", "[overlay]") {
+TEST_CASE("a call does not circulate for ever, whatever links robots report") {
   Overlay overlay({2, 1});
   overlay.connected(robot(1), 0.0);
   overlay.connected(robot(3), 0.0);
@@ -126,7 +126,7 @@ TEST_CASE("a call does not circulate for ever, whatever links robots report", "[
   CHECK(forwarded == 16);
 }
 
-TEST_CASE("invented robots take no more memory than a full team", "[overlay]") {
+TEST_CASE("invented robots take no more memory than a full team") {
   Overlay overlay({1, 1});
   overlay.connected(robot(2), 0.0);
   std::size_t taken = 0, refused = 0;
@@ -145,7 +145,7 @@ TEST_CASE("invented robots take no more memory than a full team", "[overlay]") {
   CHECK(receive(overlay, robot(4000), state) == OverlayArrival::kNew);
 }
 
-TEST_CASE("states that one robot sends do not use the memory for those of others", "[overlay]") {
+TEST_CASE("states that one robot sends do not use the memory for those of others") {
   Network team(4, {{1, 2}, {1, 3}});
   Overlay& overlay = team.at(1);
   constexpr std::size_t kLarge = SpreadStates::kMaxHeldFromOne / 3;
@@ -165,7 +165,7 @@ TEST_CASE("states that one robot sends do not use the memory for those of others
   CHECK(arrives(2, 103, 1, kLarge) == OverlayArrival::kNew);
 }
 
-TEST_CASE("a link that returns at once counts as uninterrupted", "[overlay]") {
+TEST_CASE("a link that returns at once counts as uninterrupted") {
   Network network(4, line(3));
   const Overlay& overlay = network.at(2);
   const auto version = overlay.robots().links_version();
@@ -181,7 +181,7 @@ TEST_CASE("a link that returns at once counts as uninterrupted", "[overlay]") {
   CHECK(overlay.robots().links().component(2) == std::set<RobotId>{1, 2});
 }
 
-TEST_CASE("after a restart of a robot only the new process counts", "[overlay]") {
+TEST_CASE("after a restart of a robot only the new process counts") {
   constexpr std::uint64_t kNext = std::uint64_t{99} << 32U;
   Network network(4, line(3));
   const RobotIdentity former = network.identity(3), two_itself = network.identity(2);
@@ -205,7 +205,7 @@ TEST_CASE("after a restart of a robot only the new process counts", "[overlay]")
   CHECK(receive(one, two_itself, old) == OverlayArrival::kRefused);
 }
 
-TEST_CASE("states in a team with keys are signed only for robots out of reach", "[overlay]") {
+TEST_CASE("states in a team with keys are signed only for robots out of reach") {
   Network network(3, true);
   network.link(kA, kB);
   network.run(2.0);
@@ -239,8 +239,7 @@ TEST_CASE("states in a team with keys are signed only for robots out of reach", 
   CHECK(network.refusals(kB).front() == "not signed by its origin, or changed on its way");
 }
 
-TEST_CASE("a robot with keys is asked for new DDS writers when its packets do not arrive",
-          "[overlay]") {
+TEST_CASE("a robot with keys is asked for new DDS writers when its packets do not arrive") {
   const bool has_keys = GENERATE(true, false);
   CAPTURE(has_keys);
   Network network(3, has_keys);
@@ -266,7 +265,7 @@ TEST_CASE("a robot with keys is asked for new DDS writers when its packets do no
   CHECK(network.at(kB).summary().missed.empty());
 }
 
-TEST_CASE("packets that arrive show that the DDS writers work, whatever is missing", "[overlay]") {
+TEST_CASE("packets that arrive show that the DDS writers work, whatever is missing") {
   Network network(2, true);
   network.link(kA, kB);
   network.run(1.0);

@@ -40,7 +40,7 @@ double largest_difference_m(const std::vector<SE3>& a, const std::vector<SE3>& b
   return largest;
 }
 
-TEST_CASE("The robots' own code publishes the optimum of a graph", "[pgo][agents]") {
+TEST_CASE("The robots' own code publishes the optimum of a graph") {
   const unsigned seed = GENERATE(1U, 2U);
   const double keyframes_per_s = GENERATE(0.0, 5.0);
   const bool lacks_step = GENERATE(false, true);
@@ -58,8 +58,7 @@ TEST_CASE("The robots' own code publishes the optimum of a graph", "[pgo][agents
   CHECK(largest_difference_m(run.T_world_kf, optimum) < 1e-3 * kNoise);
 }
 
-TEST_CASE("A pair of robots with one closure is joined after the wait for witnesses",
-          "[pgo][agents]") {
+TEST_CASE("A pair of robots with one closure is joined after the wait for witnesses") {
   TeamGraph graph = team_of_three(1);
   bool one = false;
   std::erase_if(graph.edges, [&](const BlockEdge& e) {
@@ -90,8 +89,7 @@ void mistake_a_place(TeamGraph& graph, Eigen::Index closures) {
                            graph.edges.front().kappa, graph.edges.front().tau});
 }
 
-TEST_CASE("Ten false closures of one place do not outweigh five true ones per robot pair",
-          "[pgo][agents]") {
+TEST_CASE("Ten false closures of one place do not outweigh five true ones per robot pair") {
   const unsigned seed = GENERATE(1U, 2U, 3U);
   CAPTURE(seed);
   TeamGraph graph = team_of_three(seed);

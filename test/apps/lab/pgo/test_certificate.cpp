@@ -22,7 +22,7 @@ struct Known {
 
 }  // namespace
 
-TEST_CASE("[X z] S is half the Riemannian gradient of poses and vertical", "[pgo][vertical]") {
+TEST_CASE("[X z] S is half the Riemannian gradient of poses and vertical") {
   const unsigned seed = GENERATE(1U, 2U);
   const Eigen::Index rank = GENERATE(3, 5);
   CAPTURE(seed, rank);
@@ -43,8 +43,7 @@ TEST_CASE("[X z] S is half the Riemannian gradient of poses and vertical", "[pgo
   CHECK((product.col(50) - (pull - z * z.dot(pull))).norm() < 1e-12 * pull.norm());
 }
 
-TEST_CASE("The optimum of a graph with verticals is certified, and its S is semidefinite",
-          "[pgo][vertical]") {
+TEST_CASE("The optimum of a graph with verticals is certified, and its S is semidefinite") {
   const unsigned seed = GENERATE(1U, 2U, 3U);
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -75,7 +74,7 @@ TEST_CASE("The optimum of a graph with verticals is certified, and its S is semi
   CHECK(certify(problem, X_tilted).relative_gap == Approx(excess).epsilon(0.1).margin(1e-6));
 }
 
-TEST_CASE("Poses upside down have their known negative eigenvalue", "[pgo][vertical]") {
+TEST_CASE("Poses upside down have their known negative eigenvalue") {
   const Eigen::Index n = GENERATE(2, 7, 30);
   CAPTURE(n);
   constexpr double kWeight = 3.0;
@@ -97,7 +96,7 @@ TEST_CASE("Poses upside down have their known negative eigenvalue", "[pgo][verti
   CHECK(certificate.lambda_bound <= -kWeight * (static_cast<double>(n) + 1.0));
 }
 
-TEST_CASE("A ring wound once has its known negative eigenvalue", "[pgo]") {
+TEST_CASE("A ring wound once has its known negative eigenvalue") {
   const Eigen::Index n = GENERATE(5, 12, 40);
   CAPTURE(n);
   const WoundRing ring(n, 1);
@@ -113,7 +112,7 @@ TEST_CASE("A ring wound once has its known negative eigenvalue", "[pgo]") {
   CHECK(certificate.relative_gap == 1.0);
 }
 
-TEST_CASE("The certified bound is below the smallest eigenvalue of the Schur complement", "[pgo]") {
+TEST_CASE("The certified bound is below the smallest eigenvalue of the Schur complement") {
   const unsigned seed = GENERATE(1U, 2U, 3U);
   CAPTURE(seed);
   std::mt19937 rng(seed);
@@ -142,7 +141,7 @@ TEST_CASE("The certified bound is below the smallest eigenvalue of the Schur com
   CHECK(symmetric_eigen(schur).values(0) > optimum.certificate.lambda_bound);
 }
 
-TEST_CASE("The bound from any point is not above the optimal cost", "[pgo]") {
+TEST_CASE("The bound from any point is not above the optimal cost") {
   const unsigned seed = GENERATE(1U, 2U, 3U, 4U);
   const double vertical_weight = GENERATE(0.0, 4.0);
   CAPTURE(seed, vertical_weight);
@@ -158,7 +157,7 @@ TEST_CASE("The bound from any point is not above the optimal cost", "[pgo]") {
   }
 }
 
-TEST_CASE("Recorded graphs are certified at their known optima", "[pgo]") {
+TEST_CASE("Recorded graphs are certified at their known optima") {
   const Known known = GENERATE(
       Known{"3d/tinyGrid3D.g2o", 18.5193868, 2e-6}, Known{"3d/smallGrid3D.g2o", 1025.39802},
       Known{"3d/parking-garage.g2o", 1.262524, 1e-6}, Known{"3d/sphere2500.g2o", 1687.00567},

@@ -109,8 +109,7 @@ void check_orders(const LawCase& recorded) {
 }
 
 TEST_CASE(
-    "A team ends equally, in whatever order, at whatever rate and with whatever outages it meets",
-    "[pgo][law]") {
+    "A team ends equally, in whatever order, at whatever rate and with whatever outages it meets") {
   check_orders(
       GENERATE(LawCase{"cosmo_bench/kth_r3_00_d06_d09_d10_wifi.jrl", 0, "", kOverKilometres_m},
                LawCase{"cosmo_bench/ntu_r3_02_d02_n04_n13_wifi.jrl", 0, "", kOverKilometres_m},
@@ -158,7 +157,7 @@ void check_ids(const LawCase& recorded, int shuffles) {
   }
 }
 
-TEST_CASE("A team ends equally with permuted ids", "[pgo][law]") {
+TEST_CASE("A team ends equally with permuted ids") {
   check_ids(
       GENERATE(LawCase{"cosmo_bench/kth_r3_00_d06_d09_d10_wifi.jrl", 0, "", kOverKilometres_m},
                LawCase{"cosmo_bench/ntu_r3_02_d02_n04_n13_wifi.jrl", 0, "", kOverKilometres_m},
@@ -181,7 +180,7 @@ TEST_CASE("Teams with few or uneven closures end equally with reversed ids", "[.
       0);
 }
 
-TEST_CASE("Motions softer than rounding errors of messages take no further rounds", "[pgo][law]") {
+TEST_CASE("Motions softer than rounding errors of messages take no further rounds") {
   const auto graph = graph_of({"pose_graphs/2d/ais2klinik.g2o", 6, "", 0.0});
   if (!graph) return;
   const AgentTeamRun run = run_agent_team(*graph, {});
@@ -190,7 +189,7 @@ TEST_CASE("Motions softer than rounding errors of messages take no further round
   CHECK(run.last.round <= 130);  // in two looks
 }
 
-TEST_CASE("A few rejected closures do not make the team doubt the others", "[pgo][law]") {
+TEST_CASE("A few rejected closures do not make the team doubt the others") {
   const auto graph = graph_of({"pose_graphs/3d/cubicle.g2o", 5, "", 0.0});
   if (!graph) return;
   const AgentTeamRun run = run_agent_team(*graph, {});

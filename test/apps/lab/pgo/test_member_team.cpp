@@ -88,7 +88,7 @@ struct Certified {
   int rounds;      // largest number of rounds to a gap of 1e-6
 };
 
-TEST_CASE("A team that trusts its closures reaches the certified optimum", "[pgo]") {
+TEST_CASE("A team that trusts its closures reaches the certified optimum") {
   const auto [name, optimum, most] =
       GENERATE(values({Certified{"pose_graphs/3d/smallGrid3D.g2o", 1025.398056, 8},
                        Certified{kSphere, 1687.005815, 7}, Certified{kGarage, 1.26252443, 7},
@@ -114,7 +114,7 @@ TEST_CASE("A team that trusts its closures reaches the certified optimum", "[pgo
 // Measured before sessions began with measurements alone: 0.99 with two robots, 1.2 with five. If
 // the robots do not decide the closures inside them alone, second derivatives are sent in most
 // rounds: 3.
-TEST_CASE("Weighing true closures costs few bytes", "[pgo]") {
+TEST_CASE("Weighing true closures costs few bytes") {
   const std::size_t robots = GENERATE(2U, 5U);
   const auto graph = partitioned(kSphere, robots);
   if (!graph) return;
@@ -127,7 +127,7 @@ TEST_CASE("Weighing true closures costs few bytes", "[pgo]") {
 
 // The robots have drifted, and few closures join them. Robots that decide the closures inside them
 // whatever these fit would lose four of the closures between them.
-TEST_CASE("Robots that have drifted keep the few closures between them", "[pgo]") {
+TEST_CASE("Robots that have drifted keep the few closures between them") {
   const auto file = shared_data("cosmo_bench/ntu_r3_02_d02_n04_n13_wifi.jrl");
   if (!file) return;
   const TeamGraph graph = labelled_team(read_jrl(*file), file->string()).graph;
@@ -136,7 +136,7 @@ TEST_CASE("Robots that have drifted keep the few closures between them", "[pgo]"
     if (graph.robot_of(graph.edges[k].i) != graph.robot_of(graph.edges[k].j)) CHECK(kept[k]);
 }
 
-TEST_CASE("A solver message goes to one neighbour in the tree", "[pgo]") {
+TEST_CASE("A solver message goes to one neighbour in the tree") {
   std::mt19937 rng(3);
   const TeamGraph graph = noisy_chain(60, 4, 0.01, rng);
   AskedTeam asked(graph, chordal_initialisation(graph.poses(), graph.edges), {});
@@ -176,7 +176,7 @@ void check_decided_once(const AskedTeam& asked, const TeamGraph& graph) {
   CHECK(contradictory == 0);
 }
 
-TEST_CASE("Every closure is decided by exactly one of its two robots", "[pgo]") {
+TEST_CASE("Every closure is decided by exactly one of its two robots") {
   const auto clean = partitioned("pose_graphs/3d/smallGrid3D.g2o", 4);
   if (!clean) return;
   const std::vector<bool> odometry = odometry_edges(*clean);
@@ -201,7 +201,7 @@ std::size_t groups_of(const TeamGraph& graph, const std::vector<bool>& kept) {
   return std::set<std::size_t>(group.begin(), group.end()).size();
 }
 
-TEST_CASE("The robots of the tunnels estimate their noise and reach one frame", "[pgo]") {
+TEST_CASE("The robots of the tunnels estimate their noise and reach one frame") {
   const auto folder = shared_data("multi_robot/tunnels_8robots");
   if (!folder) return;
   const TeamGraph graph = read_team_folder(*folder);
@@ -240,8 +240,7 @@ const auto kGraphs = {
 // Enough for several updates of the weights. Second derivatives are sent in the first of them.
 constexpr int kRounds = 12;
 
-TEST_CASE("No private pose can be derived from the poses and edges that robots send",
-          "[pgo][slow]") {
+TEST_CASE("No private pose can be derived from the poses and edges that robots send", "[slow]") {
   const auto [name, robots] = GENERATE(values(kGraphs));
   CAPTURE(name);
   const auto clean = recorded(name, robots);

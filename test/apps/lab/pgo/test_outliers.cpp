@@ -29,7 +29,7 @@ std::string laps_g2o() {
   return text;
 }
 
-TEST_CASE("outliers compares methods in a table and JSON", "[outliers]") {
+TEST_CASE("outliers compares methods in a table and JSON") {
   const TemporaryFolder folder;
   const std::string graph = folder.write("laps.g2o", laps_g2o()).string();
   const CommandResult result = succeeded(
@@ -46,7 +46,7 @@ TEST_CASE("outliers compares methods in a table and JSON", "[outliers]") {
     CHECK(json["results"][0].contains(key));
 }
 
-TEST_CASE("outliers runs a scenario with the given share and robots", "[outliers]") {
+TEST_CASE("outliers runs a scenario with the given share and robots") {
   const TemporaryFolder folder;
   std::ostringstream text;
   for (int i = 0; i < 39; ++i)
@@ -68,7 +68,7 @@ TEST_CASE("outliers runs a scenario with the given share and robots", "[outliers
   CHECK(json["results"][1]["ratio"] == 1.0);
 }
 
-TEST_CASE("outliers reports the fault of its input", "[outliers]") {
+TEST_CASE("outliers reports the fault of its input") {
   const TemporaryFolder folder;
   (void)folder.write("laps.g2o", laps_g2o());
   (void)folder.write("step.g2o", "EDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\n");
@@ -101,7 +101,7 @@ TeamGraph clean_graph(unsigned seed) {
   return graph;
 }
 
-TEST_CASE("false closures follow a graph's own edges and depend on the seed alone", "[outliers]") {
+TEST_CASE("false closures follow a graph's own edges and depend on the seed alone") {
   TeamGraph graph = clean_graph(1);
   graph.edges[1].kappa = 7.0;
   const TeamGraph corrupted = corrupt(graph, 50, 4.0, 3);
@@ -123,7 +123,7 @@ TEST_CASE("false closures follow a graph's own edges and depend on the seed alon
   CHECK_THROWS_AS(corrupt(graph, 1, 4.0, 3), std::invalid_argument);
 }
 
-TEST_CASE("pairwise consistency keeps true closures and no false ones", "[outliers]") {
+TEST_CASE("pairwise consistency keeps true closures and no false ones") {
   const unsigned seed = GENERATE(1U, 2U);
   CAPTURE(seed);
   const std::size_t own_edges = clean_graph(seed).edges.size();
@@ -139,7 +139,7 @@ TEST_CASE("pairwise consistency keeps true closures and no false ones", "[outlie
 }
 
 // Few closures, most of which stand alone, and odometry that claims 1.3 rad after 500 steps.
-TEST_CASE("a robot with few closures and imprecise odometry keeps its true ones", "[outliers]") {
+TEST_CASE("a robot with few closures and imprecise odometry keeps its true ones") {
   const auto file = shared_data("pose_graphs/2d/input_MITb_g2o.g2o");
   if (!file) return;
   const TeamGraph graph = partition_contiguously(read_g2o(*file), 1, file->string());
@@ -154,7 +154,7 @@ TEST_CASE("a robot with few closures and imprecise odometry keeps its true ones"
 
 // Most closures inside a robot are false then. Noise of odometry that makes them true lets others
 // bend the stretches of up to 56 poses without closures. Recorded closures have no labels.
-TEST_CASE("random closures do not pass for noise of odometry", "[outliers]") {
+TEST_CASE("random closures do not pass for noise of odometry") {
   const auto folder = shared_data("multi_robot/tunnels_8robots");
   if (!folder) return;
   const OutlierStudy study =
@@ -165,8 +165,7 @@ TEST_CASE("random closures do not pass for noise of odometry", "[outliers]") {
 
 // Noise is a seventh of what these graphs claim. False closures then move parts of the map that few
 // others hold, and have no residual there.
-TEST_CASE("false closures within the claimed noise are rejected if the true noise is smaller",
-          "[outliers]") {
+TEST_CASE("false closures within the claimed noise are rejected if the true noise is smaller") {
   const std::string name = GENERATE("intel", "input_M3500_g2o");
   const int robots = GENERATE(1, 3);
   CAPTURE(name, robots);
@@ -184,7 +183,7 @@ TEST_CASE("false closures within the claimed noise are rejected if the true nois
 
 // Two robots drive side by side for 300 m. They see each other on the first 200 m and once at the
 // end, where drift is 100 to 600 sigma of a closure. All false closures are random.
-TEST_CASE("a closure that alone corrects a long drift is kept among false ones", "[outliers]") {
+TEST_CASE("a closure that alone corrects a long drift is kept among false ones") {
   const unsigned seed = GENERATE(range(1U, 6U));
   CAPTURE(seed);
   constexpr Eigen::Index kPoses = 300;
@@ -219,7 +218,7 @@ TEST_CASE("a closure that alone corrects a long drift is kept among false ones",
   CHECK(std::count(first_false, kept.end(), true) == 0);
 }
 
-TEST_CASE("noise of steps and closures that no claim covers rejects nothing", "[outliers]") {
+TEST_CASE("noise of steps and closures that no claim covers rejects nothing") {
   const auto file = shared_data("pose_graphs/3d/sphere_bignoise_vertex3.g2o");
   if (!file) return;
   const std::size_t robots = GENERATE(1U, 2U, 3U, 5U);
@@ -228,7 +227,7 @@ TEST_CASE("noise of steps and closures that no claim covers rejects nothing", "[
   CHECK(std::ranges::count(run_agent_team(graph, {}).kept, false) == 0);
 }
 
-TEST_CASE("rejected closures do not distort the map, and kept false ones do", "[outliers]") {
+TEST_CASE("rejected closures do not distort the map, and kept false ones do") {
   std::vector<std::size_t> remaining;
   std::vector<std::string> methods = kRejections;
   std::erase(methods, "robots");  // robots use one of several closures between two poses

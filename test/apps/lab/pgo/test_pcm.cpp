@@ -25,7 +25,7 @@ std::string chain_g2o(int keyframes, const std::vector<std::pair<int, int>>& clo
   return text;
 }
 
-TEST_CASE("pcm prints a table and writes JSON", "[pcm]") {
+TEST_CASE("pcm prints a table and writes JSON") {
   const TemporaryFolder folder;
   const std::string graph =
       folder.write("chain.g2o", chain_g2o(20, {{0, 5}, {2, 9}, {3, 15}})).string();
@@ -37,7 +37,7 @@ TEST_CASE("pcm prints a table and writes JSON", "[pcm]") {
   CHECK_THAT(folder.read("out.json"), Contains("\"search\": \"batch\""));
 }
 
-TEST_CASE("pcm reports the fault of its input", "[pcm]") {
+TEST_CASE("pcm reports the fault of its input") {
   const TemporaryFolder folder;
   (void)folder.write("two.g2o", chain_g2o(5, {{0, 3}, {1, 4}}));
   (void)folder.write("none.g2o", chain_g2o(5, {}));
@@ -74,7 +74,7 @@ std::vector<LabelledClosure> mixed(std::size_t count, std::mt19937& rng) {
   return closures;
 }
 
-TEST_CASE("A run ends with the set of Pcm, or with a clique of a heuristic", "[pcm]") {
+TEST_CASE("A run ends with the set of Pcm, or with a clique of a heuristic") {
   const CliqueMethod method =
       GENERATE(CliqueMethod::kExact, CliqueMethod::kIncremental, CliqueMethod::kBatch);
   CAPTURE(to_string(method));
@@ -95,7 +95,7 @@ TEST_CASE("A run ends with the set of Pcm, or with a clique of a heuristic", "[p
   CHECK(run.additions.back().true_members == run.additions.back().clique);
 }
 
-TEST_CASE("The heuristics find cliques that are no larger than the maximum", "[pcm]") {
+TEST_CASE("The heuristics find cliques that are no larger than the maximum") {
   const auto starts =
       GENERATE(GreedyClique::Starts::kNewVertex, GreedyClique::Starts::kAllVertices);
   const double density = GENERATE(0.3, 0.6, 0.9);
@@ -119,14 +119,14 @@ TEST_CASE("The heuristics find cliques that are no larger than the maximum", "[p
   }
 }
 
-TEST_CASE("Closures without a usable covariance are refused by name", "[pcm]") {
+TEST_CASE("Closures without a usable covariance are refused by name") {
   std::mt19937 rng(1);
   std::vector<LabelledClosure> closures = mixed(3, rng);
   closures[1].closure.covariance(0, 0) = -1.0;
   CHECK_THROWS_WITH(run_pcm(closures), Contains("cannot be weighed"));
 }
 
-TEST_CASE("With 1000 outliers the clique of Manhattan consists of true closures", "[pcm]") {
+TEST_CASE("With 1000 outliers the clique of Manhattan consists of true closures") {
   const auto file = shared_data("pose_graphs/2d/manhattan.g2o");
   if (!file) return;
   ClosureChoice selection{.outliers = 1000};
@@ -141,7 +141,7 @@ TEST_CASE("With 1000 outliers the clique of Manhattan consists of true closures"
   CHECK(last.clique - last.true_members <= 5);
 }
 
-TEST_CASE("Closures come from the file, with random ones among them by the seed", "[pcm]") {
+TEST_CASE("Closures come from the file, with random ones among them by the seed") {
   const TemporaryFolder folder;
   const auto file = folder.write("chain.g2o", chain_g2o(20, {{0, 5}, {9, 2}, {3, 15}, {4, 16}}));
   const ClosureChoice selection{.outliers = 30, .keep = 2};
@@ -160,7 +160,7 @@ TEST_CASE("Closures come from the file, with random ones among them by the seed"
   CHECK((one[0].outlier || one[1].outlier));
 }
 
-TEST_CASE("Random outliers join keyframes that odometry does not, in their box", "[pcm]") {
+TEST_CASE("Random outliers join keyframes that odometry does not, in their box") {
   const bool planar = GENERATE(false, true);
   CAPTURE(planar);
   RandomOutlierModel model{.robot = 7, .keyframes = 6, .planar = planar, .half_side_m = 3.0};
@@ -183,7 +183,7 @@ TEST_CASE("Random outliers join keyframes that odometry does not, in their box",
   CHECK(farthest > 2.9);  // 500 x 2 coordinates: below it with probability 1e-14
 }
 
-TEST_CASE("Two keyframes are too few for an outlier", "[pcm]") {
+TEST_CASE("Two keyframes are too few for an outlier") {
   std::mt19937 rng(1);
   CHECK_THROWS_WITH(random_outliers(1, {.robot = 0, .keyframes = 2}, rng), Contains("2 keyframes"));
 }

@@ -68,7 +68,7 @@ void check_scale(const Spread& spread, double expected) {
   CHECK(std::abs(spread.scale() / expected - 1.0) < kConfidence * spread.sigma());
 }
 
-TEST_CASE("The ratio of noise to claim is that of the scenario", "[scenario]") {
+TEST_CASE("The ratio of noise to claim is that of the scenario") {
   const unsigned seed = GENERATE(1U, 2U);
   CAPTURE(seed);
   const Whole whole(600);
@@ -93,7 +93,7 @@ TEST_CASE("The ratio of noise to claim is that of the scenario", "[scenario]") {
   check_scale(closures[{1, 1}], 1.0);
 }
 
-TEST_CASE("Honest weights are those of the drawn noise", "[scenario]") {
+TEST_CASE("Honest weights are those of the drawn noise") {
   const Whole whole(600);
   Scenario scenario = two_robots();
   scenario.odometry_noise = {{1, 7.0}};
@@ -111,8 +111,7 @@ TEST_CASE("Honest weights are those of the drawn noise", "[scenario]") {
   }
 }
 
-TEST_CASE("Closures of one place share their bias, and closures of two places do not",
-          "[scenario]") {
+TEST_CASE("Closures of one place share their bias, and closures of two places do not") {
   const Whole whole(600);
   Scenario scenario = two_robots();
   scenario.closure_noise = {{0, 0.0}, {1, 0.0}};  // no noise, only the bias
@@ -141,8 +140,7 @@ TEST_CASE("Closures of one place share their bias, and closures of two places do
   check_scale(between, 3.0);
 }
 
-TEST_CASE("Closures of a cluster agree with each other within their noise, not with the truth",
-          "[scenario]") {
+TEST_CASE("Closures of a cluster agree with each other within their noise, not with the truth") {
   const unsigned seed = GENERATE(1U, 2U, 3U);
   CAPTURE(seed);
   constexpr std::size_t kPlaces = 20, kSize = 7;
@@ -180,7 +178,7 @@ TEST_CASE("Closures of a cluster agree with each other within their noise, not w
   CHECK(std::abs(std::sqrt(squares / count) - 1.0) < kConfidence * std::sqrt(0.5 / (0.3 * count)));
 }
 
-TEST_CASE("A scenario limits the closures between two robots", "[scenario]") {
+TEST_CASE("A scenario limits the closures between two robots") {
   const Whole whole(600);
   Scenario scenario = two_robots();
   scenario.robots = 3;
@@ -203,7 +201,7 @@ TEST_CASE("A scenario limits the closures between two robots", "[scenario]") {
   CHECK(std::set<Index>(parts.begin(), parts.end()) == std::set<Index>{0, 200, 400});
 }
 
-TEST_CASE("A scenario scales its truth and takes the first poses", "[scenario]") {
+TEST_CASE("A scenario scales its truth and takes the first poses") {
   const Whole whole(600);
   Scenario scenario = two_robots();
   scenario.first_poses = 90;
@@ -220,7 +218,7 @@ TEST_CASE("A scenario scales its truth and takes the first poses", "[scenario]")
   CHECK(drawn.truth[7].linear() == whole.truth[7].linear());
 }
 
-TEST_CASE("A scenario depends on its seed alone", "[scenario]") {
+TEST_CASE("A scenario depends on its seed alone") {
   const Whole whole(90);
   Scenario scenario = two_robots();
   scenario.random_percent = 20.0;
@@ -235,7 +233,7 @@ TEST_CASE("A scenario depends on its seed alone", "[scenario]") {
   CHECK(measured(1) != measured(2));
 }
 
-TEST_CASE("A scenario that does not fit the graph is refused", "[scenario]") {
+TEST_CASE("A scenario that does not fit the graph is refused") {
   const Whole whole(30);
   const auto refused = [&](auto change, const char* why) {
     Scenario scenario = two_robots();
@@ -257,7 +255,7 @@ std::map<std::string, OutlierResult> results_of(const Whole& whole, const Scenar
   return results;
 }
 
-TEST_CASE("Without noise every method finds the truth", "[scenario]") {
+TEST_CASE("Without noise every method finds the truth") {
   Scenario scenario = two_robots();
   scenario.odometry_noise = {{0, 0.0}, {1, 0.0}};
   scenario.closure_noise = {{0, 0.0}, {1, 0.0}};
@@ -270,7 +268,7 @@ TEST_CASE("Without noise every method finds the truth", "[scenario]") {
   }
 }
 
-TEST_CASE("The central solver finds the truth of exact edges from a wrong start", "[scenario]") {
+TEST_CASE("The central solver finds the truth of exact edges from a wrong start") {
   const Whole whole(90);
   std::mt19937 rng(1);
   std::normal_distribution<double> normal(0.0, 0.1);
@@ -291,8 +289,7 @@ TEST_CASE("The central solver finds the truth of exact edges from a wrong start"
   CHECK(judge(drawn, {start, placed.frame_of, all}).max_m > 0.05);
 }
 
-TEST_CASE("Robots without a true closure between them have a reference of two frames",
-          "[scenario]") {
+TEST_CASE("Robots without a true closure between them have a reference of two frames") {
   Scenario scenario = two_robots();
   scenario.closures_per_pair = 0;
   scenario.clusters = {.places = 1, .size = 1};
@@ -304,8 +301,7 @@ TEST_CASE("Robots without a true closure between them have a reference of two fr
 }
 
 // Each scenario that a robust team must stand, on the graph that it is meant for.
-TEST_CASE("The robots' sessions stand noise and places that are not as claimed",
-          "[scenario][slow]") {
+TEST_CASE("The robots' sessions stand noise and places that are not as claimed", "[slow]") {
   struct Row {
     std::string scenario;
     std::string graph;
@@ -333,7 +329,7 @@ TEST_CASE("The robots' sessions stand noise and places that are not as claimed",
   CHECK(robots.rms_m <= row.most_ratio * study.results.at(1).rms_m);
 }
 
-TEST_CASE("Odometry that is 20 times as noisy as it claims costs no true closure", "[scenario]") {
+TEST_CASE("Odometry that is 20 times as noisy as it claims costs no true closure") {
   const auto file = shared_data("pose_graphs/3d/sphere2500.g2o");
   if (!file) return;
   Scenario scenario = scenario_of("noisy-odometry");

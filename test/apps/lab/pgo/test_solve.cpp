@@ -44,7 +44,7 @@ std::string upright_square_g2o() {
 
 }  // namespace
 
-TEST_CASE("Every method runs from the command line and prints its result", "[pgo]") {
+TEST_CASE("Every method runs from the command line and prints its result") {
   const TemporaryFolder folder;
   const auto graph = folder.write("square.g2o", square_g2o());
   const auto json = folder.path() / "out.json";
@@ -61,7 +61,7 @@ TEST_CASE("Every method runs from the command line and prints its result", "[pgo
     CHECK_THAT(written, Contains(std::string("\"") + key + "\":"));
 }
 
-TEST_CASE("Poses are written as TUM and g2o", "[pgo]") {
+TEST_CASE("Poses are written as TUM and g2o") {
   const TemporaryFolder folder;
   const auto graph = folder.write("square.g2o", square_g2o());
   const auto tum = folder.path() / "poses.tum";
@@ -87,7 +87,7 @@ TEST_CASE("Poses are written as TUM and g2o", "[pgo]") {
   CHECK((rows >> std::ws).eof());
 }
 
-TEST_CASE("A graph without noise is certified and has no gap", "[pgo]") {
+TEST_CASE("A graph without noise is certified and has no gap") {
   const TemporaryFolder folder;
   const auto graph = folder.write("exact.g2o", "EDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\n");
   const auto json = folder.path() / "out.json";
@@ -98,7 +98,7 @@ TEST_CASE("A graph without noise is certified and has no gap", "[pgo]") {
   CHECK_THAT(folder.read("out.json"), !Contains("nan") && Contains("\"certified\": true"));
 }
 
-TEST_CASE("newton decides on closures and reports their noise", "[pgo]") {
+TEST_CASE("newton decides on closures and reports their noise") {
   const TemporaryFolder folder;
   const std::string square = folder.write("square.g2o", square_g2o()).string();
   const std::string step = folder.write("step.g2o", "EDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\n").string();
@@ -113,7 +113,7 @@ TEST_CASE("newton decides on closures and reports their noise", "[pgo]") {
   }
 }
 
-TEST_CASE("solve refuses unusable input and options with the reason", "[pgo]") {
+TEST_CASE("solve refuses unusable input and options with the reason") {
   const TemporaryFolder folder;
   const std::string graph = folder.write("square.g2o", square_g2o()).string();
   (void)folder.write("lone.g2o", "VERTEX_SE2 0 0 0 0\n");
@@ -140,7 +140,7 @@ TEST_CASE("solve refuses unusable input and options with the reason", "[pgo]") {
   CHECK_THAT(result.output, Contains(message));
 }
 
-TEST_CASE("The cost of a planar graph is that of the plane", "[pgo]") {
+TEST_CASE("The cost of a planar graph is that of the plane") {
   const auto file = shared_data("pose_graphs/2d/intel.g2o");
   if (!file) return;
   const CommandResult result = succeeded(
@@ -152,7 +152,7 @@ TEST_CASE("The cost of a planar graph is that of the plane", "[pgo]") {
   CHECK_THAT(result.output, Contains("\ncertified"));
 }
 
-TEST_CASE("Verticals of the file are used, reported and written", "[pgo][vertical]") {
+TEST_CASE("Verticals of the file are used, reported and written") {
   const TemporaryFolder folder;
   const auto graph = folder.write("square.g2o", upright_square_g2o());
   const auto json = folder.path() / "out.json";

@@ -18,14 +18,14 @@ std::string planar_edge(int i, int j, const std::string& information = "4 0 0 4 
 
 }  // namespace
 
-TEST_CASE("Weights of a planar graph are those of the plane", "[pgo]") {
+TEST_CASE("Weights of a planar graph are those of the plane") {
   const G2oGraph graph = graph_of(planar_edge(0, 1, "4 0 0 2 0 9"));
   const Precision weight = precision_of_blocks(graph.edges[0].covariance, 2);
   CHECK(weight.kappa == Approx(9.0));
   CHECK(weight.tau == Approx(2.0 / (0.25 + 0.5)));
 }
 
-TEST_CASE("Cross terms are dropped before the information is inverted", "[pgo]") {
+TEST_CASE("Cross terms are dropped before the information is inverted") {
   const Precision with =
       precision_of_blocks(graph_of(planar_edge(0, 1, "4 0 3 4 1 9")).edges[0].covariance, 2);
   CHECK(with.kappa == Approx(9.0));
@@ -37,15 +37,14 @@ TEST_CASE("Cross terms are dropped before the information is inverted", "[pgo]")
   CHECK(spatial.tau == Approx(3.0 / 0.6));
 }
 
-TEST_CASE("Covariances that are not positive definite are refused", "[pgo]") {
+TEST_CASE("Covariances that are not positive definite are refused") {
   Matrix6 covariance = Matrix6::Identity();
   covariance(0, 0) = GENERATE(0.0, -1.0, std::numeric_limits<double>::quiet_NaN(),
                               std::numeric_limits<double>::infinity());
   CHECK_THROWS_AS(precision_of_blocks(covariance, 3), std::invalid_argument);
 }
 
-TEST_CASE("Poses are divided in the order of their ids, and the last robot gets the rest",
-          "[pgo]") {
+TEST_CASE("Poses are divided in the order of their ids, and the last robot gets the rest") {
   // Vertices and edges out of order; ids with gaps.
   std::string text = "VERTEX_SE2 7 0 0 0\nVERTEX_SE2 2 0 0 0\nVERTEX_SE2 3 0 0 0\n";
   text += "VERTEX_SE2 20 0 0 0\nVERTEX_SE2 9 0 0 0\n";
@@ -64,7 +63,7 @@ TEST_CASE("Poses are divided in the order of their ids, and the last robot gets 
   CHECK(between.end_on(1).index == 0);
 }
 
-TEST_CASE("Every edge belongs to one robot or to two, and parallel edges all count", "[pgo]") {
+TEST_CASE("Every edge belongs to one robot or to two, and parallel edges all count") {
   const std::string text = planar_edge(0, 1) + planar_edge(0, 1) + planar_edge(1, 2) +
                            planar_edge(2, 1) + planar_edge(2, 3);
   const TeamGraph graph = partition_contiguously(graph_of(text), 2, "graph.g2o");
@@ -82,7 +81,7 @@ TEST_CASE("Every edge belongs to one robot or to two, and parallel edges all cou
   }
 }
 
-TEST_CASE("A robot's own odometry comes before its closures", "[pgo]") {
+TEST_CASE("A robot's own odometry comes before its closures") {
   const std::string text = planar_edge(0, 2) + planar_edge(1, 2) + planar_edge(0, 1) +
                            planar_edge(2, 1) + planar_edge(2, 3);
   const SessionGraph part = part_of(partition_contiguously(graph_of(text), 1, "graph.g2o"), 0);
@@ -93,7 +92,7 @@ TEST_CASE("A robot's own odometry comes before its closures", "[pgo]") {
   CHECK(part.between.empty());
 }
 
-TEST_CASE("Without cut steps, only closures connect the robots of a graph", "[pgo]") {
+TEST_CASE("Without cut steps, only closures connect the robots of a graph") {
   std::string text;
   for (int i = 0; i < 5; ++i) text += planar_edge(i, i + 1);
   const TeamGraph whole =
@@ -105,7 +104,7 @@ TEST_CASE("Without cut steps, only closures connect the robots of a graph", "[pg
   CHECK(part_of_poses(graph) == std::vector<Eigen::Index>{0, 0, 0, 3, 3, 3});
 }
 
-TEST_CASE("Graphs that cannot be divided are refused with the reason", "[pgo]") {
+TEST_CASE("Graphs that cannot be divided are refused with the reason") {
   const auto deal_out = [](const std::string& text, std::size_t robots) {
     return partition_contiguously(graph_of(text), robots, "graph.g2o");
   };
@@ -124,7 +123,7 @@ TEST_CASE("Graphs that cannot be divided are refused with the reason", "[pgo]") 
   CHECK_THROWS_WITH(deal_out(planar_edge(0, 1, "nan 0 0 1 0 1"), 1), Contains("graph.g2o:1:"));
 }
 
-TEST_CASE("The tunnels' edges between robots count once", "[pgo]") {
+TEST_CASE("The tunnels' edges between robots count once") {
   const auto folder = shared_data("multi_robot/tunnels_8robots");
   if (!folder) return;
   const TeamGraph graph = read_team_folder(*folder);
@@ -133,7 +132,7 @@ TEST_CASE("The tunnels' edges between robots count once", "[pgo]") {
   CHECK(graph.edges.size() == 1247 + 96 + 3548);
 }
 
-TEST_CASE("Each vertical goes to the robot of its pose", "[pgo][vertical]") {
+TEST_CASE("Each vertical goes to the robot of its pose") {
   const std::string level = " 0 0 0 0 0 0 1 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 9 0 0 9 0 0\n";
   const std::string unit = " 1 0 0 0 0 0 1 1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 1 0 0 1 0 1\n";
   std::string text = "PARAMS_SE3OFFSET 0 0 0 0 0 0 0 1\n";
@@ -158,7 +157,7 @@ TEST_CASE("Each vertical goes to the robot of its pose", "[pgo][vertical]") {
       "g.g2o: the prior on 0:7 is on a vertex that the file lacks");
 }
 
-TEST_CASE("A folder's verticals are those of all its files", "[pgo][vertical]") {
+TEST_CASE("A folder's verticals are those of all its files") {
   const TemporaryFolder folder;
   for (const RobotId robot : {RobotId{4}, RobotId{2}}) {
     const auto edge = [&](KeyframeId from, KeyframeId to) {
@@ -187,7 +186,7 @@ TEST_CASE("A folder's verticals are those of all its files", "[pgo][vertical]") 
   CHECK(graph.verticals[1].up.isApprox(Eigen::Vector3d::UnitX(), 1e-12));
 }
 
-TEST_CASE("A folder and a run have the weights that robots use", "[pgo]") {
+TEST_CASE("A folder and a run have the weights that robots use") {
   Matrix6 covariance = Matrix6::Identity();
   covariance(1, 5) = covariance(5, 1) = 0.8;
   G2oGraph graph;
@@ -210,7 +209,7 @@ TEST_CASE("A folder and a run have the weights that robots use", "[pgo]") {
                     Contains("the graph of robot 3 has edges to robot 7, whose file is not there"));
 }
 
-TEST_CASE("A folder that holds no team is refused", "[pgo]") {
+TEST_CASE("A folder that holds no team is refused") {
   const TemporaryFolder folder;
   CHECK_THROWS_WITH(read_team_folder(folder.path()), Contains("no *.csv and no *.g2o"));
   CHECK_THROWS_WITH(read_team_folder(folder.path() / "x"), Contains("is not a folder"));

@@ -28,7 +28,7 @@ MemberTeam rbcd_team(const TeamGraph& graph, std::vector<SE3> start, const RbcdO
 
 }  // namespace
 
-TEST_CASE("The work of a round has the times of its slowest robot and of all robots", "[pgo]") {
+TEST_CASE("The work of a round has the times of its slowest robot and of all robots") {
   double clock = 0.0;
   RoundMeter meter(3, counting_meter(clock));
   meter.run(0, [] {});
@@ -43,7 +43,7 @@ TEST_CASE("The work of a round has the times of its slowest robot and of all rob
   CHECK(meter.finish_round().total_cpu_s == 0.0);
 }
 
-TEST_CASE("The critical path of a round is the sum over its exchanges", "[pgo]") {
+TEST_CASE("The critical path of a round is the sum over its exchanges") {
   double clock = 0.0;
   RoundMeter meter(2, counting_meter(clock));
   meter.run(0, [] {});
@@ -56,7 +56,7 @@ TEST_CASE("The critical path of a round is the sum over its exchanges", "[pgo]")
   CHECK(work.total_cpu_s == 4.0);
 }
 
-TEST_CASE("A round of block descent counts the bytes of its messages", "[pgo][rbcd]") {
+TEST_CASE("A round of block descent counts the bytes of its messages") {
   const WoundRing ring(24, 3);  // each robot's first and last pose are public
   const Eigen::Index rank = GENERATE(3, 5);
   MemberTeam team = rbcd_team(ring.graph, ring.wound, {.rank = rank, .max_rounds = 1});
@@ -73,7 +73,7 @@ TEST_CASE("A round of block descent counts the bytes of its messages", "[pgo][rb
   CHECK(rounds[1].work.bytes == starts + poses + shares + progress);
 }
 
-TEST_CASE("Without noise, robots that solve alone and are joined have no cost", "[pgo]") {
+TEST_CASE("Without noise, robots that solve alone and are joined have no cost") {
   std::mt19937 rng(4);
   const TeamGraph graph = noisy_chain(30, 3, 0.0, rng);
   const SolverRun run = run_solver(graph, any_start(graph), {.method = "local"}, {});
@@ -81,7 +81,7 @@ TEST_CASE("Without noise, robots that solve alone and are joined have no cost", 
   CHECK(run.rounds.back().cost < 1e-9);
 }
 
-TEST_CASE("A robot whose own edges do not connect its poses cannot solve alone", "[pgo]") {
+TEST_CASE("A robot whose own edges do not connect its poses cannot solve alone") {
   std::mt19937 rng(4);
   TeamGraph graph = noisy_chain(30, 3, 0.0, rng);
   std::erase_if(graph.edges, [&](const BlockEdge& e) {
@@ -91,7 +91,7 @@ TEST_CASE("A robot whose own edges do not connect its poses cannot solve alone",
                     Contains("robot 1 cannot solve alone"));
 }
 
-TEST_CASE("Robots with verticals that solve alone are joined upright", "[pgo][vertical]") {
+TEST_CASE("Robots with verticals that solve alone are joined upright") {
   std::mt19937 rng(4);
   TeamGraph graph = noisy_chain(30, 3, 0.0, rng, 2.0);
   // Closures between robots are tilted; the joined robots are not.

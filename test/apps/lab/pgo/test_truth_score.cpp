@@ -30,7 +30,7 @@ SolvedPart scaled_truth(const LabelledTeamGraph& team, double scale) {
 
 }  // namespace
 
-TEST_CASE("A JRL file becomes a team with its labels and poses", "[truth]") {
+TEST_CASE("A JRL file becomes a team with its labels and poses") {
   const LabelledTeamGraph team = small_team();
   CHECK(team.graph.robots() == 2);
   CHECK(team.graph.first == std::vector<Eigen::Index>{0, 3, 5});
@@ -45,7 +45,7 @@ TEST_CASE("A JRL file becomes a team with its labels and poses", "[truth]") {
   CHECK(team.repeated == 1);
 }
 
-TEST_CASE("Closures are counted by label, ends and decision", "[truth]") {
+TEST_CASE("Closures are counted by label, ends and decision") {
   const LabelledTeamGraph team = small_team();
   const LabelCounts kept = count_closures(team, std::vector<bool>(6, true));
   CHECK(kept.inside.true_kept == 1);
@@ -58,7 +58,7 @@ TEST_CASE("Closures are counted by label, ends and decision", "[truth]") {
   CHECK(lost.inside.true_kept + lost.between.true_kept + lost.between.false_kept == 0);
 }
 
-TEST_CASE("The ATE of positions scaled by 1.1 equals its closed form", "[truth]") {
+TEST_CASE("The ATE of positions scaled by 1.1 equals its closed form") {
   const LabelledTeamGraph team = small_team();
   CHECK(ate_of(team, {scaled_truth(team, 1.0)}).team_m == Approx(0.0).margin(1e-12));
   const TeamAte ate = ate_of(team, {scaled_truth(team, 1.1)});
@@ -69,7 +69,7 @@ TEST_CASE("The ATE of positions scaled by 1.1 equals its closed form", "[truth]"
   CHECK(ate.parts == 1);
 }
 
-TEST_CASE("Each part is aligned separately, and poses without truth do not count", "[truth]") {
+TEST_CASE("Each part is aligned separately, and poses without truth do not count") {
   LabelledTeamGraph team = small_team();
   const SolvedPart whole = scaled_truth(team, 1.1);
   const auto slice = [&](std::size_t begin, std::size_t end) {
@@ -87,7 +87,7 @@ TEST_CASE("Each part is aligned separately, and poses without truth do not count
   CHECK(ate_of(team, {whole}).team_m == Approx(0.1 * std::sqrt(2.0 / 3.0)));
 }
 
-TEST_CASE("Without the edges between two robots a team's graph has two parts", "[truth]") {
+TEST_CASE("Without the edges between two robots a team's graph has two parts") {
   const LabelledTeamGraph team = small_team();
   const std::vector<ConnectedPart> parts =
       connected_parts(team.graph, {true, true, true, false, true, false});
@@ -102,7 +102,7 @@ TEST_CASE("Without the edges between two robots a team's graph has two parts", "
   CHECK(parts[1].graph.edges[0].j == 1);
 }
 
-TEST_CASE("solve compares its result with the ground truth of a JRL file", "[pgo][truth]") {
+TEST_CASE("solve compares its result with the ground truth of a JRL file") {
   const TemporaryFolder folder;
   const auto file = folder.write("small.jrl", SmallJrl().text());
   const CommandResult result = succeeded(run_command(
@@ -126,7 +126,7 @@ TEST_CASE("solve compares its result with the ground truth of a JRL file", "[pgo
   CHECK_THAT(plain.output, !Contains("ATE") && !Contains("true kept"));
 }
 
-TEST_CASE("solve refuses a number of robots that a JRL file does not have", "[pgo][truth]") {
+TEST_CASE("solve refuses a number of robots that a JRL file does not have") {
   const TemporaryFolder folder;
   const auto file = folder.write("small.jrl", SmallJrl().text());
   const CommandResult result = run_command(kPgoTool + "solve " + file.string() + " --robots 3");
@@ -134,7 +134,7 @@ TEST_CASE("solve refuses a number of robots that a JRL file does not have", "[pg
   CHECK_THAT(result.output, Contains("--robots 3: there are 2 robots"));
 }
 
-TEST_CASE("outliers leaves out the closures that a JRL file labels as false", "[outliers][truth]") {
+TEST_CASE("outliers leaves out the closures that a JRL file labels as false") {
   const TemporaryFolder folder;
   const auto file = folder.write("small.jrl", SmallJrl().text());
   const CommandResult result = succeeded(
@@ -142,7 +142,7 @@ TEST_CASE("outliers leaves out the closures that a JRL file labels as false", "[
   CHECK_THAT(result.output, Contains("5 poses, 2 robots"));
 }
 
-TEST_CASE("True closures of COSMO-Bench lead to their known errors", "[truth]") {
+TEST_CASE("True closures of COSMO-Bench lead to their known errors") {
   struct Set {
     const char* name;
     double ate_m;  // error of the certified optimum with the weights of robots, rounded to 1 cm

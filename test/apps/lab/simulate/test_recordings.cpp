@@ -50,8 +50,7 @@ void check_equal(const std::map<std::string, std::string>& a,
   }
 }
 
-TEST_CASE("The ordinary reader reads a recording, and missing images are made again",
-          "[simulate]") {
+TEST_CASE("The ordinary reader reads a recording, and missing images are made again") {
   const TemporaryFolder folder;
   const fs::path output = folder.path() / "r";
   const auto result = succeeded(simulate(kSmall, output));
@@ -90,8 +89,7 @@ TEST_CASE("The ordinary reader reads a recording, and missing images are made ag
   check_equal(contents(folder, "r"), whole);
 }
 
-TEST_CASE("At the hardest level the reader reads the recording, with any number of threads",
-          "[simulate]") {
+TEST_CASE("At the hardest level the reader reads the recording, with any number of threads") {
   const TemporaryFolder folder;
   const std::string hard =
       kSmall + " --difficulty 3 --set timing.dropped_share=0.4 traffic.people=3 ";
@@ -140,7 +138,7 @@ std::string refusal_of_flight(const std::string& truth, const std::string& imu) 
   return {};
 }
 
-TEST_CASE("Recorded states and samples are read, gzipped or not", "[simulate]") {
+TEST_CASE("Recorded states and samples are read, gzipped or not") {
   const TemporaryFolder folder;
   const bool zipped = GENERATE(false, true);
   const auto truth =
@@ -160,7 +158,7 @@ TEST_CASE("Recorded states and samples are read, gzipped or not", "[simulate]") 
   CHECK_THAT(flight.fingerprint, Contains(truth.filename().string()));
 }
 
-TEST_CASE("Recordings that cannot be used are refused by file and line", "[simulate]") {
+TEST_CASE("Recordings that cannot be used are refused by file and line") {
   CHECK_THAT(refusal_of_flight(kEuroc + "3000,1,2,x,1,0,0,0\n", kImu),
              Contains("truth.csv line 5: x is not a finite number"));
   CHECK_THAT(refusal_of_flight(kEuroc + "3000,1,2,3,9,0,0,0\n", kImu),
@@ -184,7 +182,7 @@ std::string refusal(const fs::path& folder, const DatasetRecord& wanted = kWante
   return {};
 }
 
-TEST_CASE("A folder with other content or parameters is refused", "[simulate]") {
+TEST_CASE("A folder with other content or parameters is refused") {
   const TemporaryFolder folder;
   SECTION("files of others") {
     folder.write("thesis.tex", "");

@@ -28,7 +28,7 @@ std::string refusal_of_options(const std::vector<std::string>& arguments) {
   return {};
 }
 
-TEST_CASE("An RGB-D rig has depth at the images' rate", "[simulate]") {
+TEST_CASE("An RGB-D rig has depth at the images' rate") {
   const auto options = parse({"--world", "camp", "--rig", "rgbd", "--rate", "15", "--resolution",
                               "376x240", "--output", "x"});
   CHECK(options.cameras == CameraKind::kRgbd);
@@ -38,7 +38,7 @@ TEST_CASE("An RGB-D rig has depth at the images' rate", "[simulate]") {
   CHECK(options.height == 240);
 }
 
-TEST_CASE("Bad arguments are refused with their name and value", "[simulate]") {
+TEST_CASE("Bad arguments are refused with their name and value") {
   struct Row {
     std::vector<std::string> words;
     const char* message;
@@ -60,7 +60,7 @@ TEST_CASE("Bad arguments are refused with their name and value", "[simulate]") {
   CHECK_THAT(refusal_of_options(row.words), Contains(row.message));
 }
 
-TEST_CASE("Recorded motion needs a pair of files for each robot", "[simulate]") {
+TEST_CASE("Recorded motion needs a pair of files for each robot") {
   const TemporaryFolder folder;
   const std::string a = folder.write("V1_02_medium.csv.gz", "").string();
   const std::string b =
@@ -79,7 +79,7 @@ TEST_CASE("Recorded motion needs a pair of files for each robot", "[simulate]") 
   CHECK(options.robots == 2);
 }
 
-TEST_CASE("All errors of a file of options are reported by line", "[simulate]") {
+TEST_CASE("All errors of a file of options are reported by line") {
   const TemporaryFolder folder;
   const std::string file =
       folder.write("bad.yaml", "# a city\nworld: citty\nsped: 3\nrate: fast  # Hz\ndepth: maybe\n")
@@ -96,13 +96,13 @@ TEST_CASE("All errors of a file of options are reported by line", "[simulate]") 
              Contains("nowhere.yaml: cannot open"));
 }
 
-TEST_CASE("The files of options that come with the program can be used", "[simulate]") {
+TEST_CASE("The files of options that come with the program can be used") {
   const std::string name = GENERATE("city", "camp", "demo");
   const auto options = parse({"--config", "config/simulation/" + name + ".yaml", "--output", "x"});
   CHECK(options.robots == 3);
 }
 
-TEST_CASE("Each level is harder than the one before, and level 0 has no effects", "[simulate]") {
+TEST_CASE("Each level is harder than the one before, and level 0 has no effects") {
   const Effects none = load_effects(0, {});
   CHECK(none.inertial.gyro_scale == 0.0);
   CHECK(none.timing.dropped_share == 0.0);
@@ -120,7 +120,7 @@ TEST_CASE("Each level is harder than the one before, and level 0 has no effects"
   }
 }
 
-TEST_CASE("A single key has priority over the level", "[simulate]") {
+TEST_CASE("A single key has priority over the level") {
   const TemporaryFolder folder;
   const std::string file =
       folder.write("a.yaml", "difficulty: 2\nset: [sensor.dirt=0.7]\n").string();

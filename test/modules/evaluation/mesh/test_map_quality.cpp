@@ -24,7 +24,7 @@ std::vector<SeenPoint> seen_wall() {
   return seen;
 }
 
-TEST_CASE("The share of seen surface in a map is stated by depth and class", "[evaluation]") {
+TEST_CASE("The share of seen surface in a map is stated by depth and class") {
   const MapQuality quality = map_quality(wall(0.0F), wall(0.1F, 2.0F), seen_wall(), palette());
   CHECK(quality.by_depth[0].within_20cm == Approx(1.0));
   CHECK(quality.by_depth[0].within_5cm == Approx(0.0));
@@ -34,7 +34,7 @@ TEST_CASE("The share of seen surface in a map is stated by depth and class", "[e
   CHECK(quality.rim_m_per_m2 == Approx(8.0 / 4.0));
 }
 
-TEST_CASE("A zigzag wall has the angle and the rms of its slopes", "[evaluation]") {
+TEST_CASE("A zigzag wall has the angle and the rms of its slopes") {
   LabelledMesh zigzag = wall(0.0F);
   for (Eigen::Vector3f& p : zigzag.vertices)
     if (std::lround(p.x() / 0.1F) % 2 != 0) p.y() = 0.02F;

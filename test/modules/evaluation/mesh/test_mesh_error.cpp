@@ -32,7 +32,7 @@ std::string json_of(const MeshReport& report) {
   return json_text(to_json(report, {}));
 }
 
-TEST_CASE("Two parallel planes have the error of their distance", "[mesh_error]") {
+TEST_CASE("Two parallel planes have the error of their distance") {
   const double h = GENERATE(0.0, 0.01, 0.03, 0.08);
   const double density = GENERATE(250.0, 1000.0);
   CAPTURE(h, density);
@@ -56,7 +56,7 @@ TEST_CASE("Two parallel planes have the error of their distance", "[mesh_error]"
   CHECK(report.samples_per_m2 == density);
 }
 
-TEST_CASE("Shares of right and wrong and unknown labels are those of the areas", "[mesh_error]") {
+TEST_CASE("Shares of right and wrong and unknown labels are those of the areas") {
   LabelledMesh truth = rectangle({0, 0, 0}, {5, 0, 0}, {0, 4, 0}, 8, 1);
   truth.append(rectangle({5, 0, 0}, {5, 0, 0}, {0, 4, 0}, 8, 7));
   // Class 1: 60 % right, 40 % called 7. Class 7: 50 % right, 30 % called 2, 20 % unknown.
@@ -81,8 +81,7 @@ TEST_CASE("Shares of right and wrong and unknown labels are those of the areas",
   CHECK(report.merged.estimate.labels.total().accuracy() == Approx(0.55).margin(kBorder));
 }
 
-TEST_CASE("Labels beyond the given distance or of unknown true class are not judged",
-          "[mesh_error]") {
+TEST_CASE("Labels beyond the given distance or of unknown true class are not judged") {
   MeshErrorOptions options = in_place();
   options.label_distance_m = 0.2;
   const float z = GENERATE(0.15F, 0.25F);
@@ -93,7 +92,7 @@ TEST_CASE("Labels beyond the given distance or of unknown true class are not jud
   CHECK(unknown.merged.truth.labels.total().points() == 0);
 }
 
-TEST_CASE("True points far from the estimate are not judged", "[mesh_error]") {
+TEST_CASE("True points far from the estimate are not judged") {
   LabelledMesh estimate = square(2.0F, 0.0F);
   estimate.transform(make_pose(Eigen::Matrix3d::Identity(), {4, 4, 0}));
   const MeshReport report = compare(square(10.0F, 0.0F), estimate, in_place());
@@ -106,8 +105,7 @@ TEST_CASE("True points far from the estimate are not judged", "[mesh_error]") {
   CHECK(compare(square(10.0F, 0.0F), estimate, all).merged.coverage == 1.0);
 }
 
-TEST_CASE("True points beyond the rim of the estimate or behind it count separately",
-          "[mesh_error]") {
+TEST_CASE("True points beyond the rim of the estimate or behind it count separately") {
   // A wall with a thickness of 0.2 m, of which a part of one side was seen.
   LabelledMesh truth = rectangle({0, 0, 0}, {4, 0, 0}, {0, 0, 2}, 8, 1);
   truth.append(rectangle({0, 0.2F, 0}, {0, 0, 2}, {4, 0, 0}, 8, 2));
@@ -120,7 +118,7 @@ TEST_CASE("True points beyond the rim of the estimate or behind it count separat
   CHECK(report.merged.seen.labels.total().accuracy() == 1.0);
 }
 
-TEST_CASE("Surface that the truth lacks counts with the crop distance", "[mesh_error]") {
+TEST_CASE("Surface that the truth lacks counts with the crop distance") {
   LabelledMesh estimate = square(2.0F, 0.0F);
   estimate.append(square(1.0F, 3.0F));  // a fifth of the estimate, above the truth
   const MeshReport report = compare(square(2.0F, 0.0F), estimate, in_place());
@@ -129,7 +127,7 @@ TEST_CASE("Surface that the truth lacks counts with the crop distance", "[mesh_e
   CHECK(report.merged.truth.surface.mean_m < 1e-4);
 }
 
-TEST_CASE("Several robots are judged separately and merged", "[mesh_error]") {
+TEST_CASE("Several robots are judged separately and merged") {
   LabelledMesh left = rectangle({0, 0, 0}, {3, 0, 0}, {0, 4, 0}, 8, 1);
   LabelledMesh right = rectangle({2, 0, 0.04F}, {4, 0, 0}, {0, 4, 0}, 8, 2);
   const std::vector<MeshInput> inputs = {{"left", left}, {"right", right}};
@@ -152,8 +150,7 @@ TEST_CASE("Several robots are judged separately and merged", "[mesh_error]") {
   CHECK(report.merged.truth.labels.total().accuracy() == Approx(0.5).margin(0.02));
 }
 
-TEST_CASE("Two states of a mesh are judged on the points that either of them shows",
-          "[mesh_error]") {
+TEST_CASE("Two states of a mesh are judged on the points that either of them shows") {
   const LabelledMesh truth = rectangle({0, 0, 0}, {10, 0, 0}, {0, 4, 0}, 8, 1);
   const LabelledMesh part = rectangle({0, 0, 0.05F}, {6, 0, 0}, {0, 4, 0}, 8, 1);
   const LabelledMesh whole = rectangle({0, 0, 0.02F}, {10, 0, 0}, {0, 4, 0}, 8, 2);
@@ -180,7 +177,7 @@ TEST_CASE("Two states of a mesh are judged on the points that either of them sho
   CHECK(of_whole.truth.labels.total().accuracy() == 0.0);
 }
 
-TEST_CASE("The same arguments give the same report on any number of threads", "[mesh_error]") {
+TEST_CASE("The same arguments give the same report on any number of threads") {
   LabelledMesh estimate = room();
   estimate.transform(make_pose(Eigen::Matrix3d::Identity(), {0.02, 0.01, 0.03}));
   const int threads = cv::getNumThreads();
@@ -194,8 +191,7 @@ TEST_CASE("The same arguments give the same report on any number of threads", "[
   CHECK(one != json_of(compare(room(), estimate, other)));
 }
 
-TEST_CASE("More samples than allowed lower the density of both sides, with a note",
-          "[mesh_error]") {
+TEST_CASE("More samples than allowed lower the density of both sides, with a note") {
   MeshErrorOptions options = in_place();
   options.max_samples = 5000;
   const MeshReport report = compare(square(10.0F, 0.0F), square(5.0F, 0.0F), options);
@@ -208,8 +204,7 @@ TEST_CASE("More samples than allowed lower the density of both sides, with a not
              StartsWith("sampled at 1") && Contains("instead of 1000, to stay below 5000"));
 }
 
-TEST_CASE("A face with a vertex far away is left out, and such a truth is refused",
-          "[mesh_error]") {
+TEST_CASE("A face with a vertex far away is left out, and such a truth is refused") {
   LabelledMesh estimate = square(6.0F, 0.02F, 1);
   estimate.vertices.emplace_back(1e6F, 1e6F, 0.0F);
   estimate.labels.push_back(1);
@@ -222,7 +217,7 @@ TEST_CASE("A face with a vertex far away is left out, and such a truth is refuse
   CHECK_THROWS_WITH(compare(estimate, estimate, in_place()), Contains("has it a vertex far away?"));
 }
 
-TEST_CASE("Meshes without labels are compared by shape, with a note", "[mesh_error]") {
+TEST_CASE("Meshes without labels are compared by shape, with a note") {
   LabelledMesh bare = square(1.0F, 0.0F);
   bare.labels.clear();
   const MeshReport report = compare(square(1.0F, 0.0F), bare, in_place());
@@ -233,7 +228,7 @@ TEST_CASE("Meshes without labels are compared by shape, with a note", "[mesh_err
   CHECK_THAT(to_table(report, {}), !Contains("True class"));
 }
 
-TEST_CASE("Meshes that cannot be compared are refused by name", "[mesh_error]") {
+TEST_CASE("Meshes that cannot be compared are refused by name") {
   const LabelledMesh good = square(1.0F, 0.0F);
   const auto changed = [&](const auto& change) {
     LabelledMesh mesh = good;
@@ -264,8 +259,7 @@ TEST_CASE("Meshes that cannot be compared are refused by name", "[mesh_error]") 
   CHECK_THROWS_WITH(mesh_change(good, one, two), Contains("1 meshes before and 2 after"));
 }
 
-TEST_CASE("A mesh ends at an edge of one face with shared and with separate vertices",
-          "[mesh_error]") {
+TEST_CASE("A mesh ends at an edge of one face with shared and with separate vertices") {
   const bool shared = GENERATE(true, false);
   LabelledMesh mesh = square(3.0F, 0.0F, 3);
   if (!shared) {
@@ -286,7 +280,7 @@ TEST_CASE("A mesh ends at an edge of one face with shared and with separate vert
   CHECK(nearest.find({3.3F, 3.4F, 0.0F}, 1.0)->surface_m == Approx(0.5F));
 }
 
-TEST_CASE("The nearest sample is that of brute force", "[mesh_error]") {
+TEST_CASE("The nearest sample is that of brute force") {
   const unsigned seed = GENERATE(1U, 2U, 3U);
   CAPTURE(seed);
   const LabelledMesh mesh = room();

@@ -29,7 +29,7 @@ constexpr double kError_m = 5e-5;  // a few of the steps at which registration s
 
 }  // namespace
 
-TEST_CASE("Registration finds the motion of a room", "[mesh_error]") {
+TEST_CASE("Registration finds the motion of a room") {
   Vector6 xi;
   xi << GENERATE(-0.04, 0.0, 0.05), 0.02, -0.03, 0.10, GENERATE(-0.08, 0.12), 0.05;
   const SE3 T_truth_estimate = se3_exp(xi);
@@ -41,7 +41,7 @@ TEST_CASE("Registration finds the motion of a room", "[mesh_error]") {
   CHECK(difference(found.T_truth_estimate, T_truth_estimate) < kError_m);
 }
 
-TEST_CASE("Registration does not move along undetermined directions", "[mesh_error]") {
+TEST_CASE("Registration does not move along undetermined directions") {
   LabelledMesh estimate = square(4.0F, 0.0F);
   estimate.transform(make_pose(Eigen::Matrix3d::Identity(), {0.3, 0.0, 0.05}));
   const MeshReport report = report_of(square(4.0F, 0.0F), estimate);
@@ -53,7 +53,7 @@ TEST_CASE("Registration does not move along undetermined directions", "[mesh_err
         "the surfaces leave 3 of 6 directions open; registration did not move along these");
 }
 
-TEST_CASE("Registration is not biased by a part that the truth lacks", "[mesh_error]") {
+TEST_CASE("Registration is not biased by a part that the truth lacks") {
   LabelledMesh estimate = room();
   estimate.append(square(1.0F, 0.5F));  // a table of 1 m^2 of 41, half a metre above the floor
   const SE3 T_truth_estimate = make_pose(so3_exp({0.0, 0.0, 0.02}), {0.05, -0.05, 0.03});
@@ -63,7 +63,7 @@ TEST_CASE("Registration is not biased by a part that the truth lacks", "[mesh_er
 }
 
 // Rough ground whose rim extends beyond a kerb, which is then the nearest face.
-TEST_CASE("Registration does not pair ground beside a kerb with the kerb", "[mesh_error]") {
+TEST_CASE("Registration does not pair ground beside a kerb with the kerb") {
   const LabelledMesh ground = square(8.0F, 0.0F, 16);
   LabelledMesh upright = rectangle({2, 0, 0}, {0, 8, 0}, {0, 0, 0.3F}, 32);  // the kerb
   upright.append(rectangle({8, 0, 0}, {0, 8, 0}, {0, 0, 1}));
@@ -81,7 +81,7 @@ TEST_CASE("Registration does not pair ground beside a kerb with the kerb", "[mes
   CHECK(std::abs((found * middle - middle).x()) < 1e-3);
 }
 
-TEST_CASE("A large move is noted", "[mesh_error]") {
+TEST_CASE("A large move is noted") {
   LabelledMesh estimate = room();
   estimate.transform(make_pose(Eigen::Matrix3d::Identity(), {0.6, 0.0, 0.0}));
   const MeshReport report = report_of(room(), estimate);

@@ -32,7 +32,7 @@ void check_equal(const Camera& a, const Camera& b) {
   CHECK((a.T_body_cam.matrix() - b.T_body_cam.matrix()).norm() < kRounding);
 }
 
-TEST_CASE("The reader gets the calibration that was written", "[simulation][dataset]") {
+TEST_CASE("The reader gets the calibration that was written") {
   const TemporaryFolder folder;
   const RecordingLayout layout(folder.path());
   const Camera left = some_camera(0.0), right = some_camera(0.11);
@@ -63,7 +63,7 @@ TEST_CASE("The reader gets the calibration that was written", "[simulation][data
   CHECK(read_depth_scale(layout.mav0()) == 0.001);
 }
 
-TEST_CASE("A truncated image is not whole", "[simulation][dataset]") {
+TEST_CASE("A truncated image is not whole") {
   const bool jpeg = GENERATE(true, false);
   const TemporaryFolder folder;
   const fs::path file = folder.path() / (jpeg ? "image.jpg" : "image.png");
@@ -99,7 +99,7 @@ World two_triangles() {
   return world;
 }
 
-TEST_CASE("The world's mesh is written with classes and their colours", "[simulation][dataset]") {
+TEST_CASE("The world's mesh is written with classes and their colours") {
   const World world = two_triangles();
   const LabelPalette& palette = simulation_palette();
   const auto bytes = world_ply(world, palette);
@@ -123,7 +123,7 @@ TEST_CASE("The world's mesh is written with classes and their colours", "[simula
   CHECK(value_at<std::uint8_t>(bytes, face + 17 + 13) == static_cast<LabelId>(SurfaceClass::kRoad));
 }
 
-TEST_CASE("The world's objects are written with their classes and boxes", "[simulation][dataset]") {
+TEST_CASE("The world's objects are written with their classes and boxes") {
   Scene scene;
   const auto paint = scene.plain(SurfaceClass::kVehicle, {1, 1, 1});
   const auto ground = scene.plain(SurfaceClass::kRoad, {1, 1, 1});

@@ -18,7 +18,7 @@ std::vector<float> plane(double z_m) {
   return std::vector<float>(kPixels, static_cast<float>(z_m));
 }
 
-TEST_CASE("The error of depth grows with the square of range", "[motion]") {
+TEST_CASE("The error of depth grows with the square of range") {
   // Rounding to steps of 1/16 px adds the variance of a uniform distribution; noise hides the
   // steps.
   const double sigma_d = std::sqrt(0.15 * 0.15 + 1.0 / (16.0 * 16.0 * 12.0));
@@ -45,7 +45,7 @@ TEST_CASE("The error of depth grows with the square of range", "[motion]") {
     for (const std::uint16_t mm : measured_depth(plane(z), kWidth, kHeight, 1, {})) CHECK(mm == 0);
 }
 
-TEST_CASE("A nearer box leaves a shadow of its disparity on its left", "[motion]") {
+TEST_CASE("A nearer box leaves a shadow of its disparity on its left") {
   std::vector<float> depth = plane(8.0);  // d = 5.7 px
   for (int y = 80; y < 160; ++y)
     for (int x = 120; x < 200; ++x)
@@ -108,7 +108,7 @@ PredictionErrors predict_seconds(const BodyTrajectory& trajectory, double rate_h
   return worst;
 }
 
-TEST_CASE("Preintegrated noise-free samples of a flight reproduce it", "[motion]") {
+TEST_CASE("Preintegrated noise-free samples of a flight reproduce it") {
   FlightOptions options{.duration_s = 20.0};
   const SplineTrajectory flight =
       make_flight_trajectory({Eigen::Vector3d(-3, -3, 0.1), Eigen::Vector3d(3, 3, 3)}, options);
@@ -123,7 +123,7 @@ TEST_CASE("Preintegrated noise-free samples of a flight reproduce it", "[motion]
   CHECK(at_1000.position < at_200.position / 15.0);
 }
 
-TEST_CASE("White noise has the configured density", "[motion]") {
+TEST_CASE("White noise has the configured density") {
   ImuSimulation options;
   options.seed = GENERATE(1U, 2U);
   CAPTURE(options.seed);
@@ -182,7 +182,7 @@ std::vector<Stamp> images_at_10_hz(std::size_t count) {
   return images;
 }
 
-TEST_CASE("A scale error multiplies the integrated rotation and gravity", "[motion]") {
+TEST_CASE("A scale error multiplies the integrated rotation and gravity") {
   InertialErrorConfig config{.gyro_scale = 0.01, .accel_scale = 0.02};
   const std::uint64_t seed = GENERATE(1U, 2U, 3U);
   CAPTURE(seed);
@@ -198,8 +198,7 @@ TEST_CASE("A scale error multiplies the integrated rotation and gravity", "[moti
   CHECK(samples.back().sample.accel.z() == Approx(9.81 * (1.0 + sign_accel * 0.02)).epsilon(1e-12));
 }
 
-TEST_CASE("Biases drift with the sensor's temperature, and the truth has their values",
-          "[motion]") {
+TEST_CASE("Biases drift with the sensor's temperature, and the truth has their values") {
   InertialErrorConfig config{.warm_gyro_rps = 0.01, .warm_accel_mps2 = 0.1};
   const auto samples =
       simulate_imu(Turntable(0.0, 120.5), kClockStart, ideal_with(draw_inertial_errors(config, 5)));
@@ -215,7 +214,7 @@ TEST_CASE("Biases drift with the sensor's temperature, and the truth has their v
   }
 }
 
-TEST_CASE("A clock that drifts by 20 ppm is wrong by 20 ms after 1000 s", "[motion]") {
+TEST_CASE("A clock that drifts by 20 ppm is wrong by 20 ms after 1000 s") {
   TimingErrorConfig config{.drift_ppm = 20.0, .camera_delay_s = 0.004};
   const std::uint64_t seed = GENERATE(1U, 2U, 3U, 4U);
   const Stamp later = kClockStart + nanoseconds(1000.0);
@@ -226,7 +225,7 @@ TEST_CASE("A clock that drifts by 20 ppm is wrong by 20 ms after 1000 s", "[moti
   CHECK(clock.camera(later) == clock.inertial(later) + 4'000'000);
 }
 
-TEST_CASE("The configured share of images is lost, in runs of the configured length", "[motion]") {
+TEST_CASE("The configured share of images is lost, in runs of the configured length") {
   const auto images = images_at_10_hz(20000);
   TimingErrorConfig config{.dropped_share = 0.2, .dropped_run = 4.0};
   const auto kept = without_dropped(images, config, 7);
@@ -244,7 +243,7 @@ TEST_CASE("The configured share of images is lost, in runs of the configured len
   CHECK(without_dropped(images, {}, 7) == images);
 }
 
-TEST_CASE("The calibration that a robot gets is wrong by the configured sizes", "[motion]") {
+TEST_CASE("The calibration that a robot gets is wrong by the configured sizes") {
   const SensorRig truth = default_rig(RigKind::kVehicle, 376, 240);
   CalibrationErrorConfig config{.focal_share = 0.005, .mounting_rad = 0.0087, .stereo_rad = 0.001};
   const std::uint64_t seed = GENERATE(1U, 2U, 3U);

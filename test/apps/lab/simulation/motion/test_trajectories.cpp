@@ -14,7 +14,7 @@ namespace {
 
 const Eigen::AlignedBox3d kRoom(Eigen::Vector3d(-3.0, -2.5, 0.2), Eigen::Vector3d(3.0, 2.5, 3.0));
 
-TEST_CASE("A flight stays in its volume and is as lively as it should be", "[motion]") {
+TEST_CASE("A flight stays in its volume and is as lively as it should be") {
   FlightOptions options{.seed = GENERATE(1U, 2U, 3U, 4U)};
   CAPTURE(options.seed);
   options.duration_s = 100.0;
@@ -93,7 +93,7 @@ DriveSummary summarise(const BodyTrajectory& drive, const Route& route) {
   return summary;
 }
 
-TEST_CASE("A vehicle on level ground keeps to the limits and to its route", "[motion]") {
+TEST_CASE("A vehicle on level ground keeps to the limits and to its route") {
   VehicleOptions options{.seed = GENERATE(1U, 2U, 3U, 4U, 5U)};
   CAPTURE(options.seed);
   options.rig_height_m = 0.0;  // the point on the ground, for which the limits hold
@@ -112,7 +112,7 @@ TEST_CASE("A vehicle on level ground keeps to the limits and to its route", "[mo
   CHECK(s.roll_max < 0.05);
 }
 
-TEST_CASE("A vehicle follows the ground", "[motion]") {
+TEST_CASE("A vehicle follows the ground") {
   const VehicleOptions options;
   const SplineTrajectory drive = make_vehicle_trajectory(kDriveRoute, hills, options);
   for (double t = 0.0; t <= 60.0; t += 0.05) {
@@ -151,7 +151,7 @@ Recording record(double rate_hz, double position_noise_m, double rotation_noise_
   return recording;
 }
 
-TEST_CASE("A fit to perfect poses is the motion they were taken from", "[motion]") {
+TEST_CASE("A fit to perfect poses is the motion they were taken from") {
   const double rate_hz = GENERATE(20.0, 200.0);
   CAPTURE(rate_hz);
   const Recording recording = record(rate_hz, 0.0, 0.0);
@@ -167,7 +167,7 @@ TEST_CASE("A fit to perfect poses is the motion they were taken from", "[motion]
   }
 }
 
-TEST_CASE("Outliers do not bend a fit", "[motion]") {
+TEST_CASE("Outliers do not bend a fit") {
   Recording recording = record(200.0, 0.0002, 0.0002);
   for (std::size_t k = 500; k < recording.poses.size(); k += 700) {
     recording.poses[k].T.translation() += Eigen::Vector3d(0.3, -0.2, 0.1);
@@ -201,7 +201,7 @@ double density_at(double frequency, double roughness) {
   return sum / kWindows;
 }
 
-TEST_CASE("A road of roughness 1 has the spectrum of ISO 8608 class A", "[motion]") {
+TEST_CASE("A road of roughness 1 has the spectrum of ISO 8608 class A") {
   // 60 windows of an exponentially distributed estimate: 13 % standard deviation, checked to 4.
   for (const double frequency : {0.1, 0.2, 0.5, 1.0}) {
     CAPTURE(frequency);

@@ -74,8 +74,7 @@ void add(const cv::Mat& image, Figures& sums) {
   sums["gradient, pixels above 10"] += cv::countNonZero(gradient > 10.0);
 }
 
-TEST_CASE("Rendered images of the Vicon room are like those recorded in it",
-          "[simulation][rendering]") {
+TEST_CASE("Rendered images of the Vicon room are like those recorded in it") {
   const auto recording = shared_data("euroc/V1_01_easy");
   if (!recording) return;
   const fs::path keyframes = *recording / "keyframes";

@@ -24,7 +24,7 @@ SE3 tilted_pose() {
   return se3_exp(xi);
 }
 
-TEST_CASE("Depth of a plane is the analytic one in every pixel", "[simulation][rendering]") {
+TEST_CASE("Depth of a plane is the analytic one in every pixel") {
   const bool distorted = GENERATE(false, true);
   CAPTURE(distorted);
   const Camera camera = distorted ? distorted_camera(78, 58, 48.0) : forward_camera(78, 58, 48.0);
@@ -48,7 +48,7 @@ TEST_CASE("Depth of a plane is the analytic one in every pixel", "[simulation][r
   }
 }
 
-TEST_CASE("A box hides only the surfaces behind it", "[simulation][rendering]") {
+TEST_CASE("A box hides only the surfaces behind it") {
   const Camera camera = distorted_camera(62, 46, 40.0);
   Builder builder;
   builder.wall(8.0F, 3.0F, builder.material(SurfaceClass::kWall, 0.5F));
@@ -85,8 +85,7 @@ SE3 looking_down(double height_m) {
   return make_pose(R, {0.0, 0.0, height_m});
 }
 
-TEST_CASE("A lamp lights by the square of its distance and casts shadows",
-          "[simulation][rendering]") {
+TEST_CASE("A lamp lights by the square of its distance and casts shadows") {
   Builder builder;
   const MaterialId gray = builder.material(SurfaceClass::kFloor, 1.0F);
   builder.scene.quad({-5, -5, 0}, {5, -5, 0}, {5, 5, 0}, {-5, 5, 0}, gray);
@@ -112,8 +111,7 @@ double share_right_of(double x0, double slope, int x, int y) {
   return sum / kRows;
 }
 
-TEST_CASE("The grey of an edge is the share of the pixel that is covered",
-          "[simulation][rendering]") {
+TEST_CASE("The grey of an edge is the share of the pixel that is covered") {
   const double slope = GENERATE(0.0, 0.13, -0.4, 0.9);
   CAPTURE(slope);
   const Camera camera = forward_camera(48, 48, 48.0);
@@ -189,7 +187,7 @@ double row_deviation(const RenderedView& view, int row) {
   return std::sqrt(std::max(0.0, squares / view.width - mean * mean));
 }
 
-TEST_CASE("A texture loses contrast with distance instead of aliasing", "[simulation][rendering]") {
+TEST_CASE("A texture loses contrast with distance instead of aliasing") {
   const World world = textured_floor();
   const RenderedView view = view_of(world, forward_camera(320, 240, 200.0), above_floor(0.3, 0.2));
   // Rows at 2.5, 7 and 30 m, scaled: a pixel then covers 3, 9 and 38 texels across, more along the

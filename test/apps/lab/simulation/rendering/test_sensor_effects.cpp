@@ -23,8 +23,7 @@ RenderedView flat_view(const Camera& camera, float radiance) {
   return view;
 }
 
-TEST_CASE("The exposure starts at its target and follows a change of light with a lag",
-          "[simulation][exposure]") {
+TEST_CASE("The exposure starts at its target and follows a change of light with a lag") {
   constexpr double kTarget = 0.55;
   const SensorEffectsConfig config;
   ExposureControl control(config, 20.0);
@@ -51,7 +50,7 @@ Shot shot(double gain, std::uint64_t seed = 0) {
   return result;
 }
 
-TEST_CASE("Noise has the strength and the correlation of the sensor", "[simulation][sensor]") {
+TEST_CASE("Noise has the strength and the correlation of the sensor") {
   const double level = GENERATE(0.1, 0.5, 0.8);
   CAPTURE(level);
   const Camera camera = forward_camera(640, 480, 400.0);
@@ -99,7 +98,7 @@ LightMoments moments_of(const std::vector<float>& image, int width, const Eigen:
   return m;
 }
 
-TEST_CASE("Image motion equals that of projected points", "[simulation][sensor]") {
+TEST_CASE("Image motion equals that of projected points") {
   const Camera camera = distorted_camera(188, 120, 115.0);
   const PixelRays rays(camera);
   Vector6 velocity;
@@ -124,7 +123,7 @@ TEST_CASE("Image motion equals that of projected points", "[simulation][sensor]"
   }
 }
 
-TEST_CASE("A bright point is smeared along its motion, its light kept", "[simulation][sensor]") {
+TEST_CASE("A bright point is smeared along its motion, its light kept") {
   constexpr int kWidth = 61;
   constexpr int kHeight = 41;
   std::vector<float> image(kWidth * kHeight, 0.0F);
@@ -164,8 +163,7 @@ double edge_px(const RenderedView& view, int row) {
   return black;
 }
 
-TEST_CASE("A rolling shutter shears a vertical edge by rate * focal length * time of a row",
-          "[simulation][rendering]") {
+TEST_CASE("A rolling shutter shears a vertical edge by rate * focal length * time of a row") {
   const World world = edge_world();
   const Renderer renderer(world);
   const Camera camera = forward_camera(120, 80, 100.0);
@@ -184,8 +182,7 @@ TEST_CASE("A rolling shutter shears a vertical edge by rate * focal length * tim
   }
 }
 
-TEST_CASE("A moved car is at its pose in the images of labels and depth",
-          "[simulation][rendering]") {
+TEST_CASE("A moved car is at its pose in the images of labels and depth") {
   Builder builder;
   builder.wall(30.0F, 60.0F, builder.material(SurfaceClass::kWall, 0.5F));
   const World world = builder.build();
@@ -230,7 +227,7 @@ TEST_CASE("A moved car is at its pose in the images of labels and depth",
   CHECK(depth_m < nearest_m + 0.3F);
 }
 
-TEST_CASE("Passages multiply the light by the factor or its inverse", "[simulation][exposure]") {
+TEST_CASE("Passages multiply the light by the factor or its inverse") {
   SensorEffectsConfig config{.passage_light = 8.0, .passage_every_s = 10.0};
   const LightPassages light(config, 200.0, 5);
   int bright = 0, dark = 0, none = 0;
@@ -249,8 +246,7 @@ TEST_CASE("Passages multiply the light by the factor or its inverse", "[simulati
   CHECK(LightPassages({}, 200.0, 5).factor(50.0) == 1.0);
 }
 
-TEST_CASE("A light before the lens lifts the whole image, one behind it does not",
-          "[simulation][clutter]") {
+TEST_CASE("A light before the lens lifts the whole image, one behind it does not") {
   const PixelRays rays(forward_camera(120, 80, 100.0));
   SensorEffectsConfig config{.glare = 0.5};
   const SensorEffects effects(rays, config);
@@ -270,7 +266,7 @@ TEST_CASE("A light before the lens lifts the whole image, one behind it does not
                    static_cast<double>(brightest / 120) - 39.5) < 8.0);
 }
 
-TEST_CASE("A wall hides the sun and lamps behind it", "[simulation][clutter]") {
+TEST_CASE("A wall hides the sun and lamps behind it") {
   Builder builder;
   builder.wall(5.0F, 2.0F, builder.material(SurfaceClass::kWall, 0.5F));
   builder.world().lighting.sun = 0.8F;

@@ -170,8 +170,7 @@ void check_outdoors(World (*make)(std::uint64_t), const std::string& name,
   }
 }
 
-TEST_CASE("The city is sound, free of obstacles on its routes, and depends on the seed alone",
-          "[simulation]") {
+TEST_CASE("The city is sound, free of obstacles on its routes, and depends on the seed alone") {
   check_outdoors(
       make_city, "city",
       {SurfaceClass::kBuilding, SurfaceClass::kRoad, SurfaceClass::kSidewalk,
@@ -179,8 +178,7 @@ TEST_CASE("The city is sound, free of obstacles on its routes, and depends on th
        SurfaceClass::kPole, SurfaceClass::kFence, SurfaceClass::kPerson, SurfaceClass::kObject});
 }
 
-TEST_CASE("The camp is sound, free of obstacles on its routes, and depends on the seed alone",
-          "[simulation]") {
+TEST_CASE("The camp is sound, free of obstacles on its routes, and depends on the seed alone") {
   check_outdoors(make_camp, "camp",
                  {SurfaceClass::kRoad, SurfaceClass::kTerrain, SurfaceClass::kVegetation,
                   SurfaceClass::kVehicle, SurfaceClass::kPole, SurfaceClass::kFence,
@@ -250,8 +248,7 @@ float clearance_m(const World& world, const std::vector<Vector3f>& positions) {
 }
 
 TEST_CASE(
-    "The Vicon room is sound, closed, lit by lamps, empty where flights are, and each seed's own",
-    "[simulation][room]") {
+    "The Vicon room is sound, closed, lit by lamps, empty where flights are, and each seed's own") {
   const auto seed = GENERATE(range(1U, 5U));
   CAPTURE(seed);
   const World world = make_vicon_room(seed);
@@ -291,7 +288,7 @@ TEST_CASE(
   CHECK_FALSE(equal(make_vicon_room(5), world));
 }
 
-TEST_CASE("The recorded flights stay clear of everything in the Vicon room", "[simulation][room]") {
+TEST_CASE("The recorded flights stay clear of everything in the Vicon room") {
   const auto euroc = shared_data("euroc");
   if (!euroc) return;
   // 20 to 200 rows a second at up to 2.5 m/s: no flight gets 3 cm nearer between two samples.
@@ -326,7 +323,7 @@ double volume_m3(const SurfaceMesh& mesh) {
   return volume;
 }
 
-TEST_CASE("Closed shapes face outwards and have the volume and area of the solid", "[simulation]") {
+TEST_CASE("Closed shapes face outwards and have the volume and area of the solid") {
   Scene scene;
   double volume = 0.0;
   double area = 0.0;
