@@ -33,7 +33,7 @@ foreach(module ${modules})
   endforeach()
 endforeach()
 foreach(header apps/output_file.hpp apps/program_options.hpp apps/program_version.hpp
-               apps/report_files.hpp apps/stage_progress.hpp
+               apps/stage_progress.hpp
                runtime/clock.hpp runtime/config_layers.hpp runtime/config_text.hpp
                runtime/signal_watch.hpp runtime/yaml_config.hpp)
   get_filename_component(folder ${header} DIRECTORY)

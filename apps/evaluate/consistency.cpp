@@ -12,25 +12,22 @@
 #include "apps/evaluate/inputs.hpp"
 #include "apps/output_file.hpp"
 #include "modules/core/json.hpp"
-#include "modules/core/text_table.hpp"
 #include "modules/evaluation/association.hpp"
 #include "modules/evaluation/closure_truth.hpp"
+#include "modules/evaluation/report.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
 #include "modules/recorded_graph/g2o_io.hpp"
 
 namespace km {
 namespace {
 
-std::string to_table(const std::vector<Consistency>& robots) {
-  std::vector<std::vector<std::string>> rows = {{"NEES / degrees of freedom", "poses", "pose",
-                                                 "median", "rotation", "translation",
-                                                 "within 95 %"}};
-  for (const Consistency& c : robots)
-    rows.push_back({c.name, std::to_string(c.poses), fixed(c.pose, 2), fixed(c.median, 2),
-                    fixed(c.rotation, 2), fixed(c.translation, 2),
-                    fixed(100.0 * c.share_within_95, 1) + '%'});
-  return align_columns(rows);
-}
+constexpr ReportColumn kColumns[] = {{"NEES / degrees of freedom", "/name"},
+                                     {"poses", "/poses"},
+                                     {"pose", "/pose", 2},
+                                     {"median", "/median", 2},
+                                     {"rotation", "/rotation", 2},
+                                     {"translation", "/translation", 2},
+                                     percent_column("within 95 %", "/share_within_95")};
 
 Json to_json(const std::vector<Consistency>& robots) {
   Json json = Json::array();
@@ -98,8 +95,9 @@ struct ConsistencyCommand {
     std::vector<RelativePose> closures;
     for (const auto& [id, closure] : edges.closures) closures.push_back(closure);
     rows.push_back(consistency_of_edges("closures", closures, edges.truth));
-    std::cout << to_table(rows);
-    write_json_output(json, to_json(rows));
+    const Json numbers = to_json(rows);
+    std::cout << report_table(numbers, kColumns);
+    write_json_output(json, numbers);
   }
 };
 

@@ -1,32 +1,96 @@
+#include <algorithm>
 #include <deque>
 #include <filesystem>
 #include <iostream>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <vector>
 
 #include "apps/evaluate/commands.hpp"
 #include "apps/evaluate/inputs.hpp"
-#include "apps/report_files.hpp"
+#include "apps/output_file.hpp"
+#include "modules/charts/chart_page.hpp"
+#include "modules/core/text_table.hpp"
 #include "modules/evaluation/trajectory_error.hpp"
 
 namespace km {
 namespace {
 
+PlotPoint from_above(const SE3& T) {
+  return {T.translation().x(), T.translation().y()};
+}
+
+// Series of each distinct truth, cropped to the time that its estimates cover. The rest of a long
+// recording would make the compared part small in the plot.
+std::vector<PlotSeries> truth_series(std::span<const TrajectoryInput> inputs) {
+  struct Drawn {
+    std::span<const StampedPose> truth;
+    Stamp first, last;
+  };
+  std::map<const StampedPose*, Drawn> drawn;
+  for (const TrajectoryInput& input : inputs) {
+    if (input.truth.empty() || input.estimate.empty()) continue;
+    const Stamp first = input.estimate.front().stamp;
+    const Stamp last = input.estimate.back().stamp;
+    Drawn& entry =
+        drawn.try_emplace(input.truth.data(), Drawn{input.truth, first, last}).first->second;
+    entry.first = std::min(entry.first, first);
+    entry.last = std::max(entry.last, last);
+  }
+  std::vector<PlotSeries> all;
+  for (const auto& [key, entry] : drawn) {
+    PlotSeries& series = all.emplace_back();
+    series.name = "truth";
+    series.colour = PlotSeries::kGrey;
+    series.width_px = 3.0;
+    for (const StampedPose& pose : entry.truth)
+      if (pose.stamp >= entry.first && pose.stamp <= entry.last)
+        series.points.push_back(from_above(pose.T));
+  }
+  return all;
+}
+
+// A map of truth (grey) and aligned estimates (one colour each). The name of each estimate includes
+// its position rmse. Identical truths are drawn once, over the time of their estimates.
+Plot plot_from_above(std::span<const TrajectoryInput> inputs, const TeamError& team) {
+  Plot plot{.title = "From above", .is_map = true, .series = truth_series(inputs)};
+  for (std::size_t r = 0; r < inputs.size(); ++r) {
+    PlotSeries& series = plot.series.emplace_back();
+    series.name = team.robots[r].name + ", position rmse " +
+                  rounded(team.robots[r].position_m.rmse, 3) + " m";
+    series.colour = r;
+    series.width_px = 1.2;
+    for (const StampedPose& pose : inputs[r].estimate)
+      series.points.push_back(from_above(team.alignment.apply(pose.T)));
+  }
+  return plot;
+}
+
 struct TrajectoryCommand {
   std::vector<std::filesystem::path> truths, estimates;
-  ReportFiles files;
+  std::filesystem::path json, plot;
 
   void define(CLI::App& app) {
     app.add_option("--truth", truths, "True poses: one file for all estimates or one for each")
         ->required();
     app.add_option("--estimate", estimates, "Estimated poses, one file per robot, or a record")
         ->required();
-    files.define(app, "the numbers", "truth and estimates from above");
+    app.add_option("--json", json, "Also write the numbers to this file, as JSON");
+    app.add_option("--plot", plot,
+                   "Also draw truth and estimates from above, as a page for a browser: *.html")
+        ->check([](const std::string& file) {
+          return file.ends_with(".html")
+                     ? ""
+                     : file +
+                           ": --plot writes *.html (its charts can be saved as *.svg in the "
+                           "browser)";
+        });
   }
 
   void run() const {
-    files.check();
+    check_output_folder(json);
+    check_output_folder(plot);
     const auto all = expand_records(estimates);
     const auto true_poses = read_truths(truths, all.size(), "--estimate");
     std::deque<std::vector<StampedPose>> poses;  // inputs refer to them
@@ -38,8 +102,10 @@ struct TrajectoryCommand {
     }
     const TeamError team = trajectory_error(inputs);
     std::cout << to_table(team);
-    files.write([&](std::ostream& out) { out << json_text(team); }, "Truth and estimates",
-                [&] { return std::vector{plot_from_above(inputs, team)}; });
+    write_json_output(json, team);
+    write_output(plot, [&](std::ostream& out) {
+      out << chart_page("Truth and estimates", std::vector{plot_from_above(inputs, team)});
+    });
   }
 };
 
@@ -52,9 +118,9 @@ are judged in their common frame. Files are TUM text (t[s] p q x y z w) or EuRoC
 /NAME/path of every robot in it, the optimised poses, and FILE.mcap:/NAME/odometry for one topic
 (nav_msgs/Path, nav_msgs/Odometry, geometry_msgs/PoseStamped or PoseWithCovarianceStamped).
 The denser of truth and estimate is interpolated at the stamps of the other. Printed per estimate and for the team:
-  position error  distance to the truth at each pair [m]: the absolute trajectory error
-  rotation        angle to the truth after the same alignment [deg]
-  relative        error of the motion over a second [m, deg]
+  position error  distance to the truth at each pair: the absolute trajectory error
+  rotation        rmse of the angle to the truth after the same alignment
+  relative        rmse of the error of the motion over a second
   covered         share of the truth's time that has poses
 
 Examples:

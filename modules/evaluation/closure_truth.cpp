@@ -10,9 +10,9 @@
 #include "modules/core/config.hpp"
 #include "modules/core/input_file.hpp"
 #include "modules/core/lie.hpp"
-#include "modules/core/text_table.hpp"
 #include "modules/evaluation/association.hpp"
 #include "modules/evaluation/input_row.hpp"
+#include "modules/evaluation/report.hpp"
 
 namespace km {
 namespace {
@@ -325,57 +325,41 @@ std::vector<TrueKeyframe> place_keyframes(std::span<const KeyframeRecord> keyfra
 
 namespace {
 
-std::string percent(double share) {
-  return std::isfinite(share) ? fixed(100.0 * share, 1) + '%' : "-";
-}
-
-std::vector<std::string> table_row(const char* name, const ClosureScores& scores,
-                                   const StageScore& stage) {
-  const auto number = [&](double value, int decimals) {
-    return stage.translation_error_m.count > 0 ? fixed(value, decimals) : "-";
-  };
-  return {name,
-          std::to_string(stage.judged),
-          std::to_string(stage.correct),
-          stage.translation_error_m.count > 0 ? std::to_string(stage.beyond_limits) : "-",
-          percent(stage.precision()),
-          percent(scores.pair_recall(stage)),
-          percent(scores.frame_recall(stage)),
-          number(stage.translation_error_m.median, 3),
-          number(stage.translation_error_m.max, 3),
-          number(stage.rotation_error_deg.median, 2),
-          number(stage.rotation_error_deg.max, 2)};
-}
-
-Json error_of(const Statistics& statistics) {
-  return {{"rmse", statistics.rmse}, {"median", statistics.median}, {"max", statistics.max}};
-}
-
 Json to_json(const ClosureScores& scores, const StageScore& stage) {
-  Json json = {{"judged", stage.judged},
-               {"correct", stage.correct},
-               {"beyond_limits", stage.beyond_limits},
-               {"precision", stage.precision()},
-               {"pairs_found", stage.pairs_found},
-               {"pair_recall", scores.pair_recall(stage)},
-               {"frames_found", stage.frames_found},
-               {"frame_recall", scores.frame_recall(stage)}};
-  if (stage.translation_error_m.count > 0) {
-    json["translation_error_m"] = error_of(stage.translation_error_m);
-    json["rotation_error_deg"] = error_of(stage.rotation_error_deg);
-  }
-  return json;
+  const bool measured = stage.translation_error_m.count > 0;
+  return {{"judged", stage.judged},
+          {"correct", stage.correct},
+          {"beyond_limits", measured ? Json(stage.beyond_limits) : Json()},
+          {"precision", stage.precision()},
+          {"pairs_found", stage.pairs_found},
+          {"pair_recall", scores.pair_recall(stage)},
+          {"frames_found", stage.frames_found},
+          {"frame_recall", scores.frame_recall(stage)},
+          {"translation_error_m", stage.translation_error_m},
+          {"rotation_error_deg", stage.rotation_error_deg}};
 }
 
 }  // namespace
 
 std::string to_table(const ClosureScores& scores) {
-  std::string text =
-      align_columns({{"closures", "judged", "true", "beyond limits", "precision", "recall, pairs",
-                      "recall, keyframes", "median [m]", "max [m]", "median [deg]", "max [deg]"},
-                     table_row("candidates", scores, scores.candidates),
-                     table_row("verified", scores, scores.verified),
-                     table_row("inliers", scores, scores.inliers)});
+  constexpr ReportColumn kColumns[] = {{"closures", "/stage"},
+                                       {"judged", "/judged"},
+                                       {"true", "/correct"},
+                                       {"beyond limits", "/beyond_limits"},
+                                       percent_column("precision", "/precision"),
+                                       percent_column("recall, pairs", "/pair_recall"),
+                                       percent_column("recall, keyframes", "/frame_recall"),
+                                       {"median [m]", "/translation_error_m/median", 3},
+                                       {"max [m]", "/translation_error_m/max", 3},
+                                       {"median [deg]", "/rotation_error_deg/median", 2},
+                                       {"max [deg]", "/rotation_error_deg/max", 2}};
+  const Json json = scores;
+  Json rows = Json::array();
+  for (const char* stage : {"candidates", "verified", "inliers"}) {
+    rows.push_back(json[stage]);
+    rows.back()["stage"] = stage;
+  }
+  std::string text = report_table(rows, kColumns);
   text += std::to_string(scores.true_pairs) +
           " pairs of keyframes of two robots see the same place, in them " +
           std::to_string(scores.true_frames) + " keyframes";

@@ -13,6 +13,7 @@
 #include "modules/core/quantile.hpp"
 #include "modules/core/text_table.hpp"
 #include "modules/evaluation/mesh/sampled_surface.hpp"
+#include "modules/evaluation/report.hpp"
 
 namespace km {
 namespace {
@@ -157,8 +158,9 @@ double open_edges_m(const LabelledMesh& mesh) {
   return length_m;
 }
 
-std::string in_percent(double share) {
-  return std::isnan(share) ? "-" : fixed(100.0 * share, 1);
+Json to_json(const MappedShare& part) {
+  return {
+      {"points", part.points}, {"within_5cm", part.within_5cm}, {"within_20cm", part.within_20cm}};
 }
 
 }  // namespace
@@ -174,37 +176,37 @@ MapQuality map_quality(const LabelledMesh& truth, const LabelledMesh& map,
 }
 
 std::string to_table(const MapQuality& quality, const LabelPalette& palette) {
-  std::vector<std::vector<std::string>> rows = {{"seen", "points", "<20cm %", "<5cm %"}};
-  const auto add = [&](const std::string& name, const MappedShare& share) {
-    if (share.points > 0)
-      rows.push_back({name, std::to_string(share.points), in_percent(share.within_20cm),
-                      in_percent(share.within_5cm)});
+  constexpr ReportColumn kColumns[] = {{"seen", "/name"},
+                                       {"points", "/points"},
+                                       percent_column("<20cm", "/within_20cm"),
+                                       percent_column("<5cm", "/within_5cm")};
+  Json rows = Json::array();
+  const auto add = [&](const std::string& name, const MappedShare& part) {
+    if (part.points == 0) return;
+    rows.push_back(to_json(part));
+    rows.back()["name"] = name;
   };
   for (std::size_t i = 0; i < quality.by_depth.size(); ++i)
     add("below " + fixed(static_cast<double>(MapQuality::kDepths_m[i]), 0) + " m",
         quality.by_depth[i]);
   for (const LabelClass& entry : palette.classes()) add(entry.name, quality.by_class[entry.id]);
-  return align_columns(rows) + "\nmap within 5 cm of the truth " + in_percent(quality.within_5cm) +
-         " %, 10 cm " + in_percent(quality.within_10cm) + " %, median " +
-         fixed(quality.median_mm, 1) + " mm; walls " + fixed(quality.wall_deg, 1) + " deg, " +
-         fixed(quality.wall_rms_mm, 1) + " mm rms; floor " + fixed(quality.floor_deg, 1) +
-         " deg; open edges " + fixed(quality.rim_m_per_m2, 2) + " m/m2\n";
+  return report_table(rows, kColumns) + "\nmap within 5 cm of the truth " +
+         fixed(100.0 * quality.within_5cm, 1) + " %, 10 cm " +
+         fixed(100.0 * quality.within_10cm, 1) + " %, median " + fixed(quality.median_mm, 1) +
+         " mm; walls " + fixed(quality.wall_deg, 1) + " deg, " + fixed(quality.wall_rms_mm, 1) +
+         " mm rms; floor " + fixed(quality.floor_deg, 1) + " deg; open edges " +
+         fixed(quality.rim_m_per_m2, 2) + " m/m2\n";
 }
 
 Json to_json(const MapQuality& quality, const LabelPalette& palette) {
-  const auto share = [](const MappedShare& part) {
-    return Json{{"points", part.points},
-                {"within_5cm", part.within_5cm},
-                {"within_20cm", part.within_20cm}};
-  };
   Json json = {{"within_5cm", quality.within_5cm},     {"within_10cm", quality.within_10cm},
                {"median_mm", quality.median_mm},       {"wall_deg", quality.wall_deg},
                {"wall_rms_mm", quality.wall_rms_mm},   {"floor_deg", quality.floor_deg},
                {"rim_m_per_m2", quality.rim_m_per_m2}, {"by_depth", Json::array()}};
-  for (const MappedShare& part : quality.by_depth) json["by_depth"].push_back(share(part));
+  for (const MappedShare& part : quality.by_depth) json["by_depth"].push_back(to_json(part));
   for (const LabelClass& entry : palette.classes())
     if (quality.by_class[entry.id].points > 0)
-      json["by_class"][entry.name] = share(quality.by_class[entry.id]);
+      json["by_class"][entry.name] = to_json(quality.by_class[entry.id]);
   return json;
 }
 

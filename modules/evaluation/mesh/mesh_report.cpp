@@ -1,66 +1,18 @@
 #include "modules/evaluation/mesh/mesh_report.hpp"
 
-#include <cmath>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "modules/core/geometry.hpp"
 #include "modules/core/text_table.hpp"
+#include "modules/evaluation/report.hpp"
 
 namespace km {
 namespace {
 
-using Rows = std::vector<std::vector<std::string>>;
-
-std::string percent(double share) {
-  return std::isnan(share) ? "-" : fixed(100.0 * share, 1) + '%';
-}
-
-std::string millimetres(double metres) {
-  return fixed(1e3 * metres, 1);
-}
-
 std::string class_name(LabelId id, const LabelPalette& palette) {
   const LabelClass* found = palette.find(id);
   return found != nullptr ? found->name : "class " + std::to_string(id);
-}
-
-std::vector<const MeshError*> rows_of(const MeshReport& report) {
-  std::vector<const MeshError*> rows;
-  for (const MeshError& robot : report.robots) rows.push_back(&robot);
-  if (rows.size() > 1) rows.push_back(&report.merged);
-  return rows;
-}
-
-// One direction of the comparison, a row per mesh.
-std::string direction_table(const MeshReport& report, SurfaceComparison MeshError::*way,
-                            const auto& covered) {
-  Rows rows = {{"estimate", "points", "mean", "median", "p95", "<5cm", "<10cm", "surface", "labels",
-                "covered"}};
-  for (const MeshError* mesh : rows_of(report)) {
-    const auto& [point, surface, labels] = mesh->*way;
-    rows.push_back({mesh->name, std::to_string(point.count), millimetres(point.mean_m),
-                    millimetres(point.median_m), millimetres(point.p95_m),
-                    percent(point.within_5cm), percent(point.within_10cm),
-                    millimetres(surface.mean_m), percent(labels.total().accuracy()),
-                    percent(covered(*mesh))});
-  }
-  return align_columns(rows);
-}
-
-std::string class_table(const MeshReport& report, const LabelPalette& palette) {
-  Rows rows = {{"class", "points", "right", "wrong", "unknown"}};
-  const auto add = [&](const std::string& name, const LabelScore& score) {
-    const auto points = static_cast<double>(score.points());
-    rows.push_back({name, std::to_string(score.points()),
-                    percent(static_cast<double>(score.right) / points),
-                    percent(static_cast<double>(score.wrong) / points),
-                    percent(static_cast<double>(score.unknown) / points)});
-  };
-  for (const LabelScore& score : report.merged.seen.labels.by_class())
-    add(class_name(score.id, palette), score);
-  add("all", report.merged.seen.labels.total());
-  return align_columns(rows);
 }
 
 Json to_json(const DistanceSummary& summary) {
@@ -106,32 +58,75 @@ Json to_json(const MeshError& error, bool has_labels, const LabelPalette& palett
 }
 
 Json to_json(const Registration& registration, double moved_m) {
-  const Eigen::Vector3d t = registration.T_truth_estimate.translation();
-  const Eigen::Quaterniond q(registration.T_truth_estimate.linear());
-  return {{"translation_m", {t.x(), t.y(), t.z()}},
-          {"rotation_xyzw", {q.x(), q.y(), q.z(), q.w()}},
-          {"moved_m", moved_m},
-          {"iterations", registration.iterations},
-          {"converged", registration.converged},
-          {"free_directions", registration.free_directions},
-          {"pairs", registration.pairs},
-          {"rms_m", registration.rms_m}};
+  Json json = pose_json(registration.T_truth_estimate);
+  json.update({{"moved_m", moved_m},
+               {"iterations", registration.iterations},
+               {"converged", registration.converged},
+               {"free_directions", registration.free_directions},
+               {"pairs", registration.pairs},
+               {"rms_m", registration.rms_m}});
+  return json;
+}
+
+// The meshes of a report, and all together if they are several.
+Json meshes_of(const Json& report) {
+  Json meshes = report["robots"];
+  if (meshes.size() > 1) meshes.push_back(report["merged"]);
+  for (Json& mesh : meshes) mesh["near_truth"] = 1.0 - mesh["beyond"].get<double>();
+  return meshes;
+}
+
+// One direction of the comparison, a row per mesh. `share` is the key of the covered share.
+std::string direction_table(const Json& report, const char* direction, const char* share) {
+  constexpr ReportColumn kColumns[] = {{"estimate", "/name"},
+                                       {"points", "/point/count"},
+                                       {"mean", "/point/mean_m", 1, 1e3},
+                                       {"median", "/point/median_m", 1, 1e3},
+                                       {"p95", "/point/p95_m", 1, 1e3},
+                                       percent_column("<5cm", "/point/within_5cm"),
+                                       percent_column("<10cm", "/point/within_10cm"),
+                                       {"surface", "/surface/mean_m", 1, 1e3},
+                                       percent_column("labels", "/labels/accuracy"),
+                                       percent_column("covered", "/covered")};
+  Json rows = Json::array();
+  for (const Json& mesh : meshes_of(report)) {
+    rows.push_back(mesh[direction]);
+    rows.back().update({{"name", mesh["name"]}, {"covered", mesh[share]}});
+  }
+  return report_table(rows, kColumns);
+}
+
+std::string class_table(const Json& labels) {
+  constexpr ReportColumn kClassColumns[] = {{"class", "/name"},
+                                            {"points", "/points"},
+                                            percent_column("right", "/accuracy"),
+                                            percent_column("wrong", "/wrong_share"),
+                                            percent_column("unknown", "/unknown_share")};
+  Json rows = labels["classes"];
+  rows.push_back(labels);
+  rows.back()["name"] = "all";
+  for (Json& row : rows) {
+    const double points = row["points"];
+    row["wrong_share"] = row["wrong"].get<double>() / points;
+    row["unknown_share"] = row["unknown"].get<double>() / points;
+  }
+  return report_table(rows, kClassColumns);
 }
 
 }  // namespace
 
 std::string to_table(const MeshReport& report, const LabelPalette& palette) {
+  const Json json = to_json(report, palette);
   std::ostringstream out;
   out << "Distances in mm. Each true point to the nearest estimated one:\n"
-      << direction_table(report, &MeshError::truth, [](auto& mesh) { return mesh.coverage; })
+      << direction_table(json, "truth_to_estimate", "coverage")
       << "\nOnly true points with the estimate in front, neither past its rim nor behind it:\n"
-      << direction_table(report, &MeshError::seen, [](auto& mesh) { return mesh.seen_coverage; })
+      << direction_table(json, "seen_truth_to_estimate", "seen_coverage")
       << "\nEach estimated point to the nearest true one:\n"
-      << direction_table(report, &MeshError::estimate,
-                         [](auto& mesh) { return 1.0 - mesh.beyond; });
+      << direction_table(json, "estimate_to_truth", "near_truth");
   if (report.has_labels)
     out << "\nTrue class, of points with " << report.merged.name << " in front:\n"
-        << class_table(report, palette);
+        << class_table(json["merged"]["seen_truth_to_estimate"]["labels"]);
   const SE3& T = report.registration.T_truth_estimate;
   const Eigen::Vector3d turn_deg =
       kDegrees * Eigen::AngleAxisd(T.linear()).angle() * Eigen::AngleAxisd(T.linear()).axis();
@@ -141,7 +136,7 @@ std::string to_table(const MeshReport& report, const LabelPalette& palette) {
   out << "\nEstimate moved into the truth by [" << vector(T.translation())
       << "] m, rotation vector [" << vector(turn_deg) << "] deg";
   if (report.registration.iterations > 0)
-    out << "; of this by ICP " << millimetres(report.moved_m) << " mm at most, in "
+    out << "; of this by ICP " << fixed(1e3 * report.moved_m, 1) << " mm at most, in "
         << report.registration.iterations << " iterations";
   out << '\n';
   for (const std::string& note : report.notes) out << "note: " << note << '\n';

@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "modules/core/text_table.hpp"
+#include "modules/evaluation/report.hpp"
 
 namespace km {
 namespace {
@@ -107,14 +107,15 @@ std::vector<double> mapped_surfaces_m2(const LabelledMesh& mesh,
 }
 
 std::string to_table(const ObjectScores& scores) {
-  std::vector<std::vector<std::string>> rows = {
-      {"class", "true", "found", "recall", "estimated", "right", "precision", "IoU"}};
-  for (const ObjectScore& score : scores)
-    rows.push_back({score.name, std::to_string(score.true_objects), std::to_string(score.found),
-                    fixed(score.recall(), 2), std::to_string(score.estimates),
-                    std::to_string(score.right), fixed(score.precision(), 2),
-                    fixed(score.mean_overlap, 2)});
-  return align_columns(rows);
+  constexpr ReportColumn kColumns[] = {{"class", "/class"},
+                                       {"true", "/true"},
+                                       {"found", "/found"},
+                                       {"recall", "/recall", 2},
+                                       {"estimated", "/estimated"},
+                                       {"right", "/right"},
+                                       {"precision", "/precision", 2},
+                                       {"IoU", "/mean_overlap", 2}};
+  return report_table(to_json(scores), kColumns);
 }
 
 Json to_json(const ObjectScores& scores) {

@@ -231,7 +231,7 @@ TEST_CASE("Missing relative errors are not perfect errors") {
   const TeamError none = trajectory_error(inputs);
   CHECK(none.joint.rpe_translation_m.count == 0);
   const std::string table = to_table(none);
-  CHECK(occurrences(table, "          -           -   100.0%\n") == 3);
+  CHECK(occurrences(table, "             -      -   100.0%\n") == 3);
   CHECK(occurrences(table, "\n-: no two compared poses lie a second apart") == 1);
   const auto longer = sample(0.0, 20.0, 100, curve);
   CHECK(occurrences(to_table(error_of(longer, longer)), "no two compared poses") == 0);
