@@ -78,48 +78,41 @@ struct SampledMesh {
   }
 };
 
-// The nearest surface of another mesh for each point of a mesh. All arrays are as long as the
-// points.
-struct PointMatches {
+// The nearest surface of another mesh for a point of a mesh.
+struct PointMatch {
   // Distance to the nearest sample; infinite if none is within reach.
-  std::vector<float> point_m;
-  std::vector<float> surface_m;  // See NearestSample::surface_m; infinite if none is within reach.
-  std::vector<LabelId> labels;   // Labels of the nearest face (NearestSample::face); 0 if none.
+  float point_m = std::numeric_limits<float>::infinity();
+  float surface_m = std::numeric_limits<float>::infinity();  // See NearestSample::surface_m.
+  LabelId label = 0;  // Label of the nearest face (NearestSample::face).
 
   // Whether that face is in front of the point: the mesh does not end there, and the two faces do
   // not face opposite ways. Otherwise the point may be on surface that the other mesh never saw,
   // such as the ground below a car or the back of a wall.
-  std::vector<bool> in_front;
+  bool in_front = false;
 
-  // Takes the values of `other` where its surface is nearer. A point in front of either mesh is in
-  // front. Precondition: both matches have the same points.
-  void keep_nearer(const PointMatches& other) {
-    for (std::size_t i = 0; i < point_m.size(); ++i) {
-      point_m[i] = std::min(point_m[i], other.point_m[i]);
-      in_front[i] = in_front[i] || other.in_front[i];
-      if (other.surface_m[i] >= surface_m[i]) continue;
-      surface_m[i] = other.surface_m[i];
-      labels[i] = other.labels[i];
-    }
-  }
+  [[nodiscard]] bool is_near() const { return std::isfinite(point_m); }
 };
+using PointMatches = std::vector<PointMatch>;
 
-// The true points that count for one of two states of a mesh: those that either state can show.
-struct SharedPoints {
-  std::vector<bool> near;      // within reach
-  std::vector<bool> in_front;  // see PointMatches
-  std::vector<bool> labelled;  // within the distance at which labels are judged
-
-  void add(const PointMatches& matches, double label_distance_m) {
-    near.resize(matches.point_m.size());
-    in_front.resize(matches.point_m.size());
-    labelled.resize(matches.point_m.size());
-    for (std::size_t i = 0; i < near.size(); ++i) {
-      near[i] = near[i] || std::isfinite(matches.point_m[i]);
-      in_front[i] = in_front[i] || matches.in_front[i];
-      labelled[i] = labelled[i] || static_cast<double>(matches.point_m[i]) <= label_distance_m;
-    }
+// Takes the values of `others` where their surface is nearer. A point in front of either mesh is in
+// front. Precondition: both matches have the same points.
+void keep_nearer(PointMatches& matches, const PointMatches& others) {
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    PointMatch& match = matches[i];
+    const PointMatch& other = others[i];
+    match.point_m = std::min(match.point_m, other.point_m);
+    match.in_front = match.in_front || other.in_front;
+    if (other.surface_m >= match.surface_m) continue;
+    match.surface_m = other.surface_m;
+    match.label = other.label;
   }
+}
+
+// Whether a true point counts for both of two states of a mesh: either state can show it.
+struct SharedPoint {
+  bool near = false;      // within reach
+  bool in_front = false;  // see PointMatch
+  bool labelled = false;  // within the distance at which labels are judged
 };
 
 // Uses OpenCV's threads; the result does not depend on their number. Calls `progress` with `stage`.
@@ -127,19 +120,13 @@ PointMatches match_points(const SampledMesh& from, const SampledMesh& to,
                           const NearestSurface& nearest_to, double reach_m, std::string_view stage,
                           const MeshProgress& progress) {
   const std::size_t count = from.samples.points.size();
-  PointMatches matches;
-  matches.point_m.assign(count, std::numeric_limits<float>::infinity());
-  matches.surface_m = matches.point_m;
-  matches.labels.assign(count, 0);
-  std::vector<std::uint8_t> in_front(count, 0);  // threads may write neighbouring bytes, not bits
+  PointMatches matches(count);
   const auto match = [&](std::size_t i) {
     const auto near = nearest_to.find(from.samples.points[i], reach_m);
     if (!near) return;
-    matches.point_m[i] = near->distance_m;
-    matches.surface_m[i] = near->surface_m;
-    matches.labels[i] = to.mesh.face_label(near->face);
     const Eigen::Vector3f normal = normal_of(from.mesh, from.samples.faces[i]);
-    in_front[i] = !near->past_boundary && normal.dot(normal_of(to.mesh, near->face)) > 0.0F ? 1 : 0;
+    matches[i] = {near->distance_m, near->surface_m, to.mesh.face_label(near->face),
+                  !near->past_boundary && normal.dot(normal_of(to.mesh, near->face)) > 0.0F};
   };
   for (std::size_t start = 0; start < count; start += kChunk) {
     if (progress) progress(stage, static_cast<double>(start) / static_cast<double>(count));
@@ -148,7 +135,6 @@ PointMatches match_points(const SampledMesh& from, const SampledMesh& to,
       for (int i = range.start; i < range.end; ++i) match(start + static_cast<std::size_t>(i));
     });
   }
-  matches.in_front.assign(in_front.begin(), in_front.end());
   return matches;
 }
 
@@ -357,7 +343,7 @@ class Evaluation {
         if (robot == 0)
           merged[state] = matches.back();
         else
-          merged[state].keep_nearer(matches.back());
+          keep_nearer(merged[state], matches.back());
       }
       judge_truth(matches, [&](MeshReport& report) -> MeshError& { return report.robots[robot]; });
     }
@@ -365,40 +351,56 @@ class Evaluation {
       judge_truth(merged, [](MeshReport& report) -> MeshError& { return report.merged; });
   }
 
-  // `matches`: of one mesh, by state.
-  void judge_truth(const std::vector<PointMatches>& matches, const auto& error_of) {
-    SharedPoints points;
-    for (const PointMatches& state : matches) points.add(state, options_.label_distance_m);
-    const auto total = static_cast<double>(true_samples_.total);
-    const auto share = [&](auto count) { return static_cast<double>(count) / total; };
-    for (std::size_t state = 0; state < matches.size(); ++state) {
+  // `states`: matches of one mesh, by state.
+  void judge_truth(const std::vector<PointMatches>& states, const auto& error_of) {
+    std::vector<SharedPoint> shared(true_samples_.points.size());
+    for (const PointMatches& matches : states)
+      for (std::size_t i = 0; i < shared.size(); ++i) {
+        shared[i].near |= matches[i].is_near();
+        shared[i].in_front |= matches[i].in_front;
+        shared[i].labelled |= has_label(matches[i]);
+      }
+    const auto share = [&](auto count) {
+      return static_cast<double>(count) / static_cast<double>(true_samples_.total);
+    };
+    for (std::size_t state = 0; state < states.size(); ++state) {
+      const PointMatches& matches = states[state];
       MeshError& error = error_of(reports_[state]);
-      error.truth = judged(matches[state], points, points.near);
-      error.seen = judged(matches[state], points, points.in_front);
-      error.coverage = share(std::ranges::count_if(
-          matches[state].point_m, [](float distance_m) { return std::isfinite(distance_m); }));
-      error.seen_coverage = share(std::ranges::count(matches[state].in_front, true));
+      error.truth = judged(matches, shared, &SharedPoint::near);
+      error.seen = judged(matches, shared, &SharedPoint::in_front);
+      error.coverage = share(std::ranges::count_if(matches, &PointMatch::is_near));
+      error.seen_coverage = share(std::ranges::count_if(matches, &PointMatch::in_front));
     }
   }
 
-  // Comparison from the true points that `counts` has.
-  [[nodiscard]] SurfaceComparison judged(const PointMatches& matches, const SharedPoints& points,
-                                         const std::vector<bool>& counts) const {
+  // Whether the label of a match is judged.
+  [[nodiscard]] bool has_label(const PointMatch& match) const {
+    return static_cast<double>(match.point_m) <= options_.label_distance_m;
+  }
+
+  // Distances of the points for which counts(i) is true.
+  [[nodiscard]] SurfaceComparison distances(const PointMatches& matches, const auto& counts) const {
     const auto limit = static_cast<float>(options_.crop_m);
     std::vector<float> point_m;
     std::vector<float> surface_m;
-    SurfaceComparison result;
-    for (std::size_t i = 0; i < counts.size(); ++i) {
-      if (!counts[i]) continue;
-      point_m.push_back(std::min(matches.point_m[i], limit));
-      surface_m.push_back(std::min(matches.surface_m[i], limit));
-      if (!report_.has_labels || !points.labelled[i]) continue;
-      const bool is_near = static_cast<double>(matches.point_m[i]) <= options_.label_distance_m;
-      result.labels.add(SampledMesh{truth_, true_samples_}.label(i),
-                        is_near ? matches.labels[i] : LabelId{0});
+    for (std::size_t i = 0; i < matches.size(); ++i) {
+      if (!counts(i)) continue;
+      point_m.push_back(std::min(matches[i].point_m, limit));
+      surface_m.push_back(std::min(matches[i].surface_m, limit));
     }
-    result.point = summary_of(std::move(point_m));
-    result.surface = summary_of(std::move(surface_m));
+    return {summary_of(std::move(point_m)), summary_of(std::move(surface_m)), {}};
+  }
+
+  // Comparison from the true points for which the member `counts` is true.
+  [[nodiscard]] SurfaceComparison judged(const PointMatches& matches,
+                                         const std::vector<SharedPoint>& shared,
+                                         bool SharedPoint::*counts) const {
+    SurfaceComparison result = distances(matches, [&](std::size_t i) { return shared[i].*counts; });
+    if (!report_.has_labels) return result;
+    for (std::size_t i = 0; i < matches.size(); ++i)
+      if (shared[i].*counts && shared[i].labelled)
+        result.labels.add(SampledMesh{truth_, true_samples_}.label(i),
+                          has_label(matches[i]) ? matches[i].label : LabelId{0});
     return result;
   }
 
@@ -410,8 +412,7 @@ class Evaluation {
 
   void compare_estimates(const NearestSurface& nearest, std::size_t state) {
     MeshReport& report = reports_[state];
-    std::vector<float> all_point_m;
-    std::vector<float> all_surface_m;
+    PointMatches all;
     for (std::size_t robot = 0; robot < robots_; ++robot) {
       const std::size_t i = state * robots_ + robot;
       const SampledMesh estimate{moved_[i], estimates_[i]};
@@ -419,40 +420,23 @@ class Evaluation {
           match_points(estimate, {truth_, true_samples_}, nearest, options_.crop_m,
                        inputs_[i].name + " to the truth", progress_);
       MeshError& error = report.robots[robot];
-      error.estimate.labels = labels_of(estimate, matches);
+      for (std::size_t k = 0; report_.has_labels && k < matches.size(); ++k)
+        if (has_label(matches[k])) error.estimate.labels.add(matches[k].label, estimate.label(k));
       report.merged.estimate.labels.add(error.estimate.labels);
-      const std::size_t start = all_point_m.size();
-      append_clamped(matches.point_m, all_point_m);
-      append_clamped(matches.surface_m, all_surface_m);
-      judge_estimate(std::span(all_point_m).subspan(start), std::span(all_surface_m).subspan(start),
-                     error);
+      judge_estimate(matches, error);
+      all.insert(all.end(), matches.begin(), matches.end());
     }
-    if (robots_ > 1) judge_estimate(all_point_m, all_surface_m, report.merged);
+    if (robots_ > 1) judge_estimate(all, report.merged);
   }
 
-  void append_clamped(const std::vector<float>& distances_m, std::vector<float>& all_m) const {
+  void judge_estimate(const PointMatches& matches, MeshError& error) const {
+    SurfaceComparison found = distances(matches, [](std::size_t) { return true; });
+    found.labels = error.estimate.labels;
+    error.estimate = std::move(found);
     const auto limit = static_cast<float>(options_.crop_m);
-    for (const float distance_m : distances_m) all_m.push_back(std::min(distance_m, limit));
-  }
-
-  [[nodiscard]] LabelConfusion labels_of(const SampledMesh& estimate,
-                                         const PointMatches& matches) const {
-    LabelConfusion labels;
-    if (!report_.has_labels) return labels;
-    for (std::size_t i = 0; i < matches.point_m.size(); ++i)
-      if (static_cast<double>(matches.point_m[i]) <= options_.label_distance_m)
-        labels.add(matches.labels[i], estimate.label(i));
-    return labels;
-  }
-
-  void judge_estimate(std::span<const float> point_m, std::span<const float> surface_m,
-                      MeshError& error) const {
-    const auto limit = static_cast<float>(options_.crop_m);
-    const auto beyond = std::count_if(point_m.begin(), point_m.end(),
-                                      [&](float distance_m) { return distance_m >= limit; });
-    error.beyond = static_cast<double>(beyond) / static_cast<double>(point_m.size());
-    error.estimate.point = summary_of({point_m.begin(), point_m.end()});
-    error.estimate.surface = summary_of({surface_m.begin(), surface_m.end()});
+    const auto beyond = std::ranges::count_if(
+        matches, [&](const PointMatch& match) { return match.point_m >= limit; });
+    error.beyond = ratio(static_cast<std::size_t>(beyond), matches.size());
   }
 
   const LabelledMesh& truth_;
