@@ -152,22 +152,27 @@ class FloorSearch {
       for (int x = 0; x < grid_.width; ++x)
         if (const auto height = tiles.height_at(x, y, max_step_m))
           set(grid_.index(x, y),
-              lowest_surface(columns_, grid_.index(x, y), SurfaceKind::kLevel,
+              lowest_surface(columns_, grid_.index(x, y), SurfaceKind::kTop,
                              [&](float found) { return std::abs(found - *height) <= kBin_m; }));
   }
 
-  void grow() {
-    const double climb_m = grid_.resolution_m + SurfaceColumns::kStep_m;
+  // Over surface of at least `kind`.
+  void grow(SurfaceKind kind) {
     while (!queue_.empty()) {
       const std::uint32_t cell = queue_.front();
       queue_.pop_front();
       const float from = floor_.height_m[cell];
       for_around(grid_, cell, [&](std::uint32_t next) {
-        if (!floor_.is_seen[next])
-          set(next, lowest_surface(columns_, next, SurfaceKind::kLevel,
-                                   [&](float found) { return std::abs(found - from) <= climb_m; }));
+        if (!floor_.is_seen[next]) set(next, level_with(next, kind, from));
       });
     }
+  }
+
+  // Precondition: extend() was called.
+  void add_tops() {
+    for (std::uint32_t cell = 0; cell < grid_.size(); ++cell)
+      if (!floor_.is_seen[cell] && level_with(cell, SurfaceKind::kTop, floor_.height_m[cell]))
+        floor_.is_seen[cell] = true;
   }
 
   // Breadth first from all seen cells, so that each cell gets the height of a nearest one.
@@ -192,6 +197,14 @@ class FloorSearch {
   FloorHeights take() { return std::move(floor_); }
 
  private:
+  // Height of surface in a cell that continues floor at another height; none if that is NaN.
+  [[nodiscard]] std::optional<float> level_with(std::uint32_t cell, SurfaceKind kind,
+                                                float height_m) const {
+    const double climb_m = grid_.resolution_m + SurfaceColumns::kStep_m;
+    return lowest_surface(columns_, cell, kind,
+                          [&](float found) { return std::abs(found - height_m) <= climb_m; });
+  }
+
   void set(std::uint32_t cell, std::optional<float> height) {
     if (!height) return;
     floor_.height_m[cell] = *height;
@@ -209,12 +222,14 @@ class FloorSearch {
 
 FloorHeights find_floor(const SurfaceColumns& columns, double max_step_m) {
   FloorSearch search(columns);
-  if (columns.area_m2(SurfaceKind::kFloor) > kFloor_m2)
+  const bool is_labelled = columns.area_m2(SurfaceKind::kFloor) > kFloor_m2;
+  if (is_labelled)
     search.seed_by_labels();
   else
     search.seed_by_height(max_step_m);
-  search.grow();
+  search.grow(is_labelled ? SurfaceKind::kLevel : SurfaceKind::kTop);
   search.extend();
+  if (is_labelled) search.add_tops();
   return search.take();
 }
 

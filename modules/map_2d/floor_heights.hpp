@@ -30,7 +30,9 @@ struct FloorHeights {
 /// a tile beside it.
 ///
 /// Growth: level surface that continues the floor of the next cell, with a slope up to 45 degrees,
-/// is floor. So ramps without labels are floor too, up to the slope of SurfaceKind::kLevel.
+/// is floor. So ramps without labels are floor too, up to the slope of SurfaceKind::kLevel. If the
+/// mesh has labels of floor, surface with other labels is floor only at the height of the nearest
+/// floor, as a carpet is. Otherwise a wrong slope of the mesh beside a box makes its top floor.
 ///
 /// A grid has one floor. If storeys lie above each other, the lowest one counts.
 [[nodiscard]] FloorHeights find_floor(const SurfaceColumns& columns, double max_step_m);

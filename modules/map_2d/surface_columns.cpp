@@ -59,9 +59,11 @@ class Sampler {
     const Eigen::Vector3d normal = ab.cross(ac);
     const double area_m2 = normal.norm() / 2;
     if (!(area_m2 > 0.0) || !std::isfinite(area_m2)) return;
-    const SurfaceKind kind = is_floor_[mesh_.face_label(face)]       ? SurfaceKind::kFloor
-                             : normal.z() >= kLeast_up * 2 * area_m2 ? SurfaceKind::kLevel
-                                                                     : SurfaceKind::kOther;
+    const LabelId label = mesh_.face_label(face);
+    const SurfaceKind kind = is_floor_[label]                       ? SurfaceKind::kFloor
+                             : normal.z() < kLeast_up * 2 * area_m2 ? SurfaceKind::kOther
+                             : label == 0                           ? SurfaceKind::kLevel
+                                                                    : SurfaceKind::kTop;
     const double longest_m =
         std::sqrt(std::max({ab.squaredNorm(), ac.squaredNorm(), (ac - ab).squaredNorm()}));
     const int n = static_cast<int>(std::min(std::ceil(longest_m / grid_.resolution_m), 1000.0));

@@ -41,7 +41,8 @@ struct CellGrid {
 /// Kind of surface.
 enum class SurfaceKind : std::uint8_t {
   kOther,  ///< Walls, undersides, slopes above 35 degrees.
-  kLevel,  ///< Seen from above, slope at most 35 degrees.
+  kTop,    ///< Seen from above, slope at most 35 degrees, with a label that is not of floor.
+  kLevel,  ///< The same without a label.
   kFloor,  ///< Labelled as floor, of any slope.
 };
 
@@ -82,7 +83,7 @@ class SurfaceColumns {
   CellGrid grid_;
   std::vector<SurfaceLayer> layers_;
   std::vector<std::uint32_t> first_;
-  std::array<double, 3> areas_ = {};
+  std::array<double, 4> areas_ = {};
 };
 
 }  // namespace km

@@ -96,6 +96,16 @@ TEST_CASE("Ramps and stairs that are labelled as floor are free") {
   CHECK(found.contains(kFree) == labelled);
 }
 
+TEST_CASE("A labelled box with a slope to the floor is an obstacle, and a labelled carpet is not") {
+  Surfaces surfaces;
+  surfaces.level(0, 0, 2.5F, 4, 0, kFloorLabel).level(3.5F, 0, 6, 4, 0, kFloorLabel);
+  const bool is_carpet = GENERATE(true, false);
+  const float top = is_carpet ? 0.02F : 0.26F;
+  surfaces.add({2.5F, 1, 0}, {0.5F, 0, top}, {0, 1, 0}, kWallLabel);
+  surfaces.level(3, 1, 3.5F, 2, top, kWallLabel);
+  CHECK(values(map_of(surfaces), 3.05, 1.05, 3.45, 1.95) == Values{is_carpet ? kFree : kOccupied});
+}
+
 TEST_CASE("Two floors are free, and the step between them is not") {
   Surfaces surfaces;
   surfaces.level(0, 0, 5, 4, 0, kFloorLabel).level(5, 0, 10, 4, 0.6F, kFloorLabel);
