@@ -8,6 +8,7 @@ namespace km {
 namespace {
 
 constexpr int kMaxDoublings = 3;
+constexpr int kMaxDoublingsIfAbsent = 7;
 
 }  // namespace
 
@@ -28,6 +29,14 @@ void KeyframeRequests::ask(Request& request, double now_s) const {
   ++request.attempts;
 }
 
+// The first waiting keyframe that the owner did not have.
+std::optional<std::uint32_t> KeyframeRequests::first_absent(const Peer& peer) {
+  std::optional<std::uint32_t> first;
+  for (const std::uint32_t index : peer.waiting)
+    if (peer.requests.at(index).absences > 0 && index <= first.value_or(index)) first = index;
+  return first;
+}
+
 std::vector<KeyframeId> KeyframeRequests::due(double now_s) {
   std::vector<KeyframeId> now_due;
   for (auto& [robot, peer] : peers_) {
@@ -36,10 +45,11 @@ std::vector<KeyframeId> KeyframeRequests::due(double now_s) {
       ask(request, now_s);
       now_due.push_back({robot, index});
     }
+    const std::optional<std::uint32_t> first = first_absent(peer);
     for (auto index = peer.waiting.begin();
          index != peer.waiting.end() && peer.outstanding < max_outstanding_;) {
       Request& request = peer.requests.at(*index);
-      if (request.next_s > now_s) {
+      if (request.next_s > now_s && !(*index == first && request.absent_s + timeout_s_ <= now_s)) {
         ++index;
         continue;
       }
@@ -74,7 +84,8 @@ void KeyframeRequests::absent(const KeyframeId& keyframe, double now_s) {
   if (found == peer->second.requests.end() || !found->second.asked) return;
   Request& request = found->second;
   request.asked = false;
-  request.next_s = now_s + timeout_s_;
+  request.absent_s = now_s;
+  request.next_s = now_s + timeout_s_ * (1 << std::min(request.absences++, kMaxDoublingsIfAbsent));
   request.attempts = 1;  // the peer replies, so the time-out need not grow
   --peer->second.outstanding;
   peer->second.waiting.push_back(keyframe.index);

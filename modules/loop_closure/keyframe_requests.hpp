@@ -6,6 +6,7 @@
 #include <list>
 #include <map>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -56,8 +57,10 @@ struct KeyframeWords {
 /// Schedules the requests for keyframes of peers. Every wanted keyframe is requested until it
 /// arrives, a few at a time per peer. Requests are repeated after a time-out. Each time without a
 /// reply the time-out doubles, up to eightfold, so that an absent peer costs little. If the owner
-/// does not have the keyframe (yet), it is requested again later, after other keyframes. Time is
-/// an argument and must not decrease. Not thread-safe.
+/// does not have the keyframe (yet), it is requested again later, after other keyframes. Keyframes
+/// come into being in order: the first of those that do not exist yet is requested again after each
+/// time-out, and the others ever less often. Time is an argument and must not decrease. Not
+/// thread-safe.
 class KeyframeRequests {
  public:
   /// Throws std::invalid_argument unless both are positive.
@@ -87,9 +90,11 @@ class KeyframeRequests {
 
  private:
   struct Request {
-    bool asked = false;   // sent, and not answered
-    int attempts = 0;     // requests without an answer so far
-    double next_s = 0.0;  // time before which no (further) request is sent
+    bool asked = false;     // sent, and not answered
+    int attempts = 0;       // requests without an answer so far
+    int absences = 0;       // replies that the owner does not have it
+    double absent_s = 0.0;  // time of the last of them
+    double next_s = 0.0;    // time before which no (further) request is sent
   };
   struct Peer {
     std::map<std::uint32_t, Request> requests;
@@ -97,6 +102,7 @@ class KeyframeRequests {
     int outstanding = 0;
   };
 
+  [[nodiscard]] static std::optional<std::uint32_t> first_absent(const Peer& peer);
   void ask(Request& request, double now_s) const;
 
   double timeout_s_;

@@ -1,4 +1,7 @@
 #include "modules/loop_closure/keyframe_requests.hpp"
+
+#include <map>
+
 #include "test/support/test.hpp"
 
 namespace km {
@@ -49,6 +52,23 @@ TEST_CASE("a keyframe that does not exist yet makes room and is tried later") {
   CHECK(requests.arrived({7, 1}));
   CHECK(requests.due(2.0).empty());
   CHECK(requests.due(2.1) == Ids{{7, 9}});
+}
+
+TEST_CASE("the first keyframe that does not exist yet is asked for most often") {
+  KeyframeRequests requests(1.0, 2);
+  for (const std::uint32_t index : {5U, 3U, 4U}) requests.want({7, index});
+  std::map<std::uint32_t, int> asked;
+  for (int tick = 0; tick < 640; ++tick)
+    for (const KeyframeId& id : requests.due(0.1 * tick)) {
+      ++asked[id.index];
+      requests.absent(id, 0.1 * tick);
+    }
+  CHECK(asked[3] == 64);
+  CHECK(asked[4] == 7);  // at 0, 1, 3, 7, 15, 31, 63 s
+  CHECK(asked[5] == 7);
+  // Once the first exists, the next one is due.
+  CHECK(requests.arrived({7, 3}));
+  CHECK(requests.due(65.0) == Ids{{7, 4}});
 }
 
 TEST_CASE("a late reply counts and a reply without a request does not") {
