@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <iostream>
 #include <limits>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -133,6 +134,17 @@ struct Count {
   }
 };
 
+// Which robots share a frame; empty if all do.
+std::string frames_text(const std::vector<RobotId>& world_of) {
+  std::map<RobotId, std::string> frames;
+  for (std::size_t robot = 0; robot < world_of.size(); ++robot)
+    frames[world_of[robot]] += ' ' + std::to_string(robot);
+  if (frames.size() < 2) return {};
+  std::string text;
+  for (const auto& [world, robots] : frames) text += (text.empty() ? "robots" : " |") + robots;
+  return text + " have different frames: no accepted closure ties them without a contradiction\n";
+}
+
 std::string decision_text(const TeamGraph& graph, const Solution& solution) {
   const Decision& decision = *solution.run.decision;
   const std::vector<bool> odometry = odometry_edges(graph);
@@ -156,7 +168,8 @@ std::string decision_text(const TeamGraph& graph, const Solution& solution) {
        << " sent, by one robot at most " << bytes_text(static_cast<double>(decision.most_sent))
        << " and to one " << bytes_text(static_cast<double>(decision.most_received))
        << ", critical path " << fixed(work.critical_path_s, 3) << " s, CPU "
-       << fixed(work.total_cpu_s, 3) << " s\n";
+       << fixed(work.total_cpu_s, 3) << " s\n"
+       << frames_text(decision.world_of);
   if (!decision.decided) text << "not decided: --rounds did not suffice\n";
   return text.str();
 }

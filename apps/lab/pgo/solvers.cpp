@@ -164,6 +164,7 @@ SolverRun run_agents(const TeamGraph& graph, const SolverOptions& options, const
                 .gradient_norm = robots.last.gradient,
                 .work = {.bytes = robots.bytes, .critical_path_s = robots.critical_path_s}};
   Decision decision{.kept = std::move(robots.kept),
+                    .world_of = std::move(robots.world_of),
                     .noise_scale = robots.last.noise_scale,
                     .threshold = robots.last.barc,
                     .decided = robots.settled && end.round < options.max_rounds};

@@ -34,7 +34,9 @@ inline const std::vector<std::string> kMethods = {"local", "rbcd", "centralized"
 
 /// The edges that a method has kept, and the estimates behind this decision.
 struct Decision {
-  std::vector<bool> kept;     ///< By edge of the graph.
+  std::vector<bool> kept;  ///< By edge of the graph.
+  /// By robot: the robot whose odometry frame is its world. Robots that are not joined differ.
+  std::vector<RobotId> world_of = {};
   double noise_scale = 1.0;   ///< Noise of closures, as a multiple of the graph's.
   double threshold = 0.0;     ///< Largest residual of an inlier [sigma of the graph].
   std::size_t most_sent = 0;  ///< Most bytes that one robot sent; below: received.

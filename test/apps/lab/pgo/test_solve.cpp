@@ -61,6 +61,20 @@ TEST_CASE("Every method runs from the command line and prints its result") {
     CHECK_THAT(written, Contains(std::string("\"") + key + "\":"));
 }
 
+TEST_CASE("Robots that are not joined are named") {
+  const TemporaryFolder folder;
+  const std::string joined = square_g2o();
+  const std::string apart = joined.substr(0, joined.find("EDGE_SE2 1 5")) +
+                            "EDGE_SE2 3 7 300 0 2 4 0 0 4 0 9\n";  // contradicts 0 4
+  const std::string named = "robots 0 | 1 have different frames";
+  const auto solve = [&](const std::string& text) {
+    const auto graph = folder.write("graph.g2o", text);
+    return succeeded(run_command(kSolveTool + graph.string() + " --robots 2")).output;
+  };
+  CHECK_THAT(solve(apart), Contains(named));
+  CHECK_THAT(solve(joined), !Contains(named));
+}
+
 TEST_CASE("Poses are written as TUM and g2o") {
   const TemporaryFolder folder;
   const auto graph = folder.write("square.g2o", square_g2o());
