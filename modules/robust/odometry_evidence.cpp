@@ -25,6 +25,9 @@ constexpr std::size_t kPlacesBeside = 8;   // places before and after, among whi
 constexpr std::size_t kMostPlaces = 60;    // bounds the time
 constexpr std::size_t kEnoughPlaces = 3;
 constexpr std::size_t kClosureLevels = 4;
+// Log of odds. A precise robot that seems noisy loses little, and a noisy one that seems precise
+// loses true closures.
+constexpr double kTenToOne = 2.3;
 
 double log_prior(double level) {
   const double away = level * std::numbers::ln2 / kNoiseFactorWidth;
@@ -201,26 +204,26 @@ Levels best_levels(std::span<const PairVote> votes, const std::set<RobotId>& hon
   return levels;
 }
 
-// True if a robot has evidence in several pairs, and without the strongest one of them no pair
-// shows its noise: one wrong peer must not weaken it. Pairs may differ by one level.
+// True if a robot has evidence in several pairs, and all but the strongest one of them refute its
+// noise: one wrong peer must not weaken it. Pairs may differ by one level.
 bool rests_on_one_pair(std::span<const PairVote> votes, const Levels& levels, RobotId robot) {
-  const auto shown_by_others = [&](std::size_t level) {
+  const auto others_allow = [&](std::size_t level) {
     std::vector<double> gains;
     for (const PairVote& v : votes)
       if (v.a == robot || v.b == robot)
         gains.push_back(evidence_at(v, with(levels, robot, level)) -
                         evidence_at(v, with(levels, robot, 0)));
     std::ranges::sort(gains);
-    return gains.size() < 2 || std::reduce(gains.begin(), gains.end() - 1) > 0.0;
+    return gains.size() < 2 || std::reduce(gains.begin(), gains.end() - 1) > -kTenToOne;
   };
   const std::size_t level = levels.at(robot);
-  return !shown_by_others(level) && !(level > 1 && shown_by_others(level - 1));
+  return !others_allow(level) && !(level > 1 && others_allow(level - 1));
 }
 
-// The robot whose noise is the least likely one, if the odds are below 1000 to 1.
+// The robot whose noise is the least likely one, if the odds are below 10 to 1.
 std::optional<RobotId> least_likely(std::span<const PairVote> votes,
                                     const std::set<RobotId>& honest, const Levels& levels) {
-  double least = kThousandToOne;
+  double least = kTenToOne;
   std::optional<RobotId> doubtful;
   const double most = log_posterior_of(votes, levels);
   for (const auto& [robot, level] : levels) {

@@ -36,10 +36,10 @@ inline constexpr std::size_t kNoiseLevels = 6;
 
 /// The robots whose odometry is noisier than it claims, with the factor on its standard deviations.
 /// The factors maximise the sum of the evidence of all pairs and the log prior of each robot (the
-/// same Cauchy distribution). A robot is left out unless the odds are 1000 to 1, with the best
+/// same Cauchy distribution). A robot is left out unless the odds are 10 to 1, with the best
 /// factors of the other robots in either case. It is also left out if it has evidence in several
-/// pairs, and only one of them shows its noise, to a factor of 2. If more than half of the robots
-/// seem noisy, the closures may be the reason, and the result is empty.
+/// pairs, and all but one of them refute its noise, also half of it, with these odds. If more than
+/// half of the robots seem noisy, the closures may be the reason, and the result is empty.
 [[nodiscard]] std::map<RobotId, double> likely_odometry_noise(std::span<const PairVote> pairs);
 
 }  // namespace km
