@@ -41,7 +41,7 @@ int run_subcommands(const std::string& program, const std::string& about,
 /// Adds a subcommand to `app`. Its options are those that `define(CLI::App&)` of a Command adds,
 /// and `run()` runs it as soon as the command line names it.
 template <typename Command>
-void add_command(CLI::App& app, const char* name, const char* about) {
+void add_command(CLI::App& app, const char* name, const std::string& about) {
   CLI::App& subcommand = *app.add_subcommand(name, about);
   const auto command = std::make_shared<Command>();
   command->define(subcommand);

@@ -181,6 +181,12 @@ Alignment align(std::span<const PosePair> pairs, bool with_scale) {
   return alignment;
 }
 
+std::vector<double> aligned_errors_m(std::span<const PosePair> pairs) {
+  Errors errors;
+  add_absolute_errors(pairs, align(pairs, false), errors);
+  return errors.position_m;
+}
+
 TeamError trajectory_error(std::span<const TrajectoryInput> inputs) {
   if (inputs.empty()) throw std::invalid_argument("trajectory_error: no estimate");
   std::vector<std::vector<PosePair>> pairs;

@@ -49,6 +49,9 @@ struct Alignment {
 /// std::invalid_argument if `with_scale` and either side does not move.
 [[nodiscard]] Alignment align(std::span<const PosePair> pairs, bool with_scale);
 
+/// Distances between the positions of pairs after align() without scale [m].
+[[nodiscard]] std::vector<double> aligned_errors_m(std::span<const PosePair> pairs);
+
 /// One estimate with its truth; both ascending and outliving the call.
 struct TrajectoryInput {
   std::string name;

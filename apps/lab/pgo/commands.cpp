@@ -16,13 +16,14 @@ void GraphInput::define(CLI::App& app) {
          "results")
       ->required();
   app.add_option("--robots", robots, "Number of robots among which a single file is divided")
-      ->check(CLI::Range(1, 65535));
+      ->check(CLI::Range(1, 65535))
+      ->each([this](const std::string&) { robots_given = true; });
   app.add_flag("--keep-steps", keep_steps,
                "Keep the odometry between two robots that a cut leaves. The default is without:\n"
                "closures alone join robots in the field");
 }
 
-LabelledTeamGraph GraphInput::read(const CLI::App& app) const {
+LabelledTeamGraph GraphInput::read() const {
   const bool folder = is_folder(file);
   const bool of_a_team = folder || file.extension() == ".jrl";
   LabelledTeamGraph team =
@@ -30,7 +31,7 @@ LabelledTeamGraph GraphInput::read(const CLI::App& app) const {
       : of_a_team
           ? labelled_team(read_jrl(file), file.string())
           : LabelledTeamGraph{partition_contiguously(read_g2o(file), robots, file.string())};
-  if (app.count("--robots") > 0 && team.graph.robots() != robots)
+  if (robots_given && team.graph.robots() != robots)
     throw std::runtime_error("--robots " + std::to_string(robots) + ": there are " +
                              std::to_string(team.graph.robots()) + " robots in the file or folder");
   if (keep_steps || of_a_team) return team;

@@ -21,6 +21,7 @@ struct GraphInput {
   std::filesystem::path file = {};
   std::size_t robots = 1;
   bool keep_steps = false;
+  bool robots_given = false;  ///< Whether --robots was given.
 
   /// Defines FILE, --robots and --keep-steps, which set the members. This object must
   /// outlive `app`.
@@ -28,9 +29,9 @@ struct GraphInput {
 
   /// Reads the graph with the ground truth of the file, and without odometry between robots unless
   /// keep_steps. Throws std::runtime_error if there is no such graph, or if it is not connected
-  /// after a g2o graph is divided. Throws it too if --robots was given to `app` and differs from
-  /// the number of robots.
-  [[nodiscard]] LabelledTeamGraph read(const CLI::App& app) const;
+  /// after a g2o graph is divided. Throws it too if --robots was given and differs from the number
+  /// of robots.
+  [[nodiscard]] LabelledTeamGraph read() const;
 };
 
 /// Notice on edges whose information matrix is not positive definite. Such edges are weighed only

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <stdexcept>
 #include <utility>
@@ -9,6 +10,7 @@
 #include "apps/lab/pgo/agent_team.hpp"
 #include "apps/lab/pgo/solvers.hpp"
 #include "apps/lab/pgo/team_graph.hpp"
+#include "apps/lab/pgo/truth_score.hpp"
 #include "modules/evaluation/trajectory_error.hpp"
 #include "modules/outlier_rejection/pcm.hpp"
 #include "modules/robust/lone_solution.hpp"
@@ -108,34 +110,20 @@ PlacedTeam solve_centrally(const TeamGraph& graph, std::vector<bool> kept, std::
 
 OutlierResult judge(const ScenarioGraph& drawn, const PlacedTeam& placed) {
   OutlierResult result{.rounds = placed.rounds, .bytes = placed.bytes, .decided = placed.decided};
-  const TeamGraph& graph = drawn.graph;
-  const std::vector<bool> odometry = odometry_edges(graph);
-  for (std::size_t k = 0; k < odometry.size(); ++k) {
-    if (odometry[k]) continue;
-    if (drawn.is_false[k]) {
-      ++result.false_closures;
-      if (placed.kept[k]) ++result.false_kept;
-      continue;
-    }
-    const bool between = graph.robot_of(graph.edges[k].i) != graph.robot_of(graph.edges[k].j);
-    ++result.true_closures;
-    if (between) ++result.between;
-    if (placed.kept[k]) continue;
-    ++result.true_lost;
-    if (between) ++result.between_lost;
-  }
+  const auto [inside, between] = count_closures(drawn.graph, drawn.is_false, placed.kept);
+  result.true_closures = inside.all_true() + between.all_true();
+  result.true_lost = inside.true_lost + between.true_lost;
+  result.between = between.all_true();
+  result.between_lost = between.true_lost;
+  result.false_kept = inside.false_kept + between.false_kept;
+  result.false_closures = result.false_kept + inside.false_rejected + between.false_rejected;
   std::map<Index, std::vector<PosePair>> frames;
   for (std::size_t i = 0; i < drawn.truth.size(); ++i)
     frames[placed.frame_of[i]].push_back(
         {static_cast<Stamp>(i), drawn.truth[i], placed.T_frame_kf[i]});
   std::vector<double> errors;
-  for (const auto& [frame, pairs] : frames) {
-    const Alignment alignment = align(pairs, false);
-    for (const PosePair& pair : pairs)
-      errors.push_back(
-          (pair.T_truth_body.translation() - alignment.apply(pair.T_estimate_body).translation())
-              .norm());
-  }
+  for (const auto& [frame, pairs] : frames)
+    std::ranges::copy(aligned_errors_m(pairs), std::back_inserter(errors));
   const Statistics statistics = statistics_of(std::move(errors));
   result.frames = frames.size();
   result.rms_m = statistics.rmse;

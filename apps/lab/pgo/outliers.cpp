@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <iostream>
-#include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
@@ -100,9 +99,8 @@ std::string outlier_text(const OutlierStudy& study) {
   return text.str();
 }
 
-// Every run. "ratio" is the RMS error divided by that of the reference with the same share and
-// seed; null without a reference.
-void write_outlier_json(std::ostream& out, const OutlierStudy& study) {
+// Every run. "ratio" is null without a reference.
+Json to_json(const OutlierStudy& study) {
   Json results = Json::array();
   for (const OutlierResult& r : study.results) {
     const auto ratio = ratio_of(study, r);
@@ -124,15 +122,17 @@ void write_outlier_json(std::ostream& out, const OutlierStudy& study) {
                        {"decided", r.decided},
                        {"cpu_s", r.cpu_s}});
   }
-  out << json_text({{"scenario", study.scenario},
-                    {"poses", study.poses},
-                    {"robots", study.robots},
-                    {"certified", study.certified},
-                    {"results", std::move(results)}});
+  return {{"scenario", study.scenario},
+          {"poses", study.poses},
+          {"robots", study.robots},
+          {"certified", study.certified},
+          {"results", std::move(results)}};
 }
 
 std::string details() {
-  return R"(How far are the poses of a team of robots from those without any false closure?
+  return R"(Adds false closures, or noise that is not as claimed, and compares what keeps them out
+
+How far are the poses of a team of robots from those without any false closure?
 
 FILE is as in kimera_multi_pgo solve, but its verticals are left out. A share of 30 adds 30
 false closures for every 100 true ones. They join uniformly drawn pairs of poses, with
@@ -163,33 +163,6 @@ Examples:
   kimera_multi_pgo outliers sphere2500.g2o --scenario noisy-odometry --seeds 1,2,3)";
 }
 
-struct OutliersCommand {
-  GraphInput input{.robots = 5};
-  OutlierStudyOptions study{.methods = {"pcm", "robots"}};
-  std::string scenario = {};
-  std::filesystem::path json = {};
-};
-
-void define(CLI::App& app, OutliersCommand& command) {
-  std::vector<std::string> names;
-  for (const Scenario& scenario : scenarios()) names.push_back(scenario.name);
-  OutlierStudyOptions& study = command.study;
-  app.add_option("--scenario", command.scenario, "See below; with the scenario's own robots")
-      ->check(CLI::IsMember(names).description(""));
-  app.add_option("--shares", study.shares_percent,
-                 "False closures for every 100 true ones [%]. The default is 10,20,...,80; in a\n"
-                 "scenario its own share")
-      ->check(CLI::Range(0.0, 10000.0))
-      ->delimiter(',');
-  app.add_option("--methods", study.methods,
-                 "See below. In a scenario the default is robots,trust-all,pcm,reference")
-      ->check(CLI::IsMember(kRejections).description(""))
-      ->delimiter(',');
-  app.add_option("--seeds", study.seeds,
-                 "Seeds of the false closures, one run each. In a scenario the default is 1 to 10")
-      ->delimiter(',');
-}
-
 // The graph without the closures that the file labels as false.
 TeamGraph true_graph(const LabelledTeamGraph& input, const std::string& file) {
   if (input.truth.is_false.empty()) return input.graph;
@@ -200,54 +173,83 @@ TeamGraph true_graph(const LabelledTeamGraph& input, const std::string& file) {
   return std::move(parts.front().graph);
 }
 
-void set_scenario(CLI::App& app, const OutliersCommand& command, OutlierStudyOptions& study) {
-  Scenario& scenario = study.scenario.emplace(scenario_of(command.scenario));
-  if (is_folder(command.input.file))
-    scenario.robots = 0;
-  else if (app.count("--robots") > 0)
-    scenario.robots = command.input.robots;
-  scenario.keep_steps = command.input.keep_steps;
-  if (app.count("--methods") == 0) study.methods = {"robots", "trust-all", "pcm", "reference"};
-  if (app.count("--seeds") == 0) study.seeds = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10};
-}
+struct OutliersCommand {
+  GraphInput input{.robots = 5};
+  std::string scenario = {};
+  std::vector<double> shares_percent = {};  // empty: the default
+  std::vector<std::string> methods = {};
+  std::vector<unsigned> seeds = {};
+  std::filesystem::path json = {};
 
-void run(CLI::App& app, const OutliersCommand& command) {
-  check_output_folder(command.json);
-  OutlierStudyOptions study = command.study;
-  GraphInput input = command.input;
-  if (!command.scenario.empty()) {
-    set_scenario(app, command, study);
-    input.keep_steps = true;
-    if (study.scenario->robots > 0) input.robots = 1;
-  } else if (study.shares_percent.empty()) {
-    study.shares_percent = {10, 20, 30, 40, 50, 60, 70, 80};
+  void define(CLI::App& app) {
+    app.option_defaults()->always_capture_default();
+    input.define(app);
+    std::vector<std::string> names;
+    for (const Scenario& one : scenarios()) names.push_back(one.name);
+    app.add_option("--scenario", scenario, "See above; with the scenario's own robots")
+        ->check(CLI::IsMember(names).description(""));
+    app.add_option("--shares", shares_percent,
+                   "False closures for every 100 true ones [%]. The default is 10,20,...,80; in a\n"
+                   "scenario its own share")
+        ->check(CLI::Range(0.0, 10000.0))
+        ->delimiter(',');
+    app.add_option("--methods", methods,
+                   "See above. The default is pcm,robots; in a scenario\n"
+                   "robots,trust-all,pcm,reference")
+        ->check(CLI::IsMember(kRejections).description(""))
+        ->delimiter(',');
+    app.add_option(
+           "--seeds", seeds,
+           "Seeds of the false closures, one run each. The default is 1; in a scenario 1 to\n"
+           "10")
+        ->delimiter(',');
+    app.add_option("--json", json, "Also write every run to this file, as JSON");
   }
-  TeamGraph graph = true_graph(input.read(app), input.file.string());
-  graph.verticals.clear();
-  std::cout << indefinite_text(graph.indefinite_edges);
-  StageProgress progress;
-  const OutlierStudy done =
-      run_outlier_study(graph, study, cpu_meter(), [&](std::size_t ended, std::size_t all) {
-        progress(std::to_string(all) + " runs",
-                 static_cast<double>(ended) / static_cast<double>(all));
-      });
-  std::cout << outlier_text(done);
-  write_output(command.json, [&](std::ostream& out) { write_outlier_json(out, done); });
-}
+
+  void run() const {
+    check_output_folder(json);
+    GraphInput graph_input = input;
+    OutlierStudyOptions study = with_defaults();
+    if (study.scenario) {
+      graph_input.keep_steps = true;
+      if (study.scenario->robots > 0) graph_input.robots = 1;
+    }
+    TeamGraph graph = true_graph(graph_input.read(), input.file.string());
+    graph.verticals.clear();
+    std::cout << indefinite_text(graph.indefinite_edges);
+    StageProgress progress;
+    const OutlierStudy done =
+        run_outlier_study(graph, study, cpu_meter(), [&](std::size_t ended, std::size_t all) {
+          progress(std::to_string(all) + " runs",
+                   static_cast<double>(ended) / static_cast<double>(all));
+        });
+    std::cout << outlier_text(done);
+    write_json_output(json, to_json(done));
+  }
+
+ private:
+  [[nodiscard]] OutlierStudyOptions with_defaults() const {
+    OutlierStudyOptions study{.shares_percent = {10, 20, 30, 40, 50, 60, 70, 80},
+                              .methods = {"pcm", "robots"}};
+    if (!scenario.empty()) {
+      study = {.scenario = scenario_of(scenario),
+               .methods = {"robots", "trust-all", "pcm", "reference"},
+               .seeds = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10}};
+      study.scenario->keep_steps = input.keep_steps;
+      if (input.robots_given) study.scenario->robots = input.robots;
+      if (is_folder(input.file)) study.scenario->robots = 0;
+    }
+    if (!shares_percent.empty()) study.shares_percent = shares_percent;
+    if (!methods.empty()) study.methods = methods;
+    if (!seeds.empty()) study.seeds = seeds;
+    return study;
+  }
+};
 
 }  // namespace
 
-void add_outliers(CLI::App& parent) {
-  CLI::App& app = *parent.add_subcommand(
-      "outliers",
-      "Adds false closures, or noise that is not as claimed, and compares what keeps them out");
-  app.footer(details());
-  app.option_defaults()->always_capture_default();
-  const auto command = std::make_shared<OutliersCommand>();
-  command->input.define(app);
-  define(app, *command);
-  app.add_option("--json", command->json, "Also write every run to this file, as JSON");
-  app.callback([&app, command] { run(app, *command); });
+void add_outliers(CLI::App& app) {
+  add_command<OutliersCommand>(app, "outliers", details());
 }
 
 }  // namespace km

@@ -1,9 +1,7 @@
 #include <algorithm>
 #include <iostream>
-#include <memory>
 #include <nlohmann/json.hpp>
 #include <numeric>
-#include <ostream>
 
 #include "apps/lab/pgo/commands.hpp"
 #include "apps/lab/pgo/pcm_run.hpp"
@@ -24,7 +22,9 @@ const std::map<std::string, CliqueMethod> kSearches{{"exact", CliqueMethod::kExa
                                                     {"batch", CliqueMethod::kBatch}};
 
 constexpr const char* kPcmDetails =
-    R"(Pairwise consistency maximisation (PCM): the closures are vertices of a consistency graph,
+    R"(Adds loop closures one at a time and follows the largest set that agrees
+
+Pairwise consistency maximisation (PCM): the closures are vertices of a consistency graph,
 and its maximum clique is the set to be trusted.
 
 FILE is one robot's pose graph (g2o), 2D or 3D. --outliers adds random closures to those of the
@@ -127,10 +127,9 @@ std::string pcm_text(const PcmRun& run) {
   return align_columns(rows) + totals_text(run);
 }
 
-// One object for one run: {"search", "additions": [{"vertices", "check_s", "search_s", "clique",
-// "true_members", "false_members"}]}. "true_members" and "false_members" count the closures of the
-// clique by label. Several runs are an array of such objects.
-void write_pcm_json(std::ostream& out, std::span<const PcmRun> runs) {
+// "true_members" and "false_members" count the closures of the clique by label. One run is an
+// object, several are an array.
+Json to_json(std::span<const PcmRun> runs) {
   Json all = Json::array();
   for (const PcmRun& run : runs) {
     Json additions = Json::array();
@@ -143,7 +142,7 @@ void write_pcm_json(std::ostream& out, std::span<const PcmRun> runs) {
                            {"false_members", a.clique - a.true_members}});
     all.push_back({{"search", run.search}, {"additions", std::move(additions)}});
   }
-  out << json_text(runs.size() == 1 ? all.front() : all);
+  return runs.size() == 1 ? all.front() : all;
 }
 
 struct PcmCommand {
@@ -151,60 +150,49 @@ struct PcmCommand {
   fs::path json;
   std::vector<std::string> searches{"exact"};
   ClosureChoice selection;
-};
 
-void define_closures(CLI::App& app, ClosureChoice& selection) {
-  app.add_option("--outliers", selection.outliers, "Random false closures to add")
-      ->check(CLI::Range(0, kMostClosures));
-  app.add_option("--closures", selection.keep,
-                 "Number of the file's closures to use, drawn at random; 0: all")
-      ->check(CLI::Range(0, kMostClosures));
-  app.add_option("--seed", selection.seed, "Seed of all random draws")->capture_default_str();
-}
-
-void define_search(CLI::App& app, PcmCommand& command) {
-  std::vector<std::string> names;
-  for (const auto& [name, method] : kSearches) names.push_back(name);
-  app.add_option("--search", command.searches, "exact, incremental or batch; several are compared")
-      ->check(CLI::IsMember(names).description(""));
-}
-
-// Does one run per search, and prints each as soon as it has ended.
-std::vector<PcmRun> run_file(const PcmCommand& command) {
-  const auto [closures, indefinite] = read_closures(command.file, command.selection);
-  const auto outliers = std::ranges::count(closures, true, &LabelledClosure::outlier);
-  std::cout << closures.size() << " closures, " << outliers << " of them false\n"
-            << indefinite_text(indefinite);
-  std::vector<PcmRun> runs;
-  for (const std::string& search : command.searches) {
-    StageProgress progress;
-    runs.push_back(run_pcm(closures, kSearches.at(search), [&](std::size_t done) {
-      progress(search + " search",
-               static_cast<double>(done) / static_cast<double>(closures.size()));
-    }));
-    std::cout << '\n' << pcm_text(runs.back()) << std::flush;
+  void define(CLI::App& app) {
+    app.option_defaults()->always_capture_default();
+    app.add_option("FILE", file, "Pose graph of one robot (*.g2o)")->required();
+    std::vector<std::string> names;
+    for (const auto& [name, method] : kSearches) names.push_back(name);
+    app.add_option("--search", searches, "exact, incremental or batch; several are compared")
+        ->check(CLI::IsMember(names).description(""));
+    app.add_option("--outliers", selection.outliers, "Random false closures to add")
+        ->check(CLI::Range(0, kMostClosures));
+    app.add_option("--closures", selection.keep,
+                   "Number of the file's closures to use, drawn at random; 0: all")
+        ->check(CLI::Range(0, kMostClosures));
+    app.add_option("--seed", selection.seed, "Seed of all random draws");
+    app.add_option("--json", json,
+                   "Also write every addition to this file, as JSON (an array for several "
+                   "searches)");
   }
-  return runs;
-}
+
+  // Does one run per search, and prints each as soon as it has ended.
+  void run() const {
+    check_output_folder(json);
+    const auto [closures, indefinite] = read_closures(file, selection);
+    const auto outliers = std::ranges::count(closures, true, &LabelledClosure::outlier);
+    std::cout << closures.size() << " closures, " << outliers << " of them false\n"
+              << indefinite_text(indefinite);
+    std::vector<PcmRun> runs;
+    for (const std::string& search : searches) {
+      StageProgress progress;
+      runs.push_back(run_pcm(closures, kSearches.at(search), [&](std::size_t done) {
+        progress(search + " search",
+                 static_cast<double>(done) / static_cast<double>(closures.size()));
+      }));
+      std::cout << '\n' << pcm_text(runs.back()) << std::flush;
+    }
+    write_json_output(json, to_json(runs));
+  }
+};
 
 }  // namespace
 
-void add_pcm(CLI::App& parent) {
-  CLI::App& app = *parent.add_subcommand(
-      "pcm", "Adds loop closures one at a time and follows the largest set that agrees");
-  app.footer(kPcmDetails);
-  app.option_defaults()->always_capture_default();
-  const auto command = std::make_shared<PcmCommand>();
-  app.add_option("FILE", command->file, "Pose graph of one robot (*.g2o)")->required();
-  define_search(app, *command);
-  define_closures(app, command->selection);
-  app.add_option("--json", command->json,
-                 "Also write every addition to this file, as JSON (an array for several searches)");
-  app.callback([command] {
-    check_output_folder(command->json);
-    const std::vector<PcmRun> runs = run_file(*command);
-    write_output(command->json, [&](std::ostream& out) { write_pcm_json(out, runs); });
-  });
+void add_pcm(CLI::App& app) {
+  add_command<PcmCommand>(app, "pcm", kPcmDetails);
 }
 
 }  // namespace km

@@ -2,7 +2,6 @@
 #include <iostream>
 #include <limits>
 #include <map>
-#include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <ostream>
@@ -23,7 +22,9 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kSolveDetails =
-    R"(Every robot has only its part of the graph, and receives only the messages that would cross
+    R"(Optimises a pose graph by a team of robots
+
+Every robot has only its part of the graph, and receives only the messages that would cross
 the network.
 
 FILE is a g2o file, 2D or 3D, divided among --robots robots; or a folder with one *.csv or
@@ -126,14 +127,6 @@ std::string comparison_text(const Solution& solution) {
   return text.str();
 }
 
-struct Count {
-  std::size_t kept = 0, all = 0;
-
-  [[nodiscard]] std::string text() const {
-    return std::to_string(kept) + " of " + std::to_string(all);
-  }
-};
-
 // Which robots share a frame; empty if all do.
 std::string frames_text(const std::vector<RobotId>& world_of) {
   std::map<RobotId, std::string> frames;
@@ -147,20 +140,19 @@ std::string frames_text(const std::vector<RobotId>& world_of) {
 
 std::string decision_text(const TeamGraph& graph, const Solution& solution) {
   const Decision& decision = *solution.run.decision;
+  const auto [inside, between] = count_closures(graph, {}, decision.kept);
+  const auto kept_of = [](std::size_t kept, std::size_t all) {
+    return std::to_string(kept) + " of " + std::to_string(all);
+  };
   const std::vector<bool> odometry = odometry_edges(graph);
-  Count between, inside, steps;
-  for (std::size_t k = 0; k < decision.kept.size(); ++k) {
-    const BlockEdge& e = graph.edges[k];
-    Count& count = odometry[k]                                  ? steps
-                   : graph.robot_of(e.i) != graph.robot_of(e.j) ? between
-                                                                : inside;
-    ++count.all;
-    if (decision.kept[k]) ++count.kept;
-  }
+  const auto steps = static_cast<std::size_t>(std::ranges::count(odometry, true));
+  const auto kept = static_cast<std::size_t>(std::ranges::count(decision.kept, true));
+  const std::size_t kept_steps = kept - inside.true_kept - between.true_kept;
   const TeamWork& work = solution.run.rounds.back().work;
   std::ostringstream text;
-  text << "kept " << between.text() << " closures between robots, " << inside.text()
-       << " inside a robot, " << steps.text() << " steps of odometry\n"
+  text << "kept " << kept_of(between.true_kept, between.all_true()) << " closures between robots, "
+       << kept_of(inside.true_kept, inside.all_true()) << " inside a robot, "
+       << kept_of(kept_steps, steps) << " steps of odometry\n"
        << "closures are " << rounded(decision.noise_scale, 3)
        << " times as noisy as the graph says; kept up to " << rounded(decision.threshold, 3)
        << " sigma of the graph\n"
@@ -231,20 +223,10 @@ std::string score_text(const TruthScore& truth) {
   return text;
 }
 
-// Writes one object. rounds[0] is the start; bytes and times are sums up to the round:
-//     {"poses", "edges", "verticals", "indefinite_edges", "robots", "method", "start_cpu_s",
-//     "rounds": [{"cost", "gradient_norm", "bytes", "critical_path_s", "total_cpu_s"}]}.
-// Keys in addition if the solution has a comparison:
-//     "rounded_cost", "relative_gap", "lambda_bound", "certified", "optimum".
-// Keys of newton in addition:
-//     "noise_scale", "barc" [sigma of the graph], "most_sent", "most_received", "decided",
-//     "kept": [indices of edges].
-// Keys in addition if the data set has the truth; "ate_ratio" is that of the two "team_m":
-//     "closures": {"inside", "between": {"true_kept", "true_lost", "false_kept",
-//     "false_rejected"}}, "ate": {"team_m", "parts"}, "optimum_of_true": as "ate",
-//     and "certified"; "ate_ratio".
-void write_solution_json(std::ostream& out, const TeamGraph& graph, const Solution& solution,
-                         const TruthScore& truth) {
+// rounds[0] is the start; bytes and times are sums up to the round. "barc" is in sigma of the
+// graph, "kept" has the indices of the edges that are kept, "ate_ratio" is that of the two
+// "team_m".
+Json to_json(const TeamGraph& graph, const Solution& solution, const TruthScore& truth) {
   Json rounds = Json::array();
   for (const TeamRound& round : solution.run.rounds)
     rounds.push_back({{"round", round.round},
@@ -288,41 +270,7 @@ void write_solution_json(std::ostream& out, const TeamGraph& graph, const Soluti
     json["optimum_of_true"]["certified"] = truth.certified;
     json["ate_ratio"] = ate_ratio(truth);
   }
-  out << json_text(json);
-}
-
-struct SolveCommand {
-  GraphInput input;
-  bool no_vertical = false;
-  SolverOptions solver;
-  std::optional<int> rounds;
-  fs::path json;
-  fs::path output;
-};
-
-void define_method(CLI::App& app, SolveCommand& command) {
-  SolverOptions& solver = command.solver;
-  app.add_option("--method", solver.method, "See below")
-      ->check(CLI::IsMember(kMethods).description(""));
-  app.add_flag("--no-vertical", command.no_vertical, "Leave out the verticals of the files");
-  app.add_option("--rounds", command.rounds,
-                 "Largest number of rounds; the default is 1000 for newton, as robots have it,\n"
-                 "and 100 for the other methods and --trust-all")
-      ->check(CLI::Range(0, 1000000));
-  app.add_option("--over-relaxation", solver.over_relaxation,
-                 "rbcd: largest step of a robot, relative to that to the minimum of its block")
-      ->check(CLI::Range(1.0, 1.99));
-  app.add_flag("--trust-all", solver.trust_all, "newton: treat all closures as true");
-}
-
-void check(CLI::App& app, SolveCommand& command) {
-  if (command.solver.trust_all && command.solver.method != "newton")
-    throw std::runtime_error("--trust-all is for --method newton only");
-  command.solver.max_rounds = command.rounds.value_or(command.solver.rejects() ? 1000 : 100);
-  if (app.count("--over-relaxation") > 0 && command.solver.method != "rbcd")
-    throw std::runtime_error("--over-relaxation is for --method rbcd only");
-  check_output_folder(command.json);
-  check_output_folder(command.output);
+  return json;
 }
 
 // Writes a row for each pose, with its number in place of a time.
@@ -350,49 +298,74 @@ void write_solved(std::ostream& out, const TeamGraph& graph, const std::vector<S
   write_g2o(out, result);
 }
 
-std::vector<bool> kept_by(const Solution& solution) {
-  return solution.run.decision ? solution.run.decision->kept : std::vector<bool>();
-}
+struct SolveCommand {
+  GraphInput input;
+  bool no_vertical = false;
+  SolverOptions solver;
+  std::optional<int> rounds;
+  std::optional<double> over_relaxation;
+  fs::path json;
+  fs::path output;
 
-void run(CLI::App& app, SolveCommand& command) {
-  check(app, command);
-  LabelledTeamGraph team = command.input.read(app);
-  TeamGraph& graph = team.graph;
-  if (command.no_vertical) graph.verticals.clear();
-  const Solution solution = solve(graph, command.solver, cpu_meter());
-  for (const SE3& T_world_kf : solution.T_world_kf)
-    if (!T_world_kf.matrix().allFinite())
-      throw std::runtime_error(command.input.file.string() + ": " + command.solver.name() +
-                               " found no finite poses: do steps and weights make sense?");
-  const TruthScore truth = score(team, solution.T_world_kf, kept_by(solution));
-  std::cout << left_out_text(team) << solution_text(graph, solution) << score_text(truth);
-  write_output(command.json,
-               [&](std::ostream& out) { write_solution_json(out, graph, solution, truth); });
-  write_output(command.output, [&](std::ostream& out) {
-    command.output.extension() == ".tum" ? write_tum(out, solution.T_world_kf)
-                                         : write_solved(out, graph, solution.T_world_kf);
-  });
-}
+  void define(CLI::App& app) {
+    app.option_defaults()->always_capture_default();
+    input.define(app);
+    app.add_option("--method", solver.method, "See above")
+        ->check(CLI::IsMember(kMethods).description(""));
+    app.add_flag("--no-vertical", no_vertical, "Leave out the verticals of the files");
+    app.add_option("--rounds", rounds,
+                   "Largest number of rounds; the default is 1000 for newton, as robots have it,\n"
+                   "and 100 for the other methods and --trust-all")
+        ->check(CLI::Range(0, 1000000));
+    app.add_option("--over-relaxation", over_relaxation,
+                   "rbcd: largest step of a robot, relative to that to the minimum of its block;\n"
+                   "the default is 1.95")
+        ->check(CLI::Range(1.0, 1.99));
+    app.add_flag("--trust-all", solver.trust_all, "newton: treat all closures as true");
+    app.option_defaults()->group("Output");
+    app.add_option("--json", json, "Also write every round to this file, as JSON");
+    app.add_option("--output", output,
+                   "Also write the rounded poses: *.tum (numbers of the poses as times) or *.g2o")
+        ->check([](const std::string& name) {
+          return name.ends_with(".tum") || name.ends_with(".g2o")
+                     ? std::string()
+                     : name + ": --output writes *.tum or *.g2o";
+        });
+  }
+
+  void run() {
+    if (solver.trust_all && solver.method != "newton")
+      throw std::runtime_error("--trust-all is for --method newton only");
+    if (over_relaxation && solver.method != "rbcd")
+      throw std::runtime_error("--over-relaxation is for --method rbcd only");
+    solver.max_rounds = rounds.value_or(solver.rejects() ? 1000 : 100);
+    solver.over_relaxation = over_relaxation.value_or(solver.over_relaxation);
+    check_output_folder(json);
+    check_output_folder(output);
+    LabelledTeamGraph team = input.read();
+    TeamGraph& graph = team.graph;
+    if (no_vertical) graph.verticals.clear();
+    const Solution solution = solve(graph, solver, cpu_meter());
+    for (const SE3& T_world_kf : solution.T_world_kf)
+      if (!T_world_kf.matrix().allFinite())
+        throw std::runtime_error(input.file.string() + ": " + solver.name() +
+                                 " found no finite poses: do steps and weights make sense?");
+    const auto& decision = solution.run.decision;
+    const TruthScore truth =
+        score(team, solution.T_world_kf, decision ? decision->kept : std::vector<bool>());
+    std::cout << left_out_text(team) << solution_text(graph, solution) << score_text(truth);
+    write_json_output(json, to_json(graph, solution, truth));
+    write_output(output, [&](std::ostream& out) {
+      output.extension() == ".tum" ? write_tum(out, solution.T_world_kf)
+                                   : write_solved(out, graph, solution.T_world_kf);
+    });
+  }
+};
 
 }  // namespace
 
-void add_solve(CLI::App& parent) {
-  CLI::App& app = *parent.add_subcommand("solve", "Optimises a pose graph by a team of robots");
-  app.footer(kSolveDetails);
-  app.option_defaults()->always_capture_default();
-  const auto command = std::make_shared<SolveCommand>();
-  command->input.define(app);
-  define_method(app, *command);
-  app.option_defaults()->group("Output");
-  app.add_option("--json", command->json, "Also write every round to this file, as JSON");
-  app.add_option("--output", command->output,
-                 "Also write the rounded poses: *.tum (numbers of the poses as times) or *.g2o")
-      ->check([](const std::string& file) {
-        return file.ends_with(".tum") || file.ends_with(".g2o")
-                   ? std::string()
-                   : file + ": --output writes *.tum or *.g2o";
-      });
-  app.callback([&app, command] { run(app, *command); });
+void add_solve(CLI::App& app) {
+  add_command<SolveCommand>(app, "solve", kSolveDetails);
 }
 
 }  // namespace km

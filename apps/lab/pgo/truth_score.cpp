@@ -28,15 +28,15 @@ TrueOptimum optimum_of_true(const LabelledTeamGraph& team) {
   return optimum;
 }
 
-LabelCounts count_closures(const LabelledTeamGraph& team, const std::vector<bool>& kept) {
-  const std::vector<bool> odometry = odometry_edges(team.graph);
+LabelCounts count_closures(const TeamGraph& graph, const std::vector<bool>& is_false,
+                           const std::vector<bool>& kept) {
+  const std::vector<bool> odometry = odometry_edges(graph);
   LabelCounts counts;
   for (std::size_t k = 0; k < odometry.size(); ++k) {
     if (odometry[k]) continue;
-    const BlockEdge& e = team.graph.edges[k];
-    const bool inside = team.graph.robot_of(e.i) == team.graph.robot_of(e.j);
+    const bool inside = graph.robot_of(graph.edges[k].i) == graph.robot_of(graph.edges[k].j);
     ClosureCounts& count = inside ? counts.inside : counts.between;
-    if (team.truth.is_false[k])
+    if (!is_false.empty() && is_false[k])
       ++(kept[k] ? count.false_kept : count.false_rejected);
     else
       ++(kept[k] ? count.true_kept : count.true_lost);
@@ -53,11 +53,7 @@ TeamAte ate_of(const LabelledTeamGraph& team, const std::vector<SolvedPart>& par
       if (const auto& truth = team.truth.T_world_kf[part.poses[i]])
         pairs.push_back({.T_truth_body = *truth, .T_estimate_body = part.T_world_kf[i]});
     if (pairs.empty()) continue;
-    const Alignment alignment = align(pairs, false);
-    for (const PosePair& pair : pairs)
-      sum_m2 +=
-          (alignment.apply(pair.T_estimate_body).translation() - pair.T_truth_body.translation())
-              .squaredNorm();
+    for (const double error_m : aligned_errors_m(pairs)) sum_m2 += error_m * error_m;
     poses += pairs.size();
   }
   return {.team_m = poses > 0 ? std::sqrt(sum_m2 / static_cast<double>(poses))
@@ -70,7 +66,7 @@ TruthScore score(const LabelledTeamGraph& team, const std::vector<SE3>& T_world_
   TruthScore score;
   const bool labels = !team.truth.is_false.empty();
   if (kept.empty()) kept.assign(team.graph.edges.size(), true);
-  if (labels) score.closures = count_closures(team, kept);
+  if (labels) score.closures = count_closures(team.graph, team.truth.is_false, kept);
   if (team.truth.T_world_kf.empty()) return score;
   SolvedPart whole{std::vector<std::size_t>(T_world_kf.size()), T_world_kf};
   std::iota(whole.poses.begin(), whole.poses.end(), std::size_t{0});

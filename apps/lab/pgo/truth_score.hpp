@@ -15,6 +15,8 @@ struct ClosureCounts {
   std::size_t true_lost = 0;
   std::size_t false_kept = 0;
   std::size_t false_rejected = 0;
+
+  [[nodiscard]] std::size_t all_true() const { return true_kept + true_lost; }
 };
 
 /// Root mean square of the position errors [m] of a team.
@@ -57,9 +59,9 @@ struct TrueOptimum {
 /// Optimum of the edges that are not labelled false. Precondition: labels.
 [[nodiscard]] TrueOptimum optimum_of_true(const LabelledTeamGraph& team);
 
-/// Counts the closures by their labels and by whether they were `kept` (by edge of the graph).
-/// Steps of odometry do not count. Precondition: labels.
-[[nodiscard]] LabelCounts count_closures(const LabelledTeamGraph& team,
+/// Counts the closures by their labels and by whether they were `kept`, both by edge of the graph.
+/// Without labels all are true. Steps of odometry do not count.
+[[nodiscard]] LabelCounts count_closures(const TeamGraph& graph, const std::vector<bool>& is_false,
                                          const std::vector<bool>& kept);
 
 /// Compares the poses of `parts` with the true ones. Poses without a true one do not count.

@@ -47,11 +47,14 @@ TEST_CASE("A JRL file becomes a team with its labels and poses") {
 
 TEST_CASE("Closures are counted by label, ends and decision") {
   const LabelledTeamGraph team = small_team();
-  const LabelCounts kept = count_closures(team, std::vector<bool>(6, true));
+  const auto counts = [&](bool kept) {
+    return count_closures(team.graph, team.truth.is_false, std::vector<bool>(6, kept));
+  };
+  const LabelCounts kept = counts(true);
   CHECK(kept.inside.true_kept == 1);
   CHECK(kept.between.true_kept == 1);
   CHECK(kept.between.false_kept == 1);
-  const LabelCounts lost = count_closures(team, std::vector<bool>(6, false));
+  const LabelCounts lost = counts(false);
   CHECK(lost.inside.true_lost == 1);
   CHECK(lost.between.true_lost == 1);
   CHECK(lost.between.false_rejected == 1);
