@@ -10,7 +10,7 @@
 #include <thread>
 #include <tuple>
 
-#include "apps/lab/simulation/dataset/recording.hpp"
+#include "modules/core/config.hpp"
 #include "runtime/yaml_config.hpp"
 
 namespace km {
@@ -163,9 +163,9 @@ SimulationOptions completed(SimulationOptions options) {
   if (options.depth_rate_hz <= 0.0) options.depth_rate_hz = options.rate_hz;
   const double steps = options.rate_hz / options.depth_rate_hz;
   if (steps < 1.0 || std::abs(steps - std::round(steps)) > 1e-6)
-    throw std::invalid_argument("--rate " + number_text(options.rate_hz) +
+    throw std::invalid_argument("--rate " + shortest_text(options.rate_hz) +
                                 " is not a multiple of --depth-rate " +
-                                number_text(options.depth_rate_hz));
+                                shortest_text(options.depth_rate_hz));
   if (options.threads == 0)
     options.threads = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
   return options;

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "modules/core/config.hpp"
 #include "modules/core/json.hpp"
 #include "modules/core/write_file.hpp"
 #include "modules/images/image_codec.hpp"
@@ -85,7 +86,7 @@ bool is_whole_image(const fs::path& file) {
 namespace {
 
 void append(std::string& text, const Eigen::Vector3d& values) {
-  for (int i = 0; i < 3; ++i) text += ',' + number_text(values[i]);
+  for (int i = 0; i < 3; ++i) text += ',' + shortest_text(values[i]);
 }
 
 std::string heading(const char* type, const std::string& comment) {
@@ -99,7 +100,7 @@ std::string extrinsics(const SE3& T_body_sensor) {
   const Eigen::Matrix4d& T = T_body_sensor.matrix();
   for (int row = 0; row < 4; ++row) {
     for (int column = 0; column < 4; ++column)
-      text << number_text(T(row, column)) << (row == 3 && column == 3 ? "]\n\n" : ", ");
+      text << shortest_text(T(row, column)) << (row == 3 && column == 3 ? "]\n\n" : ", ");
     if (row < 3) text << "\n         ";
   }
   return text.str();
@@ -108,13 +109,13 @@ std::string extrinsics(const SE3& T_body_sensor) {
 std::string list_text(std::span<const double> values) {
   std::string text = "[";
   for (std::size_t i = 0; i < values.size(); ++i)
-    text += (i == 0 ? "" : ", ") + number_text(values[i]);
+    text += (i == 0 ? "" : ", ") + shortest_text(values[i]);
   return text + ']';
 }
 
 std::string optics(const Camera& camera, double rate_hz) {
   std::ostringstream text;
-  text << "rate_hz: " << number_text(rate_hz) << "\nresolution: [" << camera.width << ", "
+  text << "rate_hz: " << shortest_text(rate_hz) << "\nresolution: [" << camera.width << ", "
        << camera.height << "]\ncamera_model: pinhole\nintrinsics: "
        << list_text(std::array{camera.fx, camera.fy, camera.cx, camera.cy})
        << "  # fu, fv, cu, cv [px]\ndistortion_model: radial-tangential\ndistortion_coefficients: "
@@ -194,7 +195,7 @@ std::string state_csv(const std::vector<TrueState>& states) {
     const Eigen::Quaterniond q(state.T_world_body.linear());
     text += std::to_string(state.stamp);
     append(text, state.T_world_body.translation());
-    text += ',' + number_text(q.w());
+    text += ',' + shortest_text(q.w());
     append(text, q.vec());
     append(text, state.velocity_world);
     append(text, state.gyro_bias);
@@ -221,21 +222,22 @@ std::string depth_yaml(const Camera& camera, const DepthCameraFigures& figures,
          optics(camera, figures.rate_hz) +
          "depth_scale: 0.001  # [m] of a unit of the 16-bit images, along the optical axis\n"
          "min_range_m: " +
-         number_text(figures.min_range_m) + "\nmax_range_m: " + number_text(figures.max_range_m) +
-         "\nbaseline_m: " + number_text(figures.baseline_m) +
+         shortest_text(figures.min_range_m) +
+         "\nmax_range_m: " + shortest_text(figures.max_range_m) +
+         "\nbaseline_m: " + shortest_text(figures.baseline_m) +
          "  # of the stereo camera that would have its errors\n";
 }
 
 std::string imu_yaml(const ImuNoise& noise, const std::string& comment) {
   std::ostringstream text;
   text << heading("imu", comment) << extrinsics(SE3::Identity())
-       << "rate_hz: " << number_text(noise.rate_hz)
-       << "\ngyroscope_noise_density: " << number_text(noise.gyro_noise_density)
-       << "  # [rad/s/sqrt(Hz)]\ngyroscope_random_walk: " << number_text(noise.gyro_random_walk)
+       << "rate_hz: " << shortest_text(noise.rate_hz)
+       << "\ngyroscope_noise_density: " << shortest_text(noise.gyro_noise_density)
+       << "  # [rad/s/sqrt(Hz)]\ngyroscope_random_walk: " << shortest_text(noise.gyro_random_walk)
        << "  # [rad/s^2/sqrt(Hz)]\naccelerometer_noise_density: "
-       << number_text(noise.accel_noise_density)
+       << shortest_text(noise.accel_noise_density)
        << "  # [m/s^2/sqrt(Hz)]\naccelerometer_random_walk: "
-       << number_text(noise.accel_random_walk) << "  # [m/s^3/sqrt(Hz)]\n";
+       << shortest_text(noise.accel_random_walk) << "  # [m/s^3/sqrt(Hz)]\n";
   return text.str();
 }
 

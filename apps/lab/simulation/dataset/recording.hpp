@@ -2,7 +2,6 @@
 
 #include <Eigen/Core>
 #include <array>
-#include <charconv>
 #include <cstdint>
 #include <filesystem>
 #include <span>
@@ -32,12 +31,6 @@ namespace km {
 /// 8-bit PNG of class ids.
 [[nodiscard]] std::vector<std::uint8_t> encode_labels(int width, int height,
                                                       const std::vector<LabelId>& labels);
-
-/// The shortest text that reads back as the same double.
-[[nodiscard]] inline std::string number_text(double value) {
-  std::array<char, 32> digits{};
-  return {digits.data(), std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr};
-}
 
 /// Images that a robot's recording can have for one instant.
 enum class ImageChannel { kLeft, kRight, kDepth, kLabels };
