@@ -4,24 +4,65 @@
 #include "modules/map_2d/map_2d.hpp"
 #include "modules/map_2d/map_server_files.hpp"
 #include "modules/map_2d/node/map_2d_node.hpp"
-#include "test/modules/map_2d/surfaces.hpp"
 #include "test/support/nav2_map.hpp"
 #include "test/support/test.hpp"
 
 namespace km {
 namespace {
 
-using test::kFloorLabel;
-using test::kWallLabel;
-using test::Surfaces;
-
+constexpr LabelId kWallLabel = 1, kFloorLabel = 2;
 constexpr std::int8_t kUnknown = OccupancyGrid::kUnknown, kFree = OccupancyGrid::kFree,
                       kOccupied = OccupancyGrid::kOccupied;
 
 const LabelPalette& palette() {
-  static const LabelPalette palette = test::two_class_palette();
+  static const LabelPalette palette(
+      {{kWallLabel, "wall", {1, 1, 1}}, {kFloorLabel, "floor", {2, 2, 2}}});
   return palette;
 }
+
+// Meshes of rectangles.
+class Surfaces {
+ public:
+  // Parallelogram with a corner and two edges; free space is on the side of u x v.
+  Surfaces& add(const Eigen::Vector3f& corner, const Eigen::Vector3f& u, const Eigen::Vector3f& v,
+                LabelId label) {
+    const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
+    for (const auto& vertex : {corner, Eigen::Vector3f(corner + u), Eigen::Vector3f(corner + u + v),
+                               Eigen::Vector3f(corner + v)})
+      mesh.vertices.push_back(vertex);
+    mesh.labels.insert(mesh.labels.end(), 4, label);
+    mesh.faces.push_back({first, first + 1, first + 2});
+    mesh.faces.push_back({first, first + 2, first + 3});
+    return *this;
+  }
+
+  // Level rectangle seen from above, or with `from_below` from below.
+  Surfaces& level(float x0, float y0, float x1, float y1, float z, LabelId label,
+                  bool from_below = false) {
+    const Eigen::Vector3f u(x1 - x0, 0, 0), v(0, y1 - y0, 0);
+    return from_below ? add({x0, y0, z}, v, u, label) : add({x0, y0, z}, u, v, label);
+  }
+
+  // Vertical rectangle over a segment, seen from its left side.
+  Surfaces& wall(float x0, float y0, float x1, float y1, float z0, float z1) {
+    return add({x0, y0, z0}, {0, 0, z1 - z0}, {x1 - x0, y1 - y0, 0}, kWallLabel);
+  }
+
+  // Room with floor and four walls, seen from inside.
+  Surfaces& room(float x0, float y0, float x1, float y1) {
+    level(x0, y0, x1, y1, 0, kFloorLabel);
+    constexpr float kHigh = 2.5F;
+    wall(x0, y0, x1, y0, 0, kHigh).wall(x1, y0, x1, y1, 0, kHigh);
+    return wall(x1, y1, x0, y1, 0, kHigh).wall(x0, y1, x0, y0, 0, kHigh);
+  }
+
+  Surfaces& without_labels() {
+    mesh.labels.clear();
+    return *this;
+  }
+
+  LabelledMesh mesh;
+};
 
 OccupancyGrid map_of(const Surfaces& surfaces, const Map2dConfig& config = {}) {
   Map2dResult result = make_map_2d(config, {surfaces.mesh, palette()});
@@ -298,11 +339,11 @@ TEST_CASE("The node maps the last mesh and moves the rays with its keyframes") {
   Topic<OccupancyGrid> maps;
   std::vector<OccupancyGrid> received;
   In<OccupancyGrid>(maps).subscribe([&](const auto& map) { received.push_back(*map); });
-  Map2dNode node({}, test::two_class_palette(), RayThinner(camera(), 5.0), {frames, maps});
+  Map2dNode node({}, palette(), RayThinner(camera(), 5.0), {frames, maps});
   node.start();
   for (const double x : {0.0, 0.4, 0.8}) frames.publish(frame_at(x, 2000));
-  test::Surfaces surfaces;
-  surfaces.level(0, 0, 1, 4, 0, test::kFloorLabel).wall(2.78F, 4, 2.78F, 0, 0, 2);
+  Surfaces surfaces;
+  surfaces.level(0, 0, 1, 4, 0, kFloorLabel).wall(2.78F, 4, 2.78F, 0, 0, 2);
   const auto mesh = std::make_shared<const LabelledMesh>(surfaces.mesh);
   SE3 moved = SE3::Identity();
   moved.translation().y() = 1.5;
