@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <chrono>
 #include <stdexcept>
-#include <thread>
 
 #include "runtime/clock.hpp"
 #include "runtime/log.hpp"

@@ -1,7 +1,6 @@
 #include "runtime/yaml_config.hpp"
 
 #include <algorithm>
-#include <cstdint>
 #include <numeric>
 
 #include "modules/core/input_file.hpp"

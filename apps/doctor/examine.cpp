@@ -1,9 +1,7 @@
 #include "apps/doctor/examine.hpp"
 
 #include <algorithm>
-#include <atomic>
 #include <condition_variable>
-#include <limits>
 #include <memory>
 #include <mutex>
 #include <optional>

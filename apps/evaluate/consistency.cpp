@@ -5,7 +5,6 @@
 #include <iostream>
 #include <map>
 #include <nlohmann/json.hpp>
-#include <string>
 #include <vector>
 
 #include "apps/evaluate/commands.hpp"

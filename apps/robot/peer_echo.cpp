@@ -9,7 +9,6 @@
 #include <chrono>
 #include <cstdint>
 #include <limits>
-#include <utility>
 #include <vector>
 
 #include "apps/robot/datagram_socket.hpp"

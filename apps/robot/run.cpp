@@ -4,7 +4,6 @@
 
 #include <cerrno>
 #include <cstdlib>
-#include <map>
 #include <optional>
 #include <set>
 #include <stdexcept>

@@ -3,7 +3,6 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <filesystem>
 #include <opencv2/imgproc.hpp>
 #include <optional>
 #include <string>

@@ -1,6 +1,5 @@
 #include "modules/mesh/chunk_placement.hpp"
 
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <optional>

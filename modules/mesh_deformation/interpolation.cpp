@@ -9,7 +9,6 @@
 #include <limits>
 #include <nanoflann.hpp>
 #include <span>
-#include <utility>
 #include <vector>
 
 #include "modules/mesh_deformation/mesh_node.hpp"

@@ -1,10 +1,8 @@
 #include "modules/mesh_deformation/local_mesh_optimization.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <stdexcept>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "modules/mesh_deformation/decimation.hpp"

@@ -1,7 +1,6 @@
 #include "modules/outlier_rejection/local_contest.hpp"
 
 #include <algorithm>
-#include <utility>
 
 namespace km {
 namespace {

@@ -6,7 +6,6 @@
 #include <limits>
 #include <optional>
 #include <set>
-#include <span>
 #include <stdexcept>
 
 #include "modules/core/covariance.hpp"

@@ -6,7 +6,6 @@
 #include <limits>
 #include <map>
 #include <numbers>
-#include <utility>
 #include <vector>
 
 #include "modules/robust/cycle_mixture.hpp"

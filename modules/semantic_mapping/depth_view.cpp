@@ -5,7 +5,6 @@
 #include <limits>
 #include <numeric>
 #include <opencv2/core/utility.hpp>
-#include <optional>
 #include <stdexcept>
 #include <string>
 

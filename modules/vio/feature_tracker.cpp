@@ -1,7 +1,6 @@
 #include "modules/vio/feature_tracker.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <iterator>
 #include <opencv2/video/tracking.hpp>
 #include <stdexcept>

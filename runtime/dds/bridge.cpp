@@ -1,8 +1,6 @@
 #include "runtime/dds/bridge.hpp"
 
-#include <array>
 #include <chrono>
-#include <cstdint>
 
 #include "runtime/clock.hpp"
 #include "runtime/log.hpp"

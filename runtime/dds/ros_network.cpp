@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <stdexcept>
-#include <utility>
 
 #include "modules/core/text_rows.hpp"
 #include "modules/core/xml_text.hpp"

@@ -1,10 +1,8 @@
 #include "modules/loop_closure/node/loop_closure_node.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cstddef>
 #include <cstdint>
-#include <span>
 #include <utility>
 #include <vector>
 

@@ -1,7 +1,6 @@
 #include "modules/map_2d/node/map_2d_node.hpp"
 
 #include <algorithm>
-#include <optional>
 #include <utility>
 
 #include "modules/core/text_table.hpp"

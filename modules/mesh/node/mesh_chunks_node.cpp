@@ -1,6 +1,5 @@
 #include "modules/mesh/node/mesh_chunks_node.hpp"
 
-#include <string>
 #include <utility>
 
 #include "modules/mesh/chunk_packing.hpp"

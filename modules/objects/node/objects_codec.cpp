@@ -1,6 +1,5 @@
 #include "modules/objects/node/objects_codec.hpp"
 
-#include <cmath>
 #include <utility>
 
 #include "runtime/dds/wire_pose.hpp"

@@ -1,7 +1,6 @@
 #include "modules/ros_dds/node/ros_output_node.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <utility>
 
 #include "modules/core/text_table.hpp"

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstdint>
 #include <stdexcept>
-#include <utility>
 
 #include "modules/core/calibration_limits.hpp"
 #include "modules/core/input_file.hpp"
