@@ -17,10 +17,6 @@ namespace fs = std::filesystem;
 
 constexpr int kMostClosures = 100000;
 
-const std::map<std::string, CliqueMethod> kSearches{{"exact", CliqueMethod::kExact},
-                                                    {"incremental", CliqueMethod::kIncremental},
-                                                    {"batch", CliqueMethod::kBatch}};
-
 constexpr const char* kPcmDetails =
     R"(Adds loop closures one at a time and follows the largest set that agrees
 
@@ -105,7 +101,7 @@ std::string totals_text(const PcmRun& run) {
   if (run.dropped_true + run.dropped_false > 0)
     text += "; contradicted odometry and dropped: " + std::to_string(run.dropped_true) + " true, " +
             std::to_string(run.dropped_false) + " false";
-  if (run.search != to_string(CliqueMethod::kExact)) return text + '\n';
+  if (run.search != "exact") return text + '\n';
   text += "; " + std::to_string(run.search_nodes) + " search nodes\n";
   if (run.searches_ended > 0)
     text += std::to_string(run.searches_ended) +
@@ -154,10 +150,8 @@ struct PcmCommand {
   void define(CLI::App& app) {
     app.option_defaults()->always_capture_default();
     app.add_option("FILE", file, "Pose graph of one robot (*.g2o)")->required();
-    std::vector<std::string> names;
-    for (const auto& [name, method] : kSearches) names.push_back(name);
     app.add_option("--search", searches, "exact, incremental or batch; several are compared")
-        ->check(CLI::IsMember(names).description(""));
+        ->check(CLI::IsMember(kSearches).description(""));
     app.add_option("--outliers", selection.outliers, "Random false closures to add")
         ->check(CLI::Range(0, kMostClosures));
     app.add_option("--closures", selection.keep,
@@ -179,7 +173,7 @@ struct PcmCommand {
     std::vector<PcmRun> runs;
     for (const std::string& search : searches) {
       StageProgress progress;
-      runs.push_back(run_pcm(closures, kSearches.at(search), [&](std::size_t done) {
+      runs.push_back(run_pcm(closures, search, [&](std::size_t done) {
         progress(search + " search",
                  static_cast<double>(done) / static_cast<double>(closures.size()));
       }));

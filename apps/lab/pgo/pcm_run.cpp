@@ -44,14 +44,13 @@ void GreedyClique::add(std::span<const std::size_t> neighbours) {
   if (best.size() > clique_.size()) clique_ = std::move(best);
 }
 
-PcmRun run_pcm(const std::vector<LabelledClosure>& closures, CliqueMethod method,
+PcmRun run_pcm(const std::vector<LabelledClosure>& closures, const std::string& search,
                const PcmProgress& progress) {
   using enum GreedyClique::Starts;
   const CycleTest test(PcmConfig{});
-  std::variant<MaxClique, GreedyClique> search = MaxClique(MaxClique::kMaxSearchNodes);
-  if (method != CliqueMethod::kExact)
-    search = GreedyClique(method == CliqueMethod::kBatch ? kAllVertices : kNewVertex);
-  PcmRun run{.search = to_string(method), .additions = {}};
+  std::variant<MaxClique, GreedyClique> searched = MaxClique(MaxClique::kMaxSearchNodes);
+  if (search != "exact") searched = GreedyClique(search == "batch" ? kAllVertices : kNewVertex);
+  PcmRun run{.search = search, .additions = {}};
   std::vector<PreparedClosure> vertices;
   std::vector<bool> is_true;
   for (std::size_t n = 0; n < closures.size(); ++n) {
@@ -83,21 +82,15 @@ PcmRun run_pcm(const std::vector<LabelledClosure>& closures, CliqueMethod method
           addition.bound = clique.bound();
           for (const std::size_t v : clique.clique()) addition.true_members += is_true[v] ? 1 : 0;
         },
-        search);
+        searched);
     addition.true_vertices =
         static_cast<std::size_t>(std::count(is_true.begin(), is_true.end(), true));
   }
-  if (const auto* exact = std::get_if<MaxClique>(&search)) {
+  if (const auto* exact = std::get_if<MaxClique>(&searched)) {
     run.search_nodes = exact->search_nodes();
     run.searches_ended = exact->searches_ended();
   }
   return run;
-}
-
-std::string to_string(CliqueMethod method) {
-  return method == CliqueMethod::kExact         ? "exact"
-         : method == CliqueMethod::kIncremental ? "incremental"
-                                                : "batch";
 }
 
 ClosureInput read_closures(const std::filesystem::path& file, const ClosureChoice& selection) {

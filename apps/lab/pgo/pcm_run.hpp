@@ -31,7 +31,7 @@ struct PcmAddition {
 };
 
 struct PcmRun {
-  std::string search;  ///< "exact", "incremental" or "batch".
+  std::string search;  ///< Name from kSearches.
   std::vector<PcmAddition> additions;
   std::size_t dropped_true = 0, dropped_false = 0;  ///< Closures that contradict odometry.
   std::size_t edges = 0;                            ///< Edges of the consistency graph.
@@ -66,25 +66,18 @@ class GreedyClique {
   std::size_t bound_ = 0;
 };
 
-/// Method by which a larger clique is searched after a vertex was added.
-enum class CliqueMethod {
-  kExact,        ///< MaxClique.
-  kIncremental,  ///< GreedyClique from the new vertex.
-  kBatch,        ///< GreedyClique from every vertex.
-};
+/// Methods by which a larger clique is searched after a vertex was added: MaxClique, GreedyClique
+/// from the new vertex, and GreedyClique from every vertex.
+inline const std::vector<std::string> kSearches = {"exact", "incremental", "batch"};
 
 /// Called before every addition with the number of closures handled so far.
 using PcmProgress = std::function<void(std::size_t)>;
 
 /// Adds the closures one at a time, as Pcm does. All are inside one robot; those that contradict
-/// the odometry between their ends are dropped. Throws std::invalid_argument for a closure that is
-/// not is_usable().
+/// the odometry between their ends are dropped. `search` is a name from kSearches. Throws
+/// std::invalid_argument for a closure that is not is_usable().
 [[nodiscard]] PcmRun run_pcm(const std::vector<LabelledClosure>& closures,
-                             CliqueMethod method = CliqueMethod::kExact,
-                             const PcmProgress& progress = {});
-
-/// "exact", "incremental" or "batch".
-[[nodiscard]] std::string to_string(CliqueMethod method);
+                             const std::string& search = "exact", const PcmProgress& progress = {});
 
 /// Selection of the closures of a pose graph, and additional random ones.
 struct ClosureChoice {
