@@ -47,10 +47,9 @@ std::optional<SE3> pose_at(std::span<const StampedPose> poses, Stamp stamp, doub
 }
 
 std::vector<PosePair> associate(std::span<const StampedPose> truth,
-                                std::span<const StampedPose> estimate, const TimeWindow& window,
-                                double max_gap_s, double max_difference_s) {
+                                std::span<const StampedPose> estimate, const TimeWindow& window) {
   if (truth.empty() || estimate.empty()) return {};
-  const Stamp margin = nanoseconds(max_difference_s);
+  const Stamp margin = nanoseconds(kMaxDifference_s);
   const TimeWindow shared = {
       std::max(window.from, std::max(truth.front().stamp, estimate.front().stamp) - margin),
       std::min(window.to, std::min(truth.back().stamp, estimate.back().stamp) + margin)};
@@ -61,8 +60,7 @@ std::vector<PosePair> associate(std::span<const StampedPose> truth,
 
   std::vector<PosePair> pairs;
   for (const StampedPose& pose : at_estimate ? estimate_inside : truth_inside) {
-    const auto other =
-        pose_at(at_estimate ? truth : estimate, pose.stamp, max_gap_s, max_difference_s);
+    const auto other = pose_at(at_estimate ? truth : estimate, pose.stamp);
     if (!other) continue;
     if (at_estimate)
       pairs.push_back({pose.stamp, *other, pose.T});

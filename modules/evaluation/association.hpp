@@ -36,9 +36,7 @@ inline constexpr double kMaxGap_s = 0.1, kMaxDifference_s = 0.01;
 /// there. The other one is interpolated as in pose_at(). Only stamps inside `window` count.
 [[nodiscard]] std::vector<PosePair> associate(std::span<const StampedPose> truth,
                                               std::span<const StampedPose> estimate,
-                                              const TimeWindow& window,
-                                              double max_gap_s = kMaxGap_s,
-                                              double max_difference_s = kMaxDifference_s);
+                                              const TimeWindow& window);
 
 /// Time in `window` that `poses` cover [s]: intervals between neighbours at most `max_gap_s` apart.
 [[nodiscard]] double covered_seconds(std::span<const StampedPose> poses, const TimeWindow& window,

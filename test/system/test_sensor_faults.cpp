@@ -163,7 +163,7 @@ FaultyRun meet(const fs::path& recording, const SensorFault& fault) {
   outcome.summary = read_summary(folder.path() / "results/summary.json");
   const auto estimate = read_trajectory(folder.path() / "results/odometry.tum");
   const auto truth = read_trajectory(recording);
-  const auto pairs = associate(truth, estimate, {first, estimate.back().stamp}, 0.1, 0.01);
+  const auto pairs = associate(truth, estimate, {first, estimate.back().stamp});
   std::vector<PosePair> fitted;
   for (const PosePair& pair : pairs)
     if (pair.stamp < begin) fitted.push_back(pair);
