@@ -11,10 +11,10 @@
 
 #include "apps/evaluate/commands.hpp"
 #include "apps/evaluate/inputs.hpp"
+#include "apps/evaluate/map_quality.hpp"
 #include "apps/evaluate/surface_image.hpp"
 #include "apps/output_file.hpp"
 #include "apps/stage_progress.hpp"
-#include "modules/evaluation/mesh/map_quality.hpp"
 #include "modules/evaluation/mesh/mesh_error.hpp"
 #include "modules/evaluation/mesh/mesh_report.hpp"
 #include "modules/evaluation/trajectory_file.hpp"

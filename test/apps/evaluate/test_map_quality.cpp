@@ -1,4 +1,4 @@
-#include "modules/evaluation/mesh/map_quality.hpp"
+#include "apps/evaluate/map_quality.hpp"
 #include "test/modules/evaluation/mesh/shapes.hpp"
 #include "test/support/test.hpp"
 
