@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "modules/core/lie.hpp"
-#include "modules/evaluation/statistics.hpp"
+#include "modules/core/quantile.hpp"
 
 namespace km {
 namespace {

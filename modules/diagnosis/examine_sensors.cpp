@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "modules/core/lie.hpp"
+#include "modules/core/quantile.hpp"
 #include "modules/core/text_table.hpp"
 #include "modules/diagnosis/acceleration_fit.hpp"
 #include "modules/diagnosis/doubt_finding.hpp"
@@ -15,7 +16,6 @@
 #include "modules/diagnosis/image_rotation.hpp"
 #include "modules/diagnosis/inertial_fit.hpp"
 #include "modules/diagnosis/stereo_fit.hpp"
-#include "modules/evaluation/statistics.hpp"
 #include "modules/recordings/bag_summary.hpp"
 #include "modules/sensors/stream_stamps.hpp"
 #include "modules/sensors/usual_numbers.hpp"

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "modules/core/lie.hpp"
-#include "modules/evaluation/statistics.hpp"
+#include "modules/core/quantile.hpp"
 
 namespace km {
 namespace {

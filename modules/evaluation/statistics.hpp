@@ -3,8 +3,6 @@
 #include <cstddef>
 #include <vector>
 
-#include "modules/core/quantile.hpp"
-
 namespace km {
 
 /// Summary of a sample of magnitudes. All values are zero for an empty sample.

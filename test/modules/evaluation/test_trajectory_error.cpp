@@ -1,6 +1,7 @@
 #include <nlohmann/json.hpp>
 
 #include "modules/core/lie.hpp"
+#include "modules/core/quantile.hpp"
 #include "modules/core/stamped_pose.hpp"
 #include "modules/evaluation/association.hpp"
 #include "modules/evaluation/trajectory_error.hpp"
