@@ -157,10 +157,8 @@ struct KeyframeRecord {
 /// measured poses follow. Below are the totals for recall.
 [[nodiscard]] std::string to_table(const ClosureScores& scores);
 
-/// The scores as one JSON object: {true_pairs, true_frames, unjudged, candidates:
-/// {judged, correct, beyond_limits, precision, pairs_found, pair_recall, frames_found,
-/// frame_recall, translation_error_m: {...}, rotation_error_deg: {...}}, verified: {...}, inliers:
-/// {...}, by_angle: [{from_deg, to_deg, true_pairs, pairs_found}, ...]}.
+/// The scores as one JSON object, with the names of the members of ClosureScores and StageScore.
+/// Errors of a stage without measured poses are null.
 void to_json(Json& json, const ClosureScores& scores);
 
 }  // namespace km

@@ -13,11 +13,7 @@ namespace km {
 /// number.
 [[nodiscard]] std::string to_table(const MeshReport& report, const LabelPalette& palette);
 
-/// The report as one JSON object: {registration: {...}, samples_per_m2, robots: [{name, area_m2,
-/// faces, coverage, seen_coverage, beyond, truth_to_estimate: {point: {mean_m, ...}, surface:
-/// {...}, labels: {right, ..., classes: [...]}}, seen_truth_to_estimate: {...}, estimate_to_truth:
-/// {...}}], merged: {...}, notes}. Labels that are not judged and numbers of empty samples are
-/// null.
+/// The report as one JSON object. Labels that are not judged and numbers of empty samples are null.
 [[nodiscard]] Json to_json(const MeshReport& report, const LabelPalette& palette);
 
 }  // namespace km
