@@ -5,6 +5,7 @@
 #include "modules/map_2d/map_server_files.hpp"
 #include "modules/map_2d/node/map_2d_node.hpp"
 #include "test/support/nav2_map.hpp"
+#include "test/support/planned_path.hpp"
 #include "test/support/test.hpp"
 
 namespace km {
@@ -201,43 +202,6 @@ void look_from(const Eigen::Vector3d& eye, const Eigen::AlignedBox3d& box,
   views.insert(views.end(), 2, view);
 }
 
-// The shortest path through free cells with no occupied one within 0.2 m, by A*.
-std::vector<Eigen::Vector2d> planned(const OccupancyGrid& grid, const Eigen::Vector2d& from,
-                                     const Eigen::Vector2d& to) {
-  using Cell = std::array<int, 2>;
-  const auto cell_at = [&](const Eigen::Vector2d& p) {
-    const Eigen::Vector2i cell = ((p - grid.origin) / grid.resolution_m).cast<int>();
-    return Cell{cell.x(), cell.y()};
-  };
-  const auto point_of = [&](const Cell& cell) -> Eigen::Vector2d {
-    return grid.origin + grid.resolution_m * Eigen::Vector2d(cell[0] + 0.5, cell[1] + 0.5);
-  };
-  const auto is_usable = [&](const Cell& cell) {
-    bool usable = grid.at(point_of(cell)) == kFree;
-    for (int x = -4; x <= 4; ++x)
-      for (int y = -4; y <= 4; ++y)
-        usable = usable && grid.at(point_of({cell[0] + x, cell[1] + y})) != kOccupied;
-    return usable;
-  };
-  const Cell start = cell_at(from), goal = cell_at(to);
-  std::map<Cell, std::pair<double, Cell>> best{{start, {0.0, start}}};  // length, predecessor
-  std::set<std::pair<double, Cell>> open{{0.0, start}};
-  while (!open.empty() && open.begin()->second != goal) {
-    const Cell cell = open.extract(open.begin()).value().second;
-    for (int k = 0; k < 9; ++k) {
-      const Cell next{cell[0] + k % 3 - 1, cell[1] + k / 3 - 1};
-      const double length = best[cell].first + (point_of(next) - point_of(cell)).norm();
-      if (!is_usable(next) || (best.contains(next) && best[next].first <= length)) continue;
-      best[next] = {length, cell};
-      open.emplace(length + (point_of(next) - point_of(goal)).norm(), next);
-    }
-  }
-  std::vector<Eigen::Vector2d> path;
-  if (open.empty()) return path;
-  for (Cell cell = goal; cell != start; cell = best[cell].second) path.push_back(point_of(cell));
-  return path;
-}
-
 TEST_CASE("A path through free cells does not touch a box of which only the front is mapped") {
   const Eigen::AlignedBox3d box(Eigen::Vector3d(4, 1.5, 0), Eigen::Vector3d(6, 4.5, 0.9));
   Surfaces surfaces;
@@ -249,7 +213,7 @@ TEST_CASE("A path through free cells does not touch a box of which only the fron
     look_from(eye, box, views);
   const std::vector<SE3> T_world_odom(1, SE3::Identity());
   const OccupancyGrid grid = make_map_2d({}, {surfaces.mesh, palette(), views, T_world_odom}).grid;
-  const std::vector<Eigen::Vector2d> path = planned(grid, {1, 3}, {7.5, 3});
+  const std::vector<Eigen::Vector2d> path = planned_path(grid, {1, 3}, {7.5, 3});
   REQUIRE_FALSE(path.empty());
   for (const Eigen::Vector2d& p : path)
     CHECK_FALSE(box.contains(Eigen::Vector3d(p.x(), p.y(), 0.1)));
