@@ -483,6 +483,9 @@ void Vio::add_first_keyframe(const OdometryState& state, VioResult& result) {
   publish(keyframe, state, result);
 }
 
+// The step is not refined while its keyframes stay in the window. ATE of optimised keyframes with
+// (and without) that: MH_01 5.0 (5.0) mm, TartanAir's hospital 15.6 (14.6) mm. The kitchen has 45.8
+// (46.5) mm, desk_c 32.6 (26.1) mm.
 void Vio::add_keyframe(const OdometryState& state, VioResult& result) {
   const auto relative = smoother_.relative_pose(last_keyframe_->stamp, state.stamp);
   // Without an inertial sensor the window understates the error of the rotation on KITTI.
