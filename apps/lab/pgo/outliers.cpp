@@ -136,7 +136,8 @@ How far are the poses of a team of robots from those without any false closure?
 
 FILE is as in kimera_multi_pgo solve, but its verticals are left out. A share of 30 adds 30
 false closures for every 100 true ones. They join uniformly drawn pairs of poses, with
-uniform rotation and translation, and the weights of a true closure.
+uniform rotation and translation, and the weights of a true closure. The closures of FILE
+itself count as true: figures of a FILE with false ones mean nothing.
 
 Methods:
   robots     the robots' own code, from measurements to published poses
