@@ -10,6 +10,7 @@ namespace {
 constexpr int kShareSteps = 5;
 constexpr double kLeastSide_m = 1.0;  // side of the volume for false closures
 constexpr double kLeastShare = 0.02;
+constexpr double kSomeTrue = 0.04;  // share of cycles
 // exp() of a larger log density ratio overflows.
 constexpr double kLargestLogRatio = 600.0;
 
@@ -65,6 +66,24 @@ double ClosureVolume::of(int dimension) const {
   const Eigen::Array3d sides =
       below_.sizes().array() + above_.sizes().array() + 2.0 * reach_m_ + kLeastSide_m;
   return sides.head(dimension).prod();
+}
+
+std::vector<double> log_densities_if_near(std::span<const Vector6> errors,
+                                          std::span<const double> as_claimed,
+                                          const std::vector<double>& uniform, int dimension) {
+  double squares = 0.0, gain = 0.0;
+  for (const Vector6& e : errors) squares += e.tail<3>().squaredNorm();
+  const double variance = squares / static_cast<double>(dimension * std::ssize(errors));
+  const double log_scale = 0.5 * dimension * std::log(2.0 * std::numbers::pi * variance);
+  std::vector<double> normal, ratios;
+  for (std::size_t k = 0; k < errors.size(); ++k) {
+    normal.push_back(log_density_if_false(errors[k], 1.0, dimension) - log_scale -
+                     0.5 * errors[k].tail<3>().squaredNorm() / variance);
+    ratios.push_back(as_claimed[k] - normal.back());
+    gain += normal.back() - uniform[k];
+  }
+  const std::vector<double> weights(errors.size(), 1.0);
+  return gain > 0.0 && fit_cycle_mixture(ratios, weights).share > kSomeTrue ? normal : uniform;
 }
 
 }  // namespace km

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <array>
 #include <span>
+#include <vector>
 
 #include "modules/core/geometry.hpp"
 
@@ -45,6 +47,18 @@ class ClosureVolume {
   Eigen::AlignedBox3d below_, above_;
   double reach_m_ = 0.0;
 };
+
+/// Log densities of the errors of cycles if they are false, and false closures end near each other:
+/// their translations are normal with the variance of all. `uniform`: their log densities by
+/// log_density_if_false(). This is the result unless the normal ones are more likely, and some
+/// cycles are true with odometry as claimed, with the log densities `as_claimed`.
+[[nodiscard]] std::vector<double> log_densities_if_near(std::span<const Vector6> errors,
+                                                        std::span<const double> as_claimed,
+                                                        const std::vector<double>& uniform,
+                                                        int dimension);
+
+/// Factors on the noise of closures beside which the noise of odometry is estimated.
+inline constexpr std::array kNoiseOfClosures{1.0, 2.0, 4.0, 8.0};
 
 // Priors that fits of noise share.
 inline constexpr double kMostlyTrue = 0.5;  ///< Share of true cycles from which on most are true.

@@ -65,10 +65,10 @@ struct OdometryCycle {
   std::array<Matrix6, 2> of_closures = {Matrix6::Zero(), Matrix6::Zero()};
   double weight = 1.0;  ///< Number of independent observations.
 
-  [[nodiscard]] Matrix6 claimed() const {
-    Matrix6 Sigma = Matrix6::Zero();
-    for (const Matrix6& part : covariance) Sigma += part;
-    return Sigma;
+  /// Covariance of `error` with odometry as claimed and closures `noise` times noisier.
+  [[nodiscard]] Matrix6 claimed(double noise = 1.0) const {
+    return covariance[kRotation] + covariance[kTranslation] +
+           noise * noise * (covariance[kClosure] + covariance[kTwoClosures]);
   }
 };
 

@@ -24,7 +24,6 @@ constexpr std::size_t kNearestPlaces = 3;  // cycles of a place with other place
 constexpr std::size_t kPlacesBeside = 8;   // places before and after, among which the nearest are
 constexpr std::size_t kMostPlaces = 60;    // bounds the time
 constexpr std::size_t kEnoughPlaces = 3;
-constexpr std::size_t kClosureLevels = 4;
 // Log of odds. A precise robot that seems noisy loses little, and a noisy one that seems precise
 // loses true closures.
 constexpr double kTenToOne = 2.3;
@@ -256,6 +255,50 @@ double refined_noise(std::span<const PairVote> votes, const Levels& levels, Robo
   return std::exp2(static_cast<double>(level) + offset);
 }
 
+// The same cycles, if false ones may end near each other: see log_densities_if_near().
+std::vector<PairCycle> if_near(std::vector<PairCycle> cycles, int dimension) {
+  std::vector<Vector6> errors;
+  std::vector<double> as_claimed, uniform;
+  for (const PairCycle& cycle : cycles) {
+    errors.push_back(cycle.error);
+    uniform.push_back(cycle.log_if_false);
+    double most = -std::numeric_limits<double>::infinity();
+    for (const double noise : kNoiseOfClosures)
+      most = std::max(most, log_ratio_with(cycle, 1.0, 1.0, noise, dimension));
+    as_claimed.push_back(most + uniform.back());
+  }
+  const auto near = log_densities_if_near(errors, as_claimed, uniform, dimension);
+  for (std::size_t k = 0; k < cycles.size(); ++k) cycles[k].log_if_false = near[k];
+  return cycles;
+}
+
+// See odometry_evidence(). Empty if most cycles are false.
+std::vector<float> evidence_of(const std::vector<PairCycle>& cycles,
+                               const std::vector<double>& weights, bool a_is_first, int dimension) {
+  std::vector<float> evidence;
+  double most = -std::numeric_limits<double>::infinity(), share = 0.0;
+  constexpr int kLevels = kNoiseLevels;
+  for (int i = 0; i < kLevels; ++i)
+    for (int j = 0; j < kLevels; ++j) {
+      double best = -std::numeric_limits<double>::infinity();
+      for (const double noise : kNoiseOfClosures) {
+        std::vector<double> ratios;
+        for (const PairCycle& cycle : cycles)
+          ratios.push_back(log_ratio_with(cycle, std::ldexp(1.0, a_is_first ? i : j),
+                                          std::ldexp(1.0, a_is_first ? j : i), noise, dimension));
+        const CycleMixture mixture = fit_cycle_mixture(ratios, weights);
+        const double found = mixture.log_likelihood + log_prior(std::log2(noise));
+        best = std::max(best, found);
+        if (!(found > most)) continue;
+        most = found;
+        share = mixture.share;
+      }
+      if (!std::isfinite(best)) return {};
+      evidence.push_back(static_cast<float>(best));
+    }
+  return share > kMostlyTrue ? evidence : std::vector<float>();
+}
+
 }  // namespace
 
 std::vector<float> odometry_evidence(std::span<const PoseEdge> closures,
@@ -269,29 +312,8 @@ std::vector<float> odometry_evidence(std::span<const PoseEdge> closures,
       std::min(1.0, static_cast<double>(places.size() - 1) / static_cast<double>(cycles.size()));
   const std::vector<double> weights(cycles.size(), weight);
   const bool a_is_first = places.front().lower.robot < places.front().upper.robot;
-  std::vector<float> evidence;
-  double most = -std::numeric_limits<double>::infinity(), share = 0.0;
-  constexpr int kLevels = kNoiseLevels;
-  for (int i = 0; i < kLevels; ++i)
-    for (int j = 0; j < kLevels; ++j) {
-      double best = -std::numeric_limits<double>::infinity();
-      for (std::size_t c = 0; c < kClosureLevels; ++c) {
-        std::vector<double> ratios;
-        for (const PairCycle& cycle : cycles)
-          ratios.push_back(log_ratio_with(cycle, std::ldexp(1.0, a_is_first ? i : j),
-                                          std::ldexp(1.0, a_is_first ? j : i),
-                                          std::ldexp(1.0, static_cast<int>(c)), dimension));
-        const CycleMixture mixture = fit_cycle_mixture(ratios, weights);
-        const double found = mixture.log_likelihood + log_prior(static_cast<double>(c));
-        best = std::max(best, found);
-        if (!(found > most)) continue;
-        most = found;
-        share = mixture.share;
-      }
-      if (!std::isfinite(best)) return {};
-      evidence.push_back(static_cast<float>(best));
-    }
-  return share > kMostlyTrue ? evidence : std::vector<float>();
+  if (evidence_of(if_near(cycles, dimension), weights, a_is_first, dimension).empty()) return {};
+  return evidence_of(cycles, weights, a_is_first, dimension);
 }
 
 std::map<RobotId, double> likely_odometry_noise(std::span<const PairVote> pairs) {

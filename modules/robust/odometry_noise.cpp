@@ -99,6 +99,21 @@ struct Cycles {
     for (const Cycle& cycle : cycles)
       if_false.push_back(log_density_if_false(cycle.error, volume, dimension));
   }
+  // The same cycles, if false ones may end near each other: see log_densities_if_near().
+  [[nodiscard]] Cycles near() const {
+    std::vector<Vector6> errors;
+    std::vector<double> as_claimed;
+    for (const Cycle& cycle : cycles) {
+      errors.push_back(cycle.error);
+      double most = -std::numeric_limits<double>::infinity();
+      for (const double noise : kNoiseOfClosures)
+        most = std::max(most, log_density_if_true(cycle.error, cycle.claimed(noise), dimension));
+      as_claimed.push_back(most);
+    }
+    Cycles all = *this;
+    all.if_false = log_densities_if_near(errors, as_claimed, if_false, dimension);
+    return all;
+  }
 };
 
 std::vector<double> log_ratios(const Cycles& all, const Factors& v) {
@@ -256,6 +271,10 @@ double noise_beside_odometry(const Cycles& all, double otherwise) {
   return likely && best >= kLeastBeside ? best : 1.0;
 }
 
+bool is_noisy(const FactorFit& fit) {
+  return fit.log_odds >= kThousandToOne && fit.share > kMostlyTrue;
+}
+
 }  // namespace
 
 OdometryNoise estimate_odometry_noise(std::span<const PoseEdge> steps,
@@ -270,7 +289,8 @@ OdometryNoise estimate_odometry_noise(std::span<const PoseEdge> steps,
     noise.beside = noise_beside_odometry({cycles, volume, dimension}, fit.log_posterior);
     return noise;
   }
-  if (!(fit.share > kMostlyTrue)) return noise;
+  const Cycles all{cycles, volume, dimension};
+  if (!is_noisy(fit) || !is_noisy(fit_factors(all.near()))) return noise;
   const std::vector<Cycle> near = short_cycles(chain, closures);
   std::vector<Cycle> normal = with_normal_errors(cycles, fit.factors, dimension);
   // If most cycles of one closure are left out, noise of closures alone may explain the cycles of

@@ -148,6 +148,19 @@ TEST_CASE("False closures neither increase the estimated noise of odometry nor h
   CHECK(factor(noise.translation, scale) < (scale > 1.0 ? 3.0 : 2.2));
 }
 
+TEST_CASE("Random closures that end near each other are no noise of odometry") {
+  const unsigned seed = GENERATE(range(1U, 61U));
+  const int dimension = GENERATE(2, 3);
+  CAPTURE(seed, dimension);
+  Walk walk(seed, dimension);
+  walk.walk(1.0, 1.0);
+  walk.close(50);
+  walk.add_false(40);
+  const OdometryNoise noise = walk.noise();
+  CHECK(noise.rotation == 1.0);
+  CHECK(noise.translation == 1.0);
+}
+
 TEST_CASE("A wrong place counts once, however many closures it has") {
   Walk walk(1);
   walk.walk(1.0, 1.0);
