@@ -10,7 +10,7 @@ namespace {
 constexpr int kShareSteps = 5;
 constexpr double kLeastSide_m = 1.0;  // side of the volume for false closures
 constexpr double kLeastShare = 0.02;
-constexpr double kSomeTrue = 0.04;  // share of cycles
+constexpr double kSomeTrue = 2.0 * kLeastShare;  // a smaller share may be that of no cycle
 // exp() of a larger log density ratio overflows.
 constexpr double kLargestLogRatio = 600.0;
 

@@ -25,7 +25,8 @@ constexpr std::size_t kPlacesBeside = 8;   // places before and after, among whi
 constexpr std::size_t kMostPlaces = 60;    // bounds the time
 constexpr std::size_t kEnoughPlaces = 3;
 // Log of odds. A precise robot that seems noisy loses little, and a noisy one that seems precise
-// loses true closures.
+// loses true closures. At 1000 to 1, one of 54 buildings in which a robot is 3 times noisier than
+// it claims has 4.1 times the error of the reference. At 10 to 1 it has 1.0 times.
 constexpr double kTenToOne = 2.3;
 
 double log_prior(double level) {
