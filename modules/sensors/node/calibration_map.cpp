@@ -1,6 +1,5 @@
 #include "modules/sensors/node/calibration_map.hpp"
 
-#include <yaml-cpp/yaml.h>
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -12,6 +11,7 @@
 #include "modules/core/calibration_limits.hpp"
 #include "modules/core/text_rows.hpp"
 #include "modules/sensors/text_file.hpp"
+#include "runtime/yaml_config.hpp"
 
 namespace km {
 namespace {
