@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 namespace km {
@@ -68,22 +69,29 @@ double ClosureVolume::of(int dimension) const {
   return sides.head(dimension).prod();
 }
 
-std::vector<double> log_densities_if_near(std::span<const Vector6> errors,
-                                          std::span<const double> as_claimed,
-                                          const std::vector<double>& uniform, int dimension) {
+std::optional<std::vector<double>> log_densities_if_near(
+    std::span<const Vector6> errors, const std::vector<double>& uniform,
+    const std::function<double(std::size_t, double)>& log_if_true, int dimension) {
   double squares = 0.0, gain = 0.0;
   for (const Vector6& e : errors) squares += e.tail<3>().squaredNorm();
   const double variance = squares / static_cast<double>(dimension * std::ssize(errors));
   const double log_scale = 0.5 * dimension * std::log(2.0 * std::numbers::pi * variance);
-  std::vector<double> normal, ratios;
+  std::vector<double> normal;
   for (std::size_t k = 0; k < errors.size(); ++k) {
     normal.push_back(log_density_if_false(errors[k], 1.0, dimension) - log_scale -
                      0.5 * errors[k].tail<3>().squaredNorm() / variance);
-    ratios.push_back(as_claimed[k] - normal.back());
     gain += normal.back() - uniform[k];
   }
+  if (!(gain > 0.0)) return std::nullopt;
+  std::vector<double> ratios;
+  for (std::size_t k = 0; k < errors.size(); ++k) {
+    double most = -std::numeric_limits<double>::infinity();
+    for (const double noise : kNoiseOfClosures) most = std::max(most, log_if_true(k, noise));
+    ratios.push_back(most - normal[k]);
+  }
   const std::vector<double> weights(errors.size(), 1.0);
-  return gain > 0.0 && fit_cycle_mixture(ratios, weights).share > kSomeTrue ? normal : uniform;
+  if (!(fit_cycle_mixture(ratios, weights).share > kSomeTrue)) return std::nullopt;
+  return normal;
 }
 
 }  // namespace km

@@ -2,6 +2,9 @@
 
 #include <Eigen/Geometry>
 #include <array>
+#include <cstddef>
+#include <functional>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -50,12 +53,11 @@ class ClosureVolume {
 
 /// Log densities of the errors of cycles if they are false, and false closures end near each other:
 /// their translations are normal with the variance of all. `uniform`: their log densities by
-/// log_density_if_false(). This is the result unless the normal ones are more likely, and some
-/// cycles are true with odometry as claimed, with the log densities `as_claimed`.
-[[nodiscard]] std::vector<double> log_densities_if_near(std::span<const Vector6> errors,
-                                                        std::span<const double> as_claimed,
-                                                        const std::vector<double>& uniform,
-                                                        int dimension);
+/// log_density_if_false(). nullopt unless the normal ones are more likely, and some cycles are true
+/// with odometry as claimed. `log_if_true` takes the index of a cycle and one of kNoiseOfClosures.
+[[nodiscard]] std::optional<std::vector<double>> log_densities_if_near(
+    std::span<const Vector6> errors, const std::vector<double>& uniform,
+    const std::function<double(std::size_t, double)>& log_if_true, int dimension);
 
 /// Factors on the noise of closures beside which the noise of odometry is estimated.
 inline constexpr std::array kNoiseOfClosures{1.0, 2.0, 4.0, 8.0};

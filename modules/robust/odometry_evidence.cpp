@@ -256,20 +256,20 @@ double refined_noise(std::span<const PairVote> votes, const Levels& levels, Robo
   return std::exp2(static_cast<double>(level) + offset);
 }
 
-// The same cycles, if false ones may end near each other: see log_densities_if_near().
-std::vector<PairCycle> if_near(std::vector<PairCycle> cycles, int dimension) {
+// The same cycles, if false ones end near each other: see log_densities_if_near().
+std::optional<std::vector<PairCycle>> if_near(std::vector<PairCycle> cycles, int dimension) {
   std::vector<Vector6> errors;
-  std::vector<double> as_claimed, uniform;
+  std::vector<double> uniform;
   for (const PairCycle& cycle : cycles) {
     errors.push_back(cycle.error);
     uniform.push_back(cycle.log_if_false);
-    double most = -std::numeric_limits<double>::infinity();
-    for (const double noise : kNoiseOfClosures)
-      most = std::max(most, log_ratio_with(cycle, 1.0, 1.0, noise, dimension));
-    as_claimed.push_back(most + uniform.back());
   }
-  const auto near = log_densities_if_near(errors, as_claimed, uniform, dimension);
-  for (std::size_t k = 0; k < cycles.size(); ++k) cycles[k].log_if_false = near[k];
+  const auto log_if_true = [&](std::size_t k, double noise) {
+    return log_ratio_with(cycles[k], 1.0, 1.0, noise, dimension) + uniform[k];
+  };
+  const auto normal = log_densities_if_near(errors, uniform, log_if_true, dimension);
+  if (!normal) return std::nullopt;
+  for (std::size_t k = 0; k < cycles.size(); ++k) cycles[k].log_if_false = (*normal)[k];
   return cycles;
 }
 
@@ -313,7 +313,8 @@ std::vector<float> odometry_evidence(std::span<const PoseEdge> closures,
       std::min(1.0, static_cast<double>(places.size() - 1) / static_cast<double>(cycles.size()));
   const std::vector<double> weights(cycles.size(), weight);
   const bool a_is_first = places.front().lower.robot < places.front().upper.robot;
-  if (evidence_of(if_near(cycles, dimension), weights, a_is_first, dimension).empty()) return {};
+  const std::optional<std::vector<PairCycle>> near = if_near(cycles, dimension);
+  if (near && evidence_of(*near, weights, a_is_first, dimension).empty()) return {};
   return evidence_of(cycles, weights, a_is_first, dimension);
 }
 

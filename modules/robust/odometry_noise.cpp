@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include "modules/robust/closure_places.hpp"
@@ -99,19 +101,17 @@ struct Cycles {
     for (const Cycle& cycle : cycles)
       if_false.push_back(log_density_if_false(cycle.error, volume, dimension));
   }
-  // The same cycles, if false ones may end near each other: see log_densities_if_near().
-  [[nodiscard]] Cycles near() const {
+  // The same cycles, if false ones end near each other: see log_densities_if_near().
+  [[nodiscard]] std::optional<Cycles> near() const {
     std::vector<Vector6> errors;
-    std::vector<double> as_claimed;
-    for (const Cycle& cycle : cycles) {
-      errors.push_back(cycle.error);
-      double most = -std::numeric_limits<double>::infinity();
-      for (const double noise : kNoiseOfClosures)
-        most = std::max(most, log_density_if_true(cycle.error, cycle.claimed(noise), dimension));
-      as_claimed.push_back(most);
-    }
+    for (const Cycle& cycle : cycles) errors.push_back(cycle.error);
+    const auto log_if_true = [&](std::size_t k, double noise) {
+      return log_density_if_true(cycles[k].error, cycles[k].claimed(noise), dimension);
+    };
+    auto normal = log_densities_if_near(errors, if_false, log_if_true, dimension);
+    if (!normal) return std::nullopt;
     Cycles all = *this;
-    all.if_false = log_densities_if_near(errors, as_claimed, if_false, dimension);
+    all.if_false = std::move(*normal);
     return all;
   }
 };
@@ -289,8 +289,8 @@ OdometryNoise estimate_odometry_noise(std::span<const PoseEdge> steps,
     noise.beside = noise_beside_odometry({cycles, volume, dimension}, fit.log_posterior);
     return noise;
   }
-  const Cycles all{cycles, volume, dimension};
-  if (!is_noisy(fit) || !is_noisy(fit_factors(all.near()))) return noise;
+  const std::optional<Cycles> near_each_other = Cycles{cycles, volume, dimension}.near();
+  if (!is_noisy(fit) || (near_each_other && !is_noisy(fit_factors(*near_each_other)))) return noise;
   const std::vector<Cycle> near = short_cycles(chain, closures);
   std::vector<Cycle> normal = with_normal_errors(cycles, fit.factors, dimension);
   // If most cycles of one closure are left out, noise of closures alone may explain the cycles of
