@@ -234,9 +234,9 @@ struct Recorded {
   std::size_t robots;  // 0: those of the recording
 };
 
-const auto kGraphs = {
-    Recorded{"pose_graphs/3d/sphere2500.g2o", 5}, Recorded{"pose_graphs/3d/torus3D.g2o", 5},
-    Recorded{"pose_graphs/2d/city10000.g2o", 5}, Recorded{"multi_robot/tunnels_8robots", 0}};
+const auto kGraphs = {Recorded{"pose_graphs/3d/sphere2500.g2o", 5},
+                      Recorded{"pose_graphs/2d/intel.g2o", 3},
+                      Recorded{"multi_robot/tunnels_8robots", 0}};
 // Enough for several updates of the weights. Second derivatives are sent in the first of them.
 constexpr int kRounds = 12;
 
