@@ -69,7 +69,7 @@ TEST_CASE("A pair of robots refuses closures beyond those that both keep") {
 }
 
 TEST_CASE("A robot that moves for hours in a known place has room for its newest closure") {
-  constexpr std::size_t kLap = 100, kKeyframes = 3000;
+  constexpr std::size_t kLap = 100, kKeyframes = 2000;
   Chain robot(0);
   for (std::size_t i = 1; i < kKeyframes; ++i) robot.step(rotz(0.0, i % kLap == 0 ? -99.0 : 1.0));
   WitnessedPair pair(0, 0, PcmConfig{});
