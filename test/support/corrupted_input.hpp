@@ -182,7 +182,7 @@ class InputCorrupter {
 /// it.
 [[nodiscard]] inline unsigned corrupted_files() {
   const char* const wanted = std::getenv("KIMERA_MULTI_CORRUPTED_FILES");
-  return wanted == nullptr ? 300U : static_cast<unsigned>(std::atoi(wanted));
+  return wanted == nullptr ? 100U : static_cast<unsigned>(std::atoi(wanted));
 }
 
 /// Calls `read` with the valid text, which it must accept, and with many corrupted ones. It may

@@ -210,8 +210,7 @@ double relative_error_m(const Run& low, const Run& high, std::initializer_list<K
 TEST_CASE("fixes of all robots act on one frame if closures tie the robots") {
   TeamNetwork network;
   using enum PgoMethod;
-  const auto [method, seed] = GENERATE(std::pair(kNewton, 41U), std::pair(kNewton, 43U),
-                                       std::pair(kNewton, 45U), std::pair(kRbcd, 41U));
+  const auto [method, seed] = GENERATE(std::pair(kNewton, 43U), std::pair(kRbcd, 41U));
   CAPTURE(seed, method);
   Run low(network, 3, seed, true, method), high(network, 6, seed + 1, true, method);
   const Eigen::Vector3d east(0.1, 0.0, 0.0);

@@ -372,18 +372,18 @@ TEST_CASE("Without features odometry waits for images to start with") {
   CHECK_FALSE(feed(vio, ride, 70, 140).states.empty());
 }
 
-TEST_CASE("During a minute at rest the pose does not move and no keyframes are made") {
+TEST_CASE("During half a minute at rest the pose does not move and no keyframes are made") {
   Ride ride(Glide{.begin_s = 1e3});
   Vio vio = ride.vio();
-  const VioResult result = feed(vio, ride, 0, 1200);
+  const VioResult result = feed(vio, ride, 0, 600);
   CHECK(result.start == StartStatus::kAtRest);
   CHECK(result.problem == VioProblem::kNone);
   CHECK(vio.statistics().rests == 1);
   // There is a second keyframe if the first leaves the window before the rest is detected.
   CHECK(result.keyframes.size() <= 2);
   CHECK(result.keyframes.back().stamp <= 2'000'000'000);
-  REQUIRE(result.states.size() == 1200);
-  REQUIRE(result.frames.size() == 1200);
+  REQUIRE(result.states.size() == 600);
+  REQUIRE(result.frames.size() == 600);
   const SE3 first = result.states.front().T_odom_body;
   for (const OdometryState& state : result.states) {
     const SE3 T = first.inverse() * state.T_odom_body;
@@ -397,12 +397,12 @@ TEST_CASE("During a minute at rest the pose does not move and no keyframes are m
 }
 
 TEST_CASE("After a rest the next keyframe is measured from the one before it") {
-  const Glide glide{.begin_s = 30.0};
+  const Glide glide{.begin_s = 15.0};
   Ride ride(glide);
   Vio vio = ride.vio();
-  (void)feed(vio, ride, 0, 600);
+  (void)feed(vio, ride, 0, 300);
   CHECK(vio.statistics().rests == 1);
-  const VioResult result = feed(vio, ride, 600, 680);
+  const VioResult result = feed(vio, ride, 300, 380);
   REQUIRE(result.states.size() == 80);  // all images have a pose
   REQUIRE(result.keyframes.size() >= 5);
   Stamp before = 0;  // the start's keyframe
@@ -410,7 +410,7 @@ TEST_CASE("After a rest the next keyframe is measured from the one before it") {
     const SE3 T = ride.T_world_body(before).inverse() * ride.T_world_body(keyframe.stamp);
     CHECK(std::abs(keyframe.T_previous_kf.translation().norm() - T.translation().norm()) < 0.01);
     CHECK(is_covariance(keyframe.covariance));
-    // 30 s at rest are no drift.
+    // 15 s at rest are no drift.
     CHECK(keyframe.covariance.diagonal().tail<3>().maxCoeff() < 0.015 * 0.015);
     before = keyframe.stamp;
   }
@@ -419,9 +419,9 @@ TEST_CASE("After a rest the next keyframe is measured from the one before it") {
 }
 
 TEST_CASE("Slow motion does not shorten the trajectory") {
-  // 2.5, 10 and 25 mm/s on average
+  // 2.5 and 25 mm/s on average
   const auto [distance_m, duration_s] =
-      GENERATE(table<double, double>({{0.05, 20.0}, {0.1, 10.0}, {0.25, 10.0}}));
+      GENERATE(table<double, double>({{0.05, 20.0}, {0.25, 10.0}}));
   constexpr double kMargin_m = 0.01;
   CAPTURE(distance_m);
   Ride ride(Glide{.begin_s = 3.0, .duration_s = duration_s, .distance_m = distance_m});

@@ -94,7 +94,7 @@ DriveSummary summarise(const BodyTrajectory& drive, const Route& route) {
 }
 
 TEST_CASE("A vehicle on level ground keeps to the limits and to its route") {
-  VehicleOptions options{.seed = GENERATE(1U, 2U, 3U, 4U, 5U)};
+  VehicleOptions options{.seed = GENERATE(1U, 5U)};
   CAPTURE(options.seed);
   options.rig_height_m = 0.0;  // the point on the ground, for which the limits hold
   options.start_m = 25.0 * static_cast<double>(options.seed);

@@ -210,15 +210,18 @@ TEST_CASE("A moved car is at its pose in the images of labels and depth") {
     nearest_m = std::min(nearest_m, static_cast<float>(p.z()));
   }
   float depth_m = 1e9F;
+  constexpr auto kVehicle = static_cast<LabelId>(SurfaceClass::kVehicle);
+  std::size_t wrong = 0;
   for (std::size_t i = 0; i < with.labels.size(); ++i) {
-    CHECK(without.labels[i] != static_cast<LabelId>(SurfaceClass::kVehicle));
-    if (with.labels[i] != static_cast<LabelId>(SurfaceClass::kVehicle)) {
-      REQUIRE(with.depth_m[i] == without.depth_m[i]);
+    wrong += without.labels[i] == kVehicle ? 1 : 0;
+    if (with.labels[i] != kVehicle) {
+      wrong += with.depth_m[i] == without.depth_m[i] ? 0 : 1;
       continue;
     }
     seen.extend(Eigen::Vector2d(static_cast<double>(i % 160), static_cast<double>(i / 160)));
     depth_m = std::min(depth_m, with.depth_m[i]);
   }
+  CHECK(wrong == 0);
   REQUIRE_FALSE(seen.isEmpty());
   // A pixel belongs to the car if its centre does; corners narrower than a pixel may be missed.
   CHECK((seen.min() - projected.min()).cwiseAbs().maxCoeff() < 1.5);
