@@ -25,7 +25,7 @@ void ConfigLayers::add_document(const YAML::Node& document, const std::string& o
 }
 
 void ConfigLayers::add_override(const std::string& assignment) try {
-  const std::string where = "command line, " + assignment;
+  const std::string where = std::string(kCommandLine) + ", " + assignment;
   const std::size_t equals = assignment.find('=');
   const std::size_t dot = assignment.find('.');
   if (equals == std::string::npos || dot == std::string::npos || dot > equals || dot == 0 ||

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <sstream>
 
 #include "modules/core/input_file.hpp"
 #include "modules/core/text_rows.hpp"
@@ -54,12 +55,17 @@ void ConfigProblems::finish() const {
   std::string all = unknown + others;
   if (all.empty()) return;
   all.pop_back();  // the last newline
+  bool of_command_line = true;
+  std::istringstream lines(all);
+  for (std::string line; std::getline(lines, line);)
+    of_command_line = of_command_line && line.starts_with(kCommandLine);
   if (all.size() > kMaxMessage) {
     const std::size_t end = std::min(all.rfind('\n', kMaxMessage), kMaxMessage);
     const auto cut = std::count(all.begin() + static_cast<std::ptrdiff_t>(end), all.end(), '\n');
     all.resize(end);
     all += "\n... and " + std::to_string(cut) + " more problems";
   }
+  if (of_command_line) throw CommandLineError(all);
   throw ConfigError(all);
 }
 

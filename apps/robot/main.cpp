@@ -11,6 +11,7 @@
 #include "modules/core/input_file.hpp"
 #include "runtime/log.hpp"
 #include "runtime/unblocked_output.hpp"
+#include "runtime/yaml_config.hpp"
 
 namespace km {
 namespace {
@@ -264,5 +265,7 @@ int main(int argc, char** argv) try {
   return km::run_robot(options, signals);
 } catch (const std::exception& error) {
   km::unblocked_stderr() << "kimera_multi_robot: " << error.what() << std::endl;
-  return km::kBadInput;
+  if (dynamic_cast<const km::CommandLineError*>(&error) == nullptr) return km::kBadInput;
+  km::unblocked_stderr() << "Run with --help for more information." << std::endl;
+  return km::kBadCommandLine;
 }

@@ -109,7 +109,7 @@ TEST_CASE("Bad input and configuration end a robot with one clear message") {
   fails_with("", 2, "--dataset");
   fails_with("--dataset " + empty + " --resume " + empty + "/alcie", 1,
              "alcie: no such folder; --output");
-  fails_with("--dataset " + empty + " --set pcm.confidence=2", 1, "pcm.confidence");
+  fails_with("--dataset " + empty + " --set pcm.confidence=2", 2, "pcm.confidence");
   fails_with("--dataset " + empty + " --link carrier_pigeon", 1, "carrier_pigeon");
   const auto typo = folder.write("typo.yaml", "vio:\n  iteratons: 3\n");
   fails_with("--dataset " + empty + " --config " + typo.string(), 1, "typo.yaml:2");

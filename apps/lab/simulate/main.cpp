@@ -35,7 +35,6 @@ int main(int argc, char** argv) try {
   km::SimulationOptions options;
   km::define(app, options);
   if (const auto exit_code = km::parse_options(app, argc, argv)) return *exit_code;
-  options = km::completed(options);
   km::simulate(options);
   std::cout << "Complete: " << options.output.string() << "\nRun a team on it:\n  "
             << "kimera_multi_team --config " << (options.output / "team.yaml").string()

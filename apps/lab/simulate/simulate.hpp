@@ -4,9 +4,8 @@
 
 namespace km {
 
-/// Makes the recordings of `options`, or their missing parts. The options are a result of
-/// completed(). Unusable input and unwritable files throw an exception with a remedy in its
-/// message.
+/// Makes the recordings of `options`, or their missing parts. Unusable input and unwritable files
+/// throw an exception with a remedy in its message.
 void simulate(const SimulationOptions& options);
 
 }  // namespace km

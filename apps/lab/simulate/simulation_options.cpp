@@ -31,7 +31,7 @@ class OptionFields : public FieldVisitor<OptionFields> {
   void visit(const char* key, const T& value, const Accepted& accepted, std::string text) {
     const std::string name = std::string("--").append(key);
     const auto give = [this, key](const auto& written) {
-      given_.values.insert_or_assign(key, ConfigValue{YAML::Node(written), "", "command line"});
+      given_.values.insert_or_assign(key, ConfigValue{YAML::Node(written), "", kCommandLine});
     };
     if (required_.contains(key)) text += " (required)";
     if (!accepted.text().empty()) text += "; " + accepted.text();
@@ -85,26 +85,6 @@ bool is_resolution(const std::string& text) {
   return parse_resolution(text).has_value();
 }
 
-void define(CLI::App& app, SimulationOptions& options) {
-  struct Given {
-    explicit Given(CLI::App& app) : fields(app, given) {}
-    std::string file;
-    ConfigSection given{"command line", {}};
-    OptionFields fields;
-  };
-  const auto line = std::make_shared<Given>(app);
-  app.add_option("--config", line->file, "File of options, see config/simulation/");
-  options.visit_fields(line->fields);
-  app.callback([line, &options] {
-    try {
-      read_options(line->file, line->given, options);
-    } catch (const ConfigError& error) {
-      if (!line->file.empty()) throw;
-      throw CLI::ValidationError(error.what(), CLI::ExitCodes::ValidationError);
-    }
-  });
-}
-
 namespace {
 
 // "V1_02_medium" for "V1_02_medium.csv.gz", the folder's name for ".../V1_01/mav0/x/data.csv".
@@ -145,9 +125,8 @@ void complete_names(const SimulationOptions& options) {
   }
 }
 
-}  // namespace
-
-SimulationOptions completed(SimulationOptions options) {
+// Fills in derived values: names, the number of robots and the rate of depth images.
+void complete(SimulationOptions& options) {
   std::tie(options.width, options.height) = parse_resolution(options.resolution).value();
   if (options.is_recorded()) {
     complete_recorded(options);
@@ -168,7 +147,31 @@ SimulationOptions completed(SimulationOptions options) {
                                 shortest_text(options.depth_rate_hz));
   if (options.threads == 0)
     options.threads = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
-  return options;
+}
+
+}  // namespace
+
+void define(CLI::App& app, SimulationOptions& options) {
+  struct Given {
+    explicit Given(CLI::App& app) : fields(app, given) {}
+    std::string file;
+    ConfigSection given{kCommandLine, {}};
+    OptionFields fields;
+  };
+  const auto line = std::make_shared<Given>(app);
+  app.add_option("--config", line->file, "File of options, see config/simulation/");
+  options.visit_fields(line->fields);
+  app.callback([line, &options] {
+    try {
+      read_options(line->file, line->given, options);
+      complete(options);
+    } catch (const CommandLineError& error) {
+      throw CLI::ValidationError(error.what(), CLI::ExitCodes::ValidationError);
+    } catch (const std::invalid_argument& error) {
+      if (!line->file.empty()) throw;
+      throw CLI::ValidationError(error.what(), CLI::ExitCodes::ValidationError);
+    }
+  });
 }
 
 namespace {

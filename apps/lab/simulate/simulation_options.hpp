@@ -75,10 +75,11 @@ struct SimulationOptions {
         "Level of errors of sensors, clocks and calibration, and of clutter in the world");
     visitor.field("set", settings,
                   "Keys of single effects over those of the difficulty: section.key=value");
-    visitor.field("trajectory", truths, Input{},
+    visitor.field("trajectory", truths, Input{.must_exist = false},
                   "Recorded motion: true poses of flights, one file per robot: EuRoC's state CSV, "
                   "also gzipped; in the frame of the world");
-    visitor.field("imu", imus, Input{}, "The recorded inertial data, one CSV per --trajectory");
+    visitor.field("imu", imus, Input{.must_exist = false},
+                  "The recorded inertial data, one CSV per --trajectory");
     visitor.field("names", names, "Names of the robots of recorded motion (default: the files')");
     visitor.field("output", output, "Folder of the recordings; a stopped run is continued");
     visitor.field("threads", threads, {0, 256},
@@ -90,11 +91,8 @@ struct SimulationOptions {
 
 /// Adds the options to a command line, and --config for a file of them, a YAML map. The command
 /// line has priority over the file. All errors of both are reported together, by name and line.
+/// Derived values are filled in: names, the number of robots and the rate of depth images.
 void define(CLI::App& app, SimulationOptions& options);
-
-/// Options with derived values filled in: names, the number of robots and the rate of depth images.
-/// Throws std::invalid_argument for contradicting options.
-[[nodiscard]] SimulationOptions completed(SimulationOptions options);
 
 /// All parameters that the bytes of the recordings depend on; neither the threads nor the output
 /// folder.
