@@ -52,13 +52,19 @@ JournalNode::JournalNode(std::filesystem::path file, ResultWriter& results,
     places_ = restored->places;
   }
   for (int copy = 0; copy < 2; ++copy) add(start);  // nothing can be restored without it
-  follow(topics.states, topics.odometry, topics.new_closures, topics.new_restarts, topics.outcomes);
+  follow(topics.states, topics.odometry);
+  // By the threads of their nodes: loop closure waits for no room in the queue of this node, which
+  // waits for room in the queue of loop closure.
+  const auto take = [this](const auto& message) { step(message); };
+  topics.new_closures.subscribe(take);
+  topics.new_restarts.subscribe(take);
+  topics.outcomes.subscribe(take);
   topics.new_keyframes.subscribe([this](const auto& keyframe) {
     ++new_keyframes_;
     post(keyframe);
   });
   topics.peer_closures.subscribe([this](const auto& closure) { post(ClosureFromPeer{closure}); });
-  if (restored == nullptr) follow(topics.restored_outcomes);
+  if (restored == nullptr) topics.restored_outcomes.subscribe(take);
   topics.peer_events.subscribe([this](const auto& event) {
     using enum PeerEventKind;
     if (event->kind == kJoined || event->kind == kReported || event->kind == kResumed) post(event);
@@ -93,7 +99,17 @@ std::shared_ptr<const Keyframe> JournalNode::recall(KeyframeIndex keyframe) cons
   }
 }
 
+void JournalNode::hold_back(HeldBack message) {
+  const std::lock_guard lock(mutex_);
+  held_back_.push_back(std::move(message));
+}
+
 void JournalNode::step(const Tick& /*tick*/) {
+  std::vector<HeldBack> held_back;  // their entries are in the journal already
+  {
+    const std::lock_guard lock(mutex_);
+    held_back.swap(held_back_);
+  }
   if (collect())
     results_.append(file_, [this](const auto& file) {
       do journal_.write();
@@ -104,7 +120,7 @@ void JournalNode::step(const Tick& /*tick*/) {
                                  ": ends where the disk was full for too long: a resumed run "
                                  "continues from there");
     });
-  for (const HeldBack& held : std::exchange(held_back_, {}))
+  for (const HeldBack& held : held_back)
     std::visit([this](const auto& message) { pass(message); }, held);
 }
 
@@ -131,17 +147,21 @@ void JournalNode::step(const Message<Keyframe>& keyframe) {
     const std::lock_guard lock(mutex_);
     places_.push_back(*place);
   }
-  held_back_.push_back(keyframe);
+  hold_back(keyframe);
 }
 
 void JournalNode::step(const Message<Closure>& closure) {
   add(*closure);
-  held_back_.push_back(closure);
+  hold_back(closure);
 }
 
 void JournalNode::step(const ClosureFromPeer& from_peer) {
   const Closure& closure = *from_peer.closure;
-  if (known_closures_.emplace(closure.from.id, closure.to.id).second) add(closure);
+  const auto is_new = [&] {
+    const std::lock_guard lock(mutex_);
+    return known_closures_.emplace(closure.from.id, closure.to.id).second;
+  };
+  if (is_new()) add(closure);
 }
 
 void JournalNode::step(const Message<ClosureOutcome>& outcome) {
@@ -150,12 +170,13 @@ void JournalNode::step(const Message<ClosureOutcome>& outcome) {
 
 void JournalNode::step(const Message<PeerEvent>& event) {
   const RobotIdentity& peer = event->identity;
-  if (event->kind == PeerEventKind::kRestarted)
-    std::erase_if(known_closures_, [&](const auto& ends) {
-      return ends.first.robot == peer.robot || ends.second.robot == peer.robot;
-    });
   add(JournalPeer{peer.robot, peer.boot, peer.name});
-  if (event->kind == PeerEventKind::kRestarted) held_back_.push_back(event);
+  if (event->kind != PeerEventKind::kRestarted) return;
+  hold_back(event);
+  const std::lock_guard lock(mutex_);
+  std::erase_if(known_closures_, [&](const auto& ends) {
+    return ends.first.robot == peer.robot || ends.second.robot == peer.robot;
+  });
 }
 
 // A closure follows its last keyframe, as in the former process: place recognition thus knows again

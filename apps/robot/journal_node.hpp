@@ -97,6 +97,7 @@ class JournalNode final : public WorkerNode<JournalInput> {
   void step(const Message<PeerEvent>& event);
   std::optional<JournalPlace> add(const JournalEntry& entry);
   bool collect();
+  void hold_back(HeldBack message);
   void pass(const Message<Keyframe>& keyframe);
   void pass(const Message<Closure>& closure) { topics_.closures.publish(closure); }
   void pass(const Message<PeerEvent>& restart) { topics_.restarts.publish(restart); }
@@ -108,10 +109,10 @@ class JournalNode final : public WorkerNode<JournalInput> {
   JournalFile journal_;
   // Number of keyframes in the continued journal: RestoreNode publishes them once more.
   const std::size_t known_keyframes_;
-  std::set<std::pair<KeyframeId, KeyframeId>> known_closures_;
   std::atomic<std::size_t> new_keyframes_ = 0;  // number of keyframes not yet published
+  mutable std::mutex mutex_;  // guards the members below, and journal_ except for its write()
+  std::set<std::pair<KeyframeId, KeyframeId>> known_closures_;
   std::vector<HeldBack> held_back_;
-  mutable std::mutex mutex_;  // guards places_, and journal_ except for its write()
   std::vector<JournalPlace>
       places_;  // places of keyframes 0, 1, ..., up to the first that is not on the disk
 };

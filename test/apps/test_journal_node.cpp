@@ -1,7 +1,10 @@
+#include <future>
+
 #include "apps/result_files.hpp"
 #include "apps/robot/journal_node.hpp"
 #include "apps/robot/wiring.hpp"
 #include "test/support/inbox.hpp"
+#include "test/support/patience.hpp"
 #include "test/support/temporary_folder.hpp"
 #include "test/support/test.hpp"
 
@@ -79,6 +82,20 @@ TEST_CASE("The journal knows a published keyframe as long as its file exists") {
   CHECK(journal.node.recall(1) == nullptr);
   fs::remove(journal.file);
   CHECK(journal.node.recall(0) == nullptr);
+}
+
+TEST_CASE("Loop closure never waits for the journal that waits for it") {
+  constexpr std::size_t kOutcomes = 20'000;  // more than the queue of the journal takes
+  Journal journal;
+  std::promise<void> answered;
+  journal.topics.keyframes.subscribe([&](const auto&) {
+    for (std::size_t k = 0; k < kOutcomes; ++k) journal.topics.outcomes.publish(ClosureOutcome());
+    answered.set_value();
+  });
+  journal.topics.new_keyframes.publish(Keyframe());
+  REQUIRE(answered.get_future().wait_for(kPatience) == std::future_status::ready);
+  journal.node.stop();
+  CHECK(journal.written<ClosureOutcome>().size() == kOutcomes);
 }
 
 TEST_CASE("Events of nodes that stop later are written, with their times") {
