@@ -2,6 +2,7 @@
 
 #include <bit>
 #include <cstdint>
+#include <map>
 #include <queue>
 
 namespace km {
@@ -10,11 +11,20 @@ namespace {
 // A graph with one row of bits per node: eliminating a node is an OR of rows.
 class BitGraph {
  public:
-  BitGraph(int nodes, const std::vector<NodePair>& pairs)
-      : words_((at(nodes) + 63) / 64), bits_(words_ * at(nodes), 0) {
-    for (const auto& [i, j] : pairs) {
-      set(i, j);
-      set(j, i);
+  explicit BitGraph(std::size_t nodes) : words_((nodes + 63) / 64), bits_(words_ * nodes, 0) {}
+
+  void couple(int i, int j) {
+    row(i)[j / 64] |= mask(j);
+    row(j)[i / 64] |= mask(i);
+  }
+
+  // Couples all of these nodes with each other.
+  void couple(const std::vector<int>& nodes) {
+    std::vector<std::uint64_t> all(words_, 0);
+    for (const int v : nodes) all[at(v) / 64] |= mask(v);
+    for (const int v : nodes) {
+      for (std::size_t w = 0; w < words_; ++w) row(v)[w] |= all[w];
+      clear(v, v);
     }
   }
 
@@ -48,7 +58,6 @@ class BitGraph {
   std::uint64_t* row(int v) { return bits_.data() + words_ * at(v); }
   [[nodiscard]] const std::uint64_t* row(int v) const { return bits_.data() + words_ * at(v); }
   static std::uint64_t mask(int v) { return std::uint64_t{1} << (static_cast<unsigned>(v) % 64U); }
-  void set(int i, int j) { row(i)[j / 64] |= mask(j); }
   void clear(int i, int j) { row(i)[j / 64] &= ~mask(j); }
 
   template <typename F>
@@ -65,30 +74,62 @@ class BitGraph {
 
 enum class State { kKept, kOffered, kOutdated, kEliminated };
 
+// The graph that is left after nodes are eliminated. Only its size is squared, not that of the
+// whole graph, in which nearly all poses of a long run are eliminated.
+struct Remainder {
+  std::vector<std::size_t> nodes;  // ascending
+  BitGraph graph{0};
+};
+
+// Couples the neighbours of each connected group of nodes that are `gone`.
+Remainder without(const std::vector<bool>& gone, const std::vector<NodePair>& pairs) {
+  Remainder left;
+  std::vector<int> place(gone.size());  // in `left`, or the next node of the group towards its root
+  for (std::size_t v = 0; v < gone.size(); ++v) {
+    place[v] = static_cast<int>(gone[v] ? v : left.nodes.size());
+    if (!gone[v]) left.nodes.push_back(v);
+  }
+  const auto root = [&place](int v) {
+    while (place[at(v)] != v) v = place[at(v)] = place[at(place[at(v)])];
+    return v;
+  };
+  for (const auto& [i, j] : pairs)
+    if (gone[at(i)] && gone[at(j)]) place[at(root(i))] = root(j);
+  left.graph = BitGraph(left.nodes.size());
+  std::map<int, std::vector<int>> around;  // neighbours of a group, by its root
+  for (const auto& [i, j] : pairs) {
+    if (gone[at(i)] && gone[at(j)]) continue;
+    if (gone[at(i)])
+      around[root(i)].push_back(place[at(j)]);
+    else if (gone[at(j)])
+      around[root(j)].push_back(place[at(i)]);
+    else
+      left.graph.couple(place[at(i)], place[at(j)]);
+  }
+  for (const auto& [group, neighbours] : around) left.graph.couple(neighbours);
+  return left;
+}
+
 }  // namespace
 
 std::vector<bool> keep_sparse(std::vector<bool> keep, const std::vector<NodePair>& pairs,
-                              const std::vector<bool>& eliminate_first) {
-  BitGraph graph(static_cast<int>(keep.size()), pairs);
+                              std::vector<bool> eliminate_first) {
+  eliminate_first.resize(keep.size(), false);
+  for (std::size_t v = 0; v < keep.size(); ++v) eliminate_first[v] = eliminate_first[v] && !keep[v];
+  auto [nodes, graph] = without(eliminate_first, pairs);
 
   // The growth of a node with a changed neighbourhood is not computed again at once. It is computed
   // when the node reaches the front of the queue by its old growth, or when the queue is empty. In
   // a dense graph, an update after each elimination would be too expensive.
-  std::vector<State> state(keep.size(), State::kKept);
+  std::vector<State> state(nodes.size(), State::kKept);
   std::priority_queue<std::pair<int, int>> queue;  // least growth first, then lowest node
-  const auto offer = [&](std::size_t v) {
+  const auto offer = [&, &graph = graph](std::size_t v) {
     state[v] = State::kOffered;
     queue.emplace(-graph.growth(static_cast<int>(v)), -static_cast<int>(v));
   };
-  // The remaining graph does not depend on the order of these eliminations.
-  for (std::size_t v = 0; v < eliminate_first.size(); ++v) {
-    if (!eliminate_first[v] || keep[v]) continue;
-    state[v] = State::kEliminated;
-    (void)graph.eliminate(static_cast<int>(v));
-  }
-  for (std::size_t v = 0; v < keep.size(); ++v)
-    if (!keep[v] && state[v] != State::kEliminated) offer(v);
-  const auto eliminate = [&](int v) {
+  for (std::size_t v = 0; v < nodes.size(); ++v)
+    if (!keep[nodes[v]]) offer(v);
+  const auto eliminate = [&, &graph = graph](int v) {
     state[at(v)] = State::kEliminated;
     for (const int u : graph.eliminate(v))
       if (state[at(u)] == State::kOffered) state[at(u)] = State::kOutdated;
@@ -110,10 +151,11 @@ std::vector<bool> keep_sparse(std::vector<bool> keep, const std::vector<NodePair
       progress = true;
     }
     queue = {};
-    for (std::size_t v = 0; v < keep.size(); ++v)
+    for (std::size_t v = 0; v < nodes.size(); ++v)
       if (state[v] == State::kOffered || state[v] == State::kOutdated) offer(v);
   }
-  for (std::size_t v = 0; v < keep.size(); ++v) keep[v] = state[v] != State::kEliminated;
+  keep.assign(keep.size(), false);
+  for (std::size_t v = 0; v < nodes.size(); ++v) keep[nodes[v]] = state[v] != State::kEliminated;
   return keep;
 }
 

@@ -1,5 +1,8 @@
+#include <sys/resource.h>
+
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
+#include <set>
 
 #include "modules/tree_newton/closure_cover.hpp"
 #include "modules/tree_newton/frontal_cholesky.hpp"
@@ -214,6 +217,52 @@ TEST_CASE("a pose is kept if eliminating it would couple many others") {
   std::vector<bool> expected = keep;
   expected[0] = true;
   CHECK(keep_sparse(keep, pairs) == expected);
+}
+
+TEST_CASE("poses that are eliminated first leave the choice among the others as it is") {
+  const unsigned seed = GENERATE(range(0U, 20U));
+  CAPTURE(seed);
+  std::mt19937 rng(seed);
+  constexpr int kNodes = 40;
+  std::vector<bool> first(kNodes), keep(kNodes);
+  for (std::size_t v = 0; v < kNodes; ++v) {
+    first[v] = rng() % 2 == 0;
+    keep[v] = rng() % 8 == 0;
+  }
+  std::set<NodePair> pairs;
+  std::uniform_int_distribution<int> node(0, kNodes - 1);
+  while (pairs.size() < 70) {
+    const int i = node(rng), j = node(rng);
+    if (i != j) pairs.insert(ordered(i, j));
+  }
+  std::set<NodePair> left = pairs;
+  for (int v = 0; v < kNodes; ++v) {
+    if (!first[at(v)] || keep[at(v)]) continue;
+    std::set<int> around;
+    for (const auto& [i, j] : left)
+      if (i == v || j == v) around.insert(i == v ? j : i);
+    std::erase_if(left, [v](const NodePair& pair) { return pair[0] == v || pair[1] == v; });
+    for (const int i : around)
+      for (const int j : around)
+        if (i < j) left.insert({i, j});
+  }
+  const std::vector<bool> expected = keep_sparse(keep, {left.begin(), left.end()});
+  CHECK(keep_sparse(keep, {pairs.begin(), pairs.end()}, first) == expected);
+}
+
+TEST_CASE("the poses of a day that others do not see take little memory") {
+  constexpr std::size_t kPoses = 100'000, kStep = 1000;
+  constexpr long kMost_kb = 100'000;  // the square of all poses takes 1.25 GB
+  std::vector<bool> keep(kPoses, false), first(kPoses, true);
+  keep.front() = keep.back() = true;
+  for (std::size_t k = 0; k < kPoses; k += kStep) first[k] = false;
+  std::vector<NodePair> chain;
+  for (int k = 1; at(k) < kPoses; ++k) chain.push_back({k - 1, k});
+  rusage before{}, after{};
+  getrusage(RUSAGE_SELF, &before);
+  CHECK(keep_sparse(keep, chain, first) == keep);
+  getrusage(RUSAGE_SELF, &after);
+  CHECK(after.ru_maxrss - before.ru_maxrss < kMost_kb);
 }
 
 }  // namespace km
