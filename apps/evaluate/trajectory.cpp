@@ -101,6 +101,10 @@ struct TrajectoryCommand {
           {short_name(all[i]), truth, poses.emplace_back(read_estimate(all[i])), std::nullopt});
     }
     const TeamError team = trajectory_error(inputs);
+    for (const TrajectoryInput& input : inputs)
+      if (const std::string difference = difference_of_notation(input); !difference.empty())
+        throw std::runtime_error(input.name + " and its truth are written differently: " +
+                                 difference + "; a header can name the columns");
     std::cout << to_table(team);
     write_json_output(json, team);
     write_output(plot, [&](std::ostream& out) {

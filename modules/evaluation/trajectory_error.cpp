@@ -2,7 +2,9 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
@@ -213,6 +215,63 @@ TeamError trajectory_error(std::span<const TrajectoryInput> inputs) {
   }
   team.joint = summary("team", joint);
   return team;
+}
+
+namespace {
+
+SE3 with_rotation(const SE3& T, double w, double x, double y, double z) {
+  SE3 result = T;
+  result.linear() = Eigen::Quaterniond(w, x, y, z).toRotationMatrix();
+  return result;
+}
+
+SE3 with_scale(const SE3& T, double scale) {
+  SE3 result = T;
+  result.translation() *= scale;
+  return result;
+}
+
+struct Notation {
+  const char* text;
+  SE3 (*undone)(const SE3& T, const Eigen::Quaterniond& q);
+};
+constexpr const char* kOrder = "one has w first in its quaternions, the other w last";
+constexpr const char* kUnits = "one has metres, the other millimetres";
+constexpr Notation kNotations[] = {
+    {kOrder,
+     [](const SE3& T, const auto& q) { return with_rotation(T, q.x(), q.y(), q.z(), q.w()); }},
+    {kOrder,
+     [](const SE3& T, const auto& q) { return with_rotation(T, q.z(), q.w(), q.x(), q.y()); }},
+    {"the rotations of one are inverse",
+     [](const SE3& T, const auto& q) { return with_rotation(T, q.w(), -q.x(), -q.y(), -q.z()); }},
+    {"the poses of one are inverse", [](const SE3& T, const auto&) { return T.inverse(); }},
+    {kUnits, [](const SE3& T, const auto&) { return with_scale(T, 1e-3); }},
+    {kUnits, [](const SE3& T, const auto&) { return with_scale(T, 1e3); }}};
+
+}  // namespace
+
+std::string difference_of_notation(const TrajectoryInput& input) {
+  constexpr double kBetter = 0.1, kWorse = 1.001;
+  constexpr double kLeast_m = 0.1, kLeast_deg = 1.0;  // errors of odometry that works
+  const TrajectoryError read = trajectory_error({&input, 1}).joint;
+  const double metres = read.rpe_translation_m.rmse, degrees = read.rpe_rotation_deg.rmse;
+  if (read.rpe_rotation_deg.count == 0 || (metres < kLeast_m && degrees < kLeast_deg)) return {};
+  std::string best;
+  double least = std::numeric_limits<double>::infinity();
+  for (const Notation& notation : kNotations) {
+    std::vector<StampedPose> poses(input.estimate.begin(), input.estimate.end());
+    for (StampedPose& pose : poses)
+      pose.T = notation.undone(pose.T, Eigen::Quaterniond(pose.T.linear()));
+    const TrajectoryError undone =
+        trajectory_error(std::array{TrajectoryInput{input.name, input.truth, poses, input.window}})
+            .joint;
+    const double m = undone.rpe_translation_m.rmse / std::max(metres, kLeast_m);
+    const double deg = undone.rpe_rotation_deg.rmse / std::max(degrees, kLeast_deg);
+    if (std::max(m, deg) > kWorse || std::min(m, deg) > kBetter || m + deg > least) continue;
+    least = m + deg;
+    best = notation.text;
+  }
+  return best;
 }
 
 SE3 align_surroundings(std::span<const TrajectoryInput> inputs) {

@@ -176,6 +176,35 @@ std::vector<PosePair> pairs_of(int count, const Truth& truth, const Estimate& es
   return pairs;
 }
 
+TEST_CASE("Poses that are written differently from the truth are named") {
+  const auto truth = sample(0.0, 20.0, 400, curve);
+  const auto difference = [&truth](auto change) {
+    const auto estimate = sample(0.0, 20.0, 400, [&](double t_s) {
+      SE3 T = curve(t_s) * make_pose(so3_exp({0.0, 0.0, 0.01 * t_s}), {0.01 * t_s, 0.0, 0.0});
+      change(T, Eigen::Quaterniond(T.linear()));
+      return T;
+    });
+    return difference_of_notation({"robot", truth, estimate, {}});
+  };
+  using Q = Eigen::Quaterniond;
+  CHECK(difference([](SE3&, const Q&) {}).empty());
+  CHECK_THAT(difference([](SE3& T, const Q& q) {
+               T.linear() = Q(q.z(), q.w(), q.x(), q.y()).toRotationMatrix();
+             }),
+             Contains("w first"));
+  CHECK_THAT(difference([](SE3& T, const Q& q) {
+               T.linear() = Q(q.x(), q.y(), q.z(), q.w()).toRotationMatrix();
+             }),
+             Contains("w first"));
+  CHECK_THAT(difference([](SE3& T, const Q& q) { T.linear() = q.conjugate().toRotationMatrix(); }),
+             Contains("rotations of one are inverse"));
+  CHECK_THAT(difference([](SE3& T, const Q&) { T = T.inverse(); }),
+             Contains("poses of one are inverse"));
+  CHECK_THAT(difference([](SE3& T, const Q&) { T.translation() *= 1000.0; }),
+             Contains("millimetres"));
+  CHECK(difference([](SE3& T, const Q&) { T.translation() *= 1.5; }).empty());
+}
+
 TEST_CASE("Drift is measured over multiples of 1, 2 and 5 up to half the path") {
   CHECK(segment_lengths(300.0) == std::vector<double>{10.0, 20.0, 50.0, 100.0});
   CHECK(segment_lengths(5.43) == std::vector<double>{0.2, 0.5, 1.0, 2.0});
