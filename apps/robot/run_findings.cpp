@@ -335,7 +335,8 @@ class FindingsOfRun {
   void add_cameras() {
     // Odometry that is wrong for a known reason estimates wrong errors of the cameras.
     const auto is_of_sensors = [](const Finding& one) {
-      return one.severity == kError && !one.id.starts_with("network.");
+      return one.id == "imu.time_offset" ||
+             (one.severity == kError && !one.id.starts_with("network."));
     };
     if (!run_.cameras || std::ranges::any_of(run_.noticed, is_of_sensors)) return;
     const CamerasSummary& found = *run_.cameras;

@@ -75,8 +75,9 @@ void examine_rate(const char* sensor, const std::string& id, const std::vector<S
                       "odometry starts again there, and charts show a gap",
                       "set the clock before the recording, or choose a part by --from and --to");
   const UsualNumber rate = id == "imu" ? UsualNumber::kImuRate_hz : UsualNumber::kImageRate_hz;
-  if (const auto unusual = doubt(rate, found.rate_hz); unusual && found.rate_hz > least_hz)
-    result.findings.push_back(finding_of(*unusual));
+  if (const auto unusual = rate_doubt(rate, found.rate_hz, found.median_s);
+      unusual && found.rate_hz > least_hz)
+    return result.findings.push_back(finding_of(*unusual));
   if (!(found.rate_hz >= least_hz))
     result.add(kWarning, id + ".rate",
                std::string(sensor) + " at " + fixed(found.rate_hz, 1) + " Hz, less than " +

@@ -28,7 +28,7 @@ Eigen::Matrix3d rectified_axes(const StereoRig& rig) {
   if (!(z_right.z() > kMinAlignment) || !(x.x() > kMinAlignment))
     throw std::invalid_argument(
         "rectification: the right camera must have the direction of the left one and be to its "
-        "right");
+        "right; kimera_multi_doctor finds poses that are inverted, and exchanged images");
   const Eigen::Vector3d y = (Eigen::Vector3d::UnitZ() + z_right).cross(x).normalized();
   Eigen::Matrix3d R_left_rect;
   R_left_rect << x, y, x.cross(y);

@@ -95,6 +95,9 @@ EdgeCovariance<N> covariance_of_blocks(const Eigen::Matrix<double, N, N>& inform
 template <int N>
 EdgeCovariance<N> read_covariance(TextFields& fields) {
   const Eigen::Matrix<double, N, N> information = read_information<N>(fields);
+  if (!fields.at_end())
+    fields.fail("information matrix has more than the " + std::to_string(N * (N + 1) / 2) +
+                " numbers of its upper triangle");
   const Eigen::LLT<Eigen::Matrix<double, N, N>> llt(information);
   EdgeCovariance<N> edge =
       llt.info() != Eigen::Success

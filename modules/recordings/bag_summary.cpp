@@ -164,8 +164,11 @@ std::vector<TopicPair> pairs_of_images(const std::vector<TopicSummary>& topics) 
 }
 
 StampStatistics stamp_statistics(std::vector<Stamp> stamps) {
-  StampStatistics result{
-      .count = stamps.size(), .rate_hz = kNone, .largest_gap_s = kNone, .jitter_s = kNone};
+  StampStatistics result{.count = stamps.size(),
+                         .rate_hz = kNone,
+                         .largest_gap_s = kNone,
+                         .median_s = kNone,
+                         .jitter_s = kNone};
   for (std::size_t i = 1; i < stamps.size(); ++i)
     result.unordered += stamps[i] <= stamps[i - 1] ? 1 : 0;
   std::sort(stamps.begin(), stamps.end());
@@ -179,8 +182,8 @@ StampStatistics stamp_statistics(std::vector<Stamp> stamps) {
   const double total_s = seconds_from_to(result.first, result.last);
   if (total_s > 0.0) result.rate_hz = static_cast<double>(intervals_s.size()) / total_s;
   result.largest_gap_s = *std::max_element(intervals_s.begin(), intervals_s.end());
-  const double median_s = quantile(intervals_s, 0.5);
-  for (double& interval_s : intervals_s) interval_s = std::abs(interval_s - median_s);
+  result.median_s = quantile(intervals_s, 0.5);
+  for (double& interval_s : intervals_s) interval_s = std::abs(interval_s - result.median_s);
   result.jitter_s = quantile(std::move(intervals_s), 0.95);
   return result;
 }

@@ -4,7 +4,8 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <limits>
+#include <functional>
+#include <numeric>
 #include <string_view>
 #include <utility>
 
@@ -136,6 +137,13 @@ std::optional<Doubt> doubt(UsualNumber number, double value) {
   return doubt;
 }
 
+std::optional<Doubt> rate_doubt(UsualNumber number, double rate_hz, double median_s) {
+  constexpr double kThousand = 1e3, kTolerance = 1.7;
+  const double ratio = kThousand * rate_hz * median_s;
+  const bool is_fraction = ratio > 1.0 / kTolerance && ratio < kTolerance;
+  return doubt(number, is_fraction ? 1.0 / median_s : rate_hz);
+}
+
 std::vector<Doubt> rig_doubts(const StereoRig& rig) {
   std::vector<Doubt> doubts;
   const bool has_pair = rig.depth_source == DepthSource::kRightImage;
@@ -177,19 +185,23 @@ std::vector<Doubt> FirstPackets::add(const SensorPacket& packet) {
   samples_.insert(samples_.end(), packet.imu.begin(), packet.imu.end());
   add_depth(*packet.frame);
   if (frames_.size() < kFrames) return {};
-  const auto rate_hz = [](Stamp first, Stamp last, std::size_t count) {
-    const double seconds = seconds_between(first, last);
-    return seconds > 0.0 ? static_cast<double>(count - 1) / seconds
-                         : std::numeric_limits<double>::quiet_NaN();
-  };
   std::vector<Doubt> doubts;
   const auto judge = [&doubts](UsualNumber number, double value) {
     if (const auto found = doubt(number, value)) doubts.push_back(*found);
   };
-  judge(UsualNumber::kImageRate_hz, rate_hz(frames_.front(), frames_.back(), frames_.size()));
-  if (!samples_.empty())
-    judge(UsualNumber::kImuRate_hz,
-          rate_hz(samples_.front().stamp, samples_.back().stamp, samples_.size()));
+  const auto judge_rate = [&doubts](UsualNumber number, const auto& all, const auto& stamp_of) {
+    std::vector<double> intervals_s;
+    for (std::size_t k = 1; k < all.size(); ++k)
+      intervals_s.push_back(
+          seconds_between(std::invoke(stamp_of, all[k - 1]), std::invoke(stamp_of, all[k])));
+    const double sum_s = std::accumulate(intervals_s.begin(), intervals_s.end(), 0.0);
+    if (!(sum_s > 0.0)) return;
+    const double rate_hz = static_cast<double>(intervals_s.size()) / sum_s;
+    if (const auto found = rate_doubt(number, rate_hz, quantile(intervals_s, 0.5)))
+      doubts.push_back(*found);
+  };
+  judge_rate(UsualNumber::kImageRate_hz, frames_, std::identity());
+  judge_rate(UsualNumber::kImuRate_hz, samples_, &ImuSample::stamp);
   if (const auto found = gravity_doubt(samples_)) doubts.push_back(*found);
   const auto unmeasured =
       std::partition(depths_m_.begin(), depths_m_.end(), [](double m) { return m > 0.0; });

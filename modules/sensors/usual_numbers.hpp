@@ -34,6 +34,10 @@ struct Doubt {
 /// number; nullopt for usual values and NaN.
 [[nodiscard]] std::optional<Doubt> doubt(UsualNumber number, double value);
 
+/// The doubt about a rate, from its mean and the median of the intervals. Microseconds in a field
+/// of nanoseconds, beside one of seconds, shorten most intervals and keep the mean.
+[[nodiscard]] std::optional<Doubt> rate_doubt(UsualNumber number, double rate_hz, double median_s);
+
 /// Doubts about the baseline and the position of the left camera on the body.
 [[nodiscard]] std::vector<Doubt> rig_doubts(const StereoRig& rig);
 

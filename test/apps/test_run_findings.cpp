@@ -114,6 +114,8 @@ TEST_CASE("An error of the network hides no finding on the cameras") {
   REQUIRE(the_finding_of(run).id == "cameras.offset");
   run.summary.noticed = {{.id = "network.path_mtu", .severity = Severity::kError}};
   CHECK(findings_of_one(run).size() == 2);
+  run.summary.noticed = {{.id = "imu.time_offset", .severity = Severity::kWarning}};
+  CHECK(the_finding_of(run).id == "imu.time_offset");  // explains the estimated offset
 }
 
 TEST_CASE("Robots that one place or no closure ties are reported as such") {

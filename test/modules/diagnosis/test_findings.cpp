@@ -82,6 +82,10 @@ TEST_CASE("Rates and gaps of a recording are found") {
                     [](auto& sample) {
                       sample.imu.erase(sample.imu.begin() + 500, sample.imu.begin() + 520);
                     }},
+               Case{"error frames.stamps ",  // microseconds as nanoseconds of a second
+                    [](auto& sample) {
+                      for (Stamp& t : sample.frames) t -= t % 1'000'000'000 / 1000 * 999;
+                    }},
                Case{"warning frames.clock ",  // from 1970 to today
                     [](auto& sample) {
                       for (std::size_t k = 50; k < sample.frames.size(); ++k)

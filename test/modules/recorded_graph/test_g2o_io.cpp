@@ -180,6 +180,8 @@ TEST_CASE("A bad g2o file is refused with its line and the reason") {
       {"VERTEX_SE3:QUAT 1 0,5 0 0 0 0 0 1", "0'; are there decimal commas?"},
       {"EDGE_SE3:QUAT 0 1" + kPose + " 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0",
        "weigh rotation by 0: they are singular and"},
+      {"EDGE_SE3:QUAT 0 1" + kPose + " 9 0 0 0 0 0 0 9 0 0 0 0 0 0 9 0 0 0 0 0 0 9",
+       "more than the 21 numbers of its upper triangle"},
       {"VERTEX_SE3:QUAT 1 0 0 0 0 0 0", "line ends before quaternion"},
       {"VERTEX_SE3:QUAT 1 0 0 0 0 0 0 1 9", "more fields"},
       {"VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1", "given twice"},

@@ -314,5 +314,12 @@ TEST_CASE("The first packets of a source show its rates and units once") {
   CHECK(found[1].id == "imu.stamps");
 }
 
+TEST_CASE("Microseconds in a field of nanoseconds are named, and bursts of samples are none") {
+  CHECK_THAT(rate_doubt(UsualNumber::kImageRate_hz, 20.0, 5e-5)->what,
+             Contains("20000 Hz") && Contains("microseconds"));
+  CHECK_FALSE(rate_doubt(UsualNumber::kImuRate_hz, 200.0, 1e-4));
+  CHECK_FALSE(rate_doubt(UsualNumber::kImuRate_hz, 200.0, 0.0));
+}
+
 }  // namespace
 }  // namespace km
