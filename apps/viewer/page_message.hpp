@@ -9,7 +9,7 @@
 
 namespace km {
 
-/// Message to the page as one frame of its WebSocket: text (one JSON object), or binary.
+/// Message to the page as one frame: text (one JSON object), or binary.
 struct PageMessage {
   bool binary = false;
   std::string bytes;

@@ -6,11 +6,11 @@
 
 #include <algorithm>
 #include <array>
-#include <limits>
+#include <charconv>
+#include <cstring>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <stdexcept>
-#include <thread>
 #include <utility>
 
 #include "modules/core/json.hpp"
@@ -28,8 +28,7 @@ constexpr const char* kConnections = "192";
 constexpr const char* kIdle_ms = "10000";
 // Open pages in all and of one address: the other threads serve files.
 constexpr std::size_t kMaxPages = 96, kMaxPagesOfAddress = 48;
-constexpr std::size_t kMaxRequest_bytes = 1024;  // a longer request closes the connection
-constexpr std::size_t kMaxImages = 64;           // robots whose images a page requests
+constexpr std::size_t kMaxImages = 64;  // robots whose images a page requests
 
 // False for names that only begin like an address, as 127.example.com.
 bool is_loopback(const std::string& address) {
@@ -68,22 +67,23 @@ std::string_view header(const mg_connection* connection, const char* name) {
   return value != nullptr ? value : "";
 }
 
-bool send(mg_connection* connection, int kind, std::string_view bytes) {
-  return mg_websocket_write(connection, kind, bytes.data(), bytes.size()) > 0;
+std::string parameter(const mg_connection* connection, const char* name) {
+  const char* const query = mg_get_request_info(connection)->query_string;
+  std::array<char, 64> value{};
+  if (query == nullptr ||
+      mg_get_var(query, std::strlen(query), name, value.data(), value.size()) < 0)
+    return {};
+  return value.data();
 }
 
-// Request of a page: {"images": robot, "on": true}. Other text is no request.
-struct ImageRequest {
-  RobotId robot = 0;
-  bool on = false;
-};
-std::optional<ImageRequest> parse_image_request(std::string_view text) {
-  const Json json = Json::parse(text, nullptr, false);
-  if (!json.is_object() || !json.contains("images") || !json.contains("on")) return std::nullopt;
-  if (!json["images"].is_number_unsigned() || !json["on"].is_boolean()) return std::nullopt;
-  const auto robot = json["images"].get<std::uint64_t>();
-  if (robot > std::numeric_limits<RobotId>::max()) return std::nullopt;
-  return ImageRequest{static_cast<RobotId>(robot), json["on"].get<bool>()};
+// Sends a frame: four bytes, in which the lowest bit stands for binary data and the others for the
+// size, and the data. False if the page has gone or does not read.
+bool send(mg_connection* connection, bool binary, std::string_view bytes) {
+  std::string frame;
+  const std::size_t head = bytes.size() << 1U | (binary ? 1U : 0U);
+  for (unsigned k = 0; k < 32; k += 8) frame += static_cast<char>(head >> k);
+  frame.append(bytes);
+  return std::cmp_equal(mg_write(connection, frame.data(), frame.size()), frame.size());
 }
 
 int refuse(mg_connection* connection) {
@@ -91,14 +91,19 @@ int refuse(mg_connection* connection) {
   return 404;
 }
 
-int answer(mg_connection* connection, const char* type, std::string_view bytes) {
+// Without a size the answer continues until the connection is closed.
+void begin_answer(mg_connection* connection, const char* type, std::optional<std::size_t> size) {
   mg_printf(connection,
-            "HTTP/1.1 200 OK\r\nContent-Type: %s\r\nContent-Length: %zu\r\n"
+            "HTTP/1.1 200 OK\r\nContent-Type: %s\r\n%s"
             "Cache-Control: no-cache\r\nX-Content-Type-Options: nosniff\r\n"
             "Content-Security-Policy: default-src 'self'; style-src 'self' 'unsafe-inline'; "
             "img-src 'self' blob: data:\r\nReferrer-Policy: no-referrer\r\n"
             "Connection: close\r\n\r\n",
-            type, bytes.size());
+            type, size ? ("Content-Length: " + std::to_string(*size) + "\r\n").c_str() : "");
+}
+
+int answer(mg_connection* connection, const char* type, std::string_view bytes) {
+  begin_answer(connection, type, bytes.size());
   mg_write(connection, bytes.data(), bytes.size());
   return 200;
 }
@@ -106,7 +111,7 @@ int answer(mg_connection* connection, const char* type, std::string_view bytes) 
 bool send_batch(mg_connection* connection, const ViewStore::Batch& batch) {
   std::string text;
   const auto flush = [&] {
-    const bool ok = text.empty() || send(connection, MG_WEBSOCKET_OPCODE_TEXT, text + ']');
+    const bool ok = text.empty() || send(connection, false, text + ']');
     text.clear();
     return ok;
   };
@@ -114,7 +119,7 @@ bool send_batch(mg_connection* connection, const ViewStore::Batch& batch) {
   for (const auto& message : batch.messages) {
     if (!message->binary) {
       add(message->bytes);
-    } else if (!flush() || !send(connection, MG_WEBSOCKET_OPCODE_BINARY, message->bytes)) {
+    } else if (!flush() || !send(connection, true, message->bytes)) {
       return false;
     }
   }
@@ -124,14 +129,6 @@ bool send_batch(mg_connection* connection, const ViewStore::Batch& batch) {
 }
 
 }  // namespace
-
-// An open page; its thread sends the messages that the page lacks.
-struct PageServer::Page {
-  std::string address;
-  std::atomic<bool> closed = false;
-  std::set<RobotId> images;  // robots whose images the page requests
-  std::thread sender;
-};
 
 PageServer::PageServer(ViewStore& store, PageServerOptions options)
     : store_(store),
@@ -163,21 +160,10 @@ void PageServer::start() {
                                ? '[' + options_.address + ']'
                                : options_.address;
   const std::string port = host + ':' + std::to_string(options_.port);
-  const std::array<const char*, 15> settings = {"listening_ports",
-                                                port.c_str(),
-                                                "num_threads",
-                                                kConnections,
-                                                "request_timeout_ms",
-                                                kIdle_ms,
-                                                "websocket_timeout_ms",
-                                                "10000",
-                                                "enable_websocket_ping_pong",
-                                                "yes",
-                                                "tcp_nodelay",
-                                                "1",
-                                                "enable_directory_listing",
-                                                "no",
-                                                nullptr};
+  const std::array<const char*, 11> settings = {
+      "listening_ports",          port.c_str(), "num_threads", kConnections,
+      "request_timeout_ms",       kIdle_ms,     "tcp_nodelay", "1",
+      "enable_directory_listing", "no",         nullptr};
   mg_init_data init{};
   mg_callbacks callbacks{};
   callbacks.log_message = [](const mg_connection*, const char*) { return 1; };
@@ -200,23 +186,6 @@ void PageServer::start() {
         return static_cast<PageServer*>(self)->serve(connection);
       },
       this);
-  mg_set_websocket_handler(
-      context_, (prefix() + "updates").c_str(),
-      [](const mg_connection* connection, void* self) {
-        return static_cast<PageServer*>(self)->has_room_for(connection) ? 0 : 1;
-      },
-      [](mg_connection* connection, void* self) {
-        static_cast<PageServer*>(self)->open(connection);
-      },
-      [](mg_connection* connection, int bits, char* data, size_t size, void* self) {
-        if (size > kMaxRequest_bytes) return 0;
-        static_cast<PageServer*>(self)->receive(connection, bits, {data, size});
-        return (bits & 0xf) == MG_WEBSOCKET_OPCODE_CONNECTION_CLOSE ? 0 : 1;
-      },
-      [](const mg_connection* connection, void* self) {
-        static_cast<PageServer*>(self)->close(connection);
-      },
-      this);
 }
 
 // False for requests from pages of other sites. Without a token, also false for requests under a
@@ -228,19 +197,15 @@ bool PageServer::is_allowed(const mg_connection* connection) const {
   return !token_.empty() || name == "[::1]" || is_loopback(name);
 }
 
-bool PageServer::has_room_for(const mg_connection* connection) {
-  const std::string address = mg_get_request_info(connection)->remote_addr;
-  const std::lock_guard lock(mutex_);
-  const auto of_address = std::ranges::count_if(
-      pages_, [&](const auto& entry) { return entry.second->address == address; });
-  return is_allowed(connection) && pages_.size() < kMaxPages &&
-         std::cmp_less(of_address, kMaxPagesOfAddress);
-}
-
-int PageServer::serve(mg_connection* connection) const {
+int PageServer::serve(mg_connection* connection) {
   const std::string uri = mg_get_request_info(connection)->local_uri;
   if (!is_allowed(connection) || !uri.starts_with(prefix())) return refuse(connection);
   std::string path = uri.substr(prefix().size());
+  // With POST every browser names the site of the page, so that other sites are refused.
+  if (mg_get_request_info(connection)->request_method == std::string_view("POST")) {
+    if (path == "updates") return send_messages(connection);
+    return path == "images" ? request_images(connection) : refuse(connection);
+  }
   if (path.empty()) path = "index.html";
   for (const PageFile& file : page_files()) {
     if (file.path == path) return answer(connection, type_of(path), file.bytes);
@@ -248,43 +213,51 @@ int PageServer::serve(mg_connection* connection) const {
   return refuse(connection);
 }
 
-void PageServer::open(mg_connection* connection) {
-  const std::lock_guard lock(mutex_);
-  const auto page = std::make_shared<Page>();
-  page->address = mg_get_request_info(connection)->remote_addr;
-  pages_[connection] = page;
-  page->sender = std::thread([this, connection, page] { send_messages(connection, *page); });
-}
-
 // Each text frame is a JSON array of messages; the first one has only the hello message. Each
-// binary message has a frame of its own.
-void PageServer::send_messages(mg_connection* connection, const Page& page) {
-  if (!send(connection, MG_WEBSOCKET_OPCODE_TEXT, '[' + options_.hello + ']')) return;
+// binary message has a frame of its own. An empty frame shows whether the page is still there.
+int PageServer::send_messages(mg_connection* connection) {
+  const std::string id = parameter(connection, "page");
+  if (!open(id, mg_get_request_info(connection)->remote_addr)) return refuse(connection);
+  begin_answer(connection, "application/octet-stream", {});
+  bool there = send(connection, false, '[' + options_.hello + ']');
   ViewStore::Cursor cursor;
   bool caught_up = false;
-  while (!page.closed && !stopping_) {
+  while (there && !stopping_) {
     const ViewStore::Batch batch = store_.take(cursor, kBatchBytes, kWait_s);
-    if (!send_batch(connection, batch)) return;
-    if (batch.caught_up && !caught_up)
-      send(connection, MG_WEBSOCKET_OPCODE_TEXT, R"([{"kind":"caught_up"}])");
+    there =
+        send_batch(connection, batch) &&
+        send(connection, false, batch.caught_up && !caught_up ? R"([{"kind":"caught_up"}])" : "");
     caught_up = caught_up || batch.caught_up;
   }
+  const std::lock_guard lock(mutex_);
+  change_requests([&] { pages_.erase(id); });
+  return 200;
 }
 
-void PageServer::receive(mg_connection* connection, int bits, std::string_view text) {
-  if ((bits & 0xf) != MG_WEBSOCKET_OPCODE_TEXT) return;
-  const auto request = parse_image_request(text);
-  if (!request) return;
+bool PageServer::open(const std::string& id, const std::string& address) {
   const std::lock_guard lock(mutex_);
-  const auto page = pages_.find(connection);
-  if (page == pages_.end()) return;
-  std::set<RobotId>& images = page->second->images;
+  const auto of_address = std::ranges::count_if(
+      pages_, [&](const auto& entry) { return entry.second.address == address; });
+  return pages_.size() < kMaxPages && std::cmp_less(of_address, kMaxPagesOfAddress) &&
+         pages_.try_emplace(id, Page{address, {}}).second;
+}
+
+int PageServer::request_images(mg_connection* connection) {
+  const std::string text = parameter(connection, "robot"), on = parameter(connection, "on");
+  RobotId robot = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), robot);
+  const std::lock_guard lock(mutex_);
+  const auto page = pages_.find(parameter(connection, "page"));
+  if (page == pages_.end() || error != std::errc() || end != text.data() + text.size())
+    return refuse(connection);
+  std::set<RobotId>& images = page->second.images;
   change_requests([&] {
-    if (!request->on)
-      images.erase(request->robot);
+    if (on != "true")
+      images.erase(robot);
     else if (images.size() < kMaxImages)
-      images.insert(request->robot);
+      images.insert(robot);
   });
+  return answer(connection, "text/plain", "");
 }
 
 // Applies `change` to the requests of pages. Calls on_images if the set of robots whose images
@@ -299,22 +272,8 @@ void PageServer::change_requests(const std::function<void()>& change) {
 
 std::set<RobotId> PageServer::requested() const {
   std::set<RobotId> robots;
-  for (const auto& [connection, page] : pages_)
-    robots.insert(page->images.begin(), page->images.end());
+  for (const auto& [id, page] : pages_) robots.insert(page.images.begin(), page.images.end());
   return robots;
-}
-
-void PageServer::close(const mg_connection* connection) {
-  std::shared_ptr<Page> page;
-  {
-    const std::lock_guard lock(mutex_);
-    const auto known = pages_.find(connection);
-    if (known == pages_.end()) return;
-    page = known->second;
-    change_requests([&] { pages_.erase(known); });
-  }
-  page->closed = true;
-  page->sender.join();
 }
 
 }  // namespace km

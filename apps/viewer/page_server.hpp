@@ -3,7 +3,6 @@
 #include <atomic>
 #include <functional>
 #include <map>
-#include <memory>
 #include <mutex>
 #include <set>
 #include <span>
@@ -32,9 +31,9 @@ struct PageServerOptions {
   std::function<void(const std::set<RobotId>&)> on_images;
 };
 
-/// Serves the page, and on its WebSocket all present and future messages of a store. Refuses
-/// requests whose Origin is another site. A server without a token (see PageServerOptions::address)
-/// also refuses requests whose host is not a name of this host.
+/// Serves the page, and as one endless answer all present and future messages of a store. Bodies of
+/// requests are not read. Refuses requests whose Origin is another site. A server without a token
+/// (see PageServerOptions::address) also refuses requests whose host is not a name of this host.
 class PageServer {
  public:
   /// `store` must outlive the server. Throws std::runtime_error that names address and port if they
@@ -48,27 +47,28 @@ class PageServer {
   [[nodiscard]] std::string url() const;
 
  private:
-  struct Page;
+  struct Page {
+    std::string address;
+    std::set<RobotId> images;  // robots whose images the page requests
+  };
 
   [[nodiscard]] std::string prefix() const { return token_.empty() ? "/" : '/' + token_ + '/'; }
   void start();
   bool is_allowed(const mg_connection* connection) const;
-  bool has_room_for(const mg_connection* connection);
-  int serve(mg_connection* connection) const;
-  void open(mg_connection* connection);
-  void send_messages(mg_connection* connection, const Page& page);
-  void receive(mg_connection* connection, int bits, std::string_view text);
+  int serve(mg_connection* connection);
+  int send_messages(mg_connection* connection);
+  int request_images(mg_connection* connection);
+  bool open(const std::string& id, const std::string& address);
   void change_requests(const std::function<void()>& change);
   [[nodiscard]] std::set<RobotId> requested() const;
-  void close(const mg_connection* connection);
 
   ViewStore& store_;
   const PageServerOptions options_;
   const std::string token_;
   std::atomic<bool> stopping_ = false;
   mg_context* context_ = nullptr;
-  std::mutex mutex_;  // guards the members below
-  std::map<const mg_connection*, std::shared_ptr<Page>> pages_;
+  std::mutex mutex_;                   // guards the members below
+  std::map<std::string, Page> pages_;  // open pages by the ids that they have chosen
 };
 
 }  // namespace km

@@ -4,9 +4,6 @@ import {join} from 'node:path';
 
 export const sum = (numbers) => numbers.reduce((a, b) => a + b, 0);
 
-export const percentile = (numbers, share) => [...numbers].sort(
-    (a, b) => a - b)[Math.min(numbers.length - 1, Math.floor(share * numbers.length))];
-
 /** The summaries of the robots, by id. */
 export function readSummaries(folder) {
   return readdirSync(folder)
@@ -17,7 +14,7 @@ export function readSummaries(folder) {
 }
 
 /** A pair of keyframes "robot:index" as the page names it. */
-export const pairOf = (...ends) => ends.sort((a, b) => {
+const pairOf = (...ends) => ends.sort((a, b) => {
   const [[r0, k0], [r1, k1]] = [a, b].map((end) => end.split(':').map(Number));
   return r0 - r1 || k0 - k1;
 }).join(' ');

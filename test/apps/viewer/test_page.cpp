@@ -90,7 +90,7 @@ TEST_CASE("Messages of the robots of a domain are shown in the page") {
   const auto address = viewer.wait_for_prefix("Open http://127.0.0.1:");
   REQUIRE(address);
   PageListener page(std::stoi(address->text.substr(std::string("Open http://127.0.0.1:").size())),
-                    "/updates");
+                    "/updates?page=a");
   CHECK(page.receives(R"("source":"live")"));
 
   const DdsParticipant robot(loopback(domain), {.robot = 7, .name = "alpha", .boot = 57});

@@ -1,5 +1,6 @@
 #include <arpa/inet.h>
 #include <civetweb.h>
+#include <sys/resource.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -31,14 +32,15 @@ std::string path_of(const PageServer& server) {
   return server.url().substr(server.url().find('/', std::string("http://").size()));
 }
 
-Answer get(int port, const std::string& path, const std::string& headers = {}) {
+Answer get(int port, const std::string& path, const std::string& headers = {},
+           const char* method = "GET") {
   std::array<char, 256> error{};
   const std::string host = headers.find("Host:") == std::string::npos
                                ? "Host: 127.0.0.1:" + std::to_string(port) + "\r\n"
                                : "";
   mg_connection* const connection =
-      mg_download("127.0.0.1", port, 0, error.data(), error.size(), "GET %s HTTP/1.1\r\n%s%s\r\n",
-                  path.c_str(), host.c_str(), headers.c_str());
+      mg_download("127.0.0.1", port, 0, error.data(), error.size(), "%s %s HTTP/1.1\r\n%s%s\r\n",
+                  method, path.c_str(), host.c_str(), headers.c_str());
   if (connection == nullptr) return {};
   Answer answer{mg_get_response_info(connection)->status_code, {}};
   std::array<char, 4096> buffer{};
@@ -47,6 +49,10 @@ Answer get(int port, const std::string& path, const std::string& headers = {}) {
     answer.body.append(buffer.data(), static_cast<std::size_t>(n));
   mg_close_connection(connection);
   return answer;
+}
+
+Answer post(int port, const std::string& path, const std::string& headers = {}) {
+  return get(port, path, headers + "Content-Length: 0\r\n", "POST");
 }
 
 PageServerOptions any_port() {
@@ -79,26 +85,30 @@ TEST_CASE("Pages of other sites are refused") {
   for (const std::string host : {"evil.example", "127.evil.example", "127.0.0.1.evil.example"})
     CHECK(get(port, "/", "Host: " + host + ':' + std::to_string(port) + "\r\n").status == 404);
   CHECK(get(port, "/", "Host: localhost:" + std::to_string(port) + "\r\n").status == 200);
-  const std::string upgrade =
-      "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
-      "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n";
-  CHECK(get(port, "/updates", upgrade + "Origin: http://" + own + "\r\n").status == 101);
-  CHECK(get(port, "/updates", upgrade + "Origin: http://evil.example\r\n").status == 0);
+  CHECK(get(port, "/updates?page=a").status == 404);  // which need not name the other site
+  CHECK(post(port, "/updates?page=a", "Origin: http://evil.example\r\n").status == 404);
 }
 
-// A TCP connection that sends nothing.
-class IdleConnection {
+// A TCP connection of an attacker.
+class RawConnection {
  public:
-  explicit IdleConnection(int port) : socket_(::socket(AF_INET, SOCK_STREAM, 0)) {
+  explicit RawConnection(int port) : socket_(::socket(AF_INET, SOCK_STREAM, 0)) {
+    const timeval patience{.tv_sec = 1, .tv_usec = 0};
+    setsockopt(socket_, SOL_SOCKET, SO_SNDTIMEO, &patience, sizeof(patience));
     sockaddr_in address{};
     address.sin_family = AF_INET;
     address.sin_port = htons(static_cast<std::uint16_t>(port));
     address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
     REQUIRE(::connect(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) == 0);
   }
-  ~IdleConnection() { ::close(socket_); }
-  IdleConnection(const IdleConnection&) = delete;
-  IdleConnection& operator=(const IdleConnection&) = delete;
+  ~RawConnection() { ::close(socket_); }
+  RawConnection(const RawConnection&) = delete;
+  RawConnection& operator=(const RawConnection&) = delete;
+
+  /// False if the server has closed the connection or does not read.
+  bool send(const std::string& bytes) const {
+    return ::send(socket_, bytes.data(), bytes.size(), MSG_NOSIGNAL) > 0;
+  }
 
   /// False once the server has closed the connection.
   [[nodiscard]] bool is_open() const {
@@ -114,8 +124,8 @@ TEST_CASE("A page does not wait until idle connections are closed") {
   ViewStore store(1'000'000);
   const PageServer server(store, any_port());
   const int port = port_of(server);
-  std::vector<std::unique_ptr<IdleConnection>> idle;
-  for (int i = 0; i < 40; ++i) idle.push_back(std::make_unique<IdleConnection>(port));
+  std::vector<std::unique_ptr<RawConnection>> idle;
+  for (int i = 0; i < 40; ++i) idle.push_back(std::make_unique<RawConnection>(port));
   CHECK(get(port, "/").status == 200);
   CHECK(std::ranges::all_of(idle, [](const auto& connection) { return connection->is_open(); }));
 }
@@ -126,15 +136,39 @@ TEST_CASE("Pages beyond the limit are refused, and files are served still") {
   const int port = port_of(server);
   std::vector<std::unique_ptr<PageListener>> pages;
   for (int i = 0; i < 48; ++i) {
-    pages.push_back(std::make_unique<PageListener>(port, "/updates"));
+    pages.push_back(std::make_unique<PageListener>(port, "/updates?page=" + std::to_string(i)));
     REQUIRE(pages.back()->receives("hello"));
   }
-  std::array<char, 256> error{};
-  CHECK(mg_connect_websocket_client("127.0.0.1", port, 0, error.data(), error.size(), "/updates",
-                                    nullptr, nullptr, nullptr, nullptr) == nullptr);
+  CHECK(post(port, "/updates?page=48").status == 404);
   CHECK(get(port, "/").status == 200);
-  pages[0]->send(std::string(20'000'000, '['));
-  CHECK(pages[0]->is_closed());
+}
+
+TEST_CASE("Requests of any size take no memory") {
+  ViewStore store(1'000'000);
+  const PageServer server(store, any_port());
+  const int port = port_of(server);
+  const std::string upgrade =
+      "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+      "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n";
+  const auto [start, frame] = GENERATE_COPY(table<std::string, std::string>(
+      {{"GET /updates?page=a", upgrade + std::string("\r\n\x81\xff\0\0\0\0\3\0\0\0\0\0\0\0", 16)},
+       {"POST /images?page=a&robot=1&on=true", "Content-Length: 2000000000\r\n\r\n"},
+       {"POST /updates?page=a", "Content-Length: 2000000000\r\n\r\n"},
+       {"GET /", "X: "}}));
+  CAPTURE(start);
+  const auto peak_kb = [] {
+    rusage usage{};
+    getrusage(RUSAGE_SELF, &usage);
+    return usage.ru_maxrss;
+  };
+  const long before = peak_kb();
+  const RawConnection attacker(port);
+  attacker.send(start + " HTTP/1.1\r\nHost: localhost\r\n" + frame);
+  const std::string brackets(1 << 20U, '[');
+  for (int k = 0; k < 50 && attacker.send(brackets); ++k) {
+  }
+  CHECK(peak_kb() - before < 10'000);
+  CHECK(get(port, "/").status == 200);
 }
 
 TEST_CASE("Other hosts need the token") {
@@ -160,7 +194,7 @@ TEST_CASE("A page receives the hello message, all past messages, and new ones") 
   ViewStore store(1'000'000);
   store.add(state_of("early"));
   const PageServer server(store, any_port());
-  PageListener page(port_of(server), "/updates");
+  PageListener page(port_of(server), "/updates?page=a");
   CHECK(page.receives(R"([{"kind":"hello"}])"));
   CHECK(page.receives(R"("name":"early")"));
   CHECK(page.receives(R"([{"kind":"caught_up"}])"));
@@ -184,17 +218,20 @@ TEST_CASE("A robot is asked for images as long as any page requests them") {
     return changed.wait_for(lock, kPatience, [&] { return asked.size() >= count; });
   };
   const PageServer server(store, options);
+  const int port = port_of(server);
+  const auto request = [port](const std::string& page_and_robot) {
+    CHECK(post(port, "/images?on=true&page=" + page_and_robot).status == 200);
+  };
   {
-    PageListener one(port_of(server), "/updates");
-    one.send("no JSON");
-    one.send(R"({"images":-1,"on":true})");
-    one.send(R"({"images":70000,"on":true})");
-    one.send(R"({"images":3,"on":true})");
+    const PageListener one(port, "/updates?page=a");
+    for (const std::string bad : {"a", "a&robot=-1", "a&robot=70000", "a&robot=3x", "b&robot=3"})
+      CHECK(post(port, "/images?on=true&page=" + bad).status == 404);
+    request("a&robot=3");
     REQUIRE(wait_for(1));
     {
-      PageListener other(port_of(server), "/updates");
-      other.send(R"({"images":3,"on":true})");
-      other.send(R"({"images":4,"on":true})");
+      const PageListener other(port, "/updates?page=b");
+      request("b&robot=3");
+      request("b&robot=4");
       REQUIRE(wait_for(2));
     }
     REQUIRE(wait_for(3));  // the other page has gone
