@@ -112,8 +112,7 @@ TEST_CASE(
     "A team ends equally, in whatever order, at whatever rate and with whatever outages it meets",
     "[slow]") {
   check_orders(
-      GENERATE(LawCase{"cosmo_bench/kth_r3_00_d06_d09_d10_wifi.jrl", 0, "", kOverKilometres_m},
-               LawCase{"cosmo_bench/ntu_r3_02_d02_n04_n13_wifi.jrl", 0, "", kOverKilometres_m},
+      GENERATE(LawCase{"cosmo_bench/ntu_r3_02_d02_n04_n13_wifi.jrl", 0, "", kOverKilometres_m},
                LawCase{"pose_graphs/3d/parking-garage.g2o", 4, "", kInRooms_m},
                LawCase{"pose_graphs/3d/parking-garage.g2o", 4, "clusters", kInRooms_m},
                LawCase{"pose_graphs/3d/sphere2500.g2o", 5, "noisy-odometry", kInRooms_m}));
@@ -121,7 +120,8 @@ TEST_CASE(
 
 TEST_CASE("All recorded graphs and scenarios end equally in any order", "[.][law_long]") {
   check_orders(
-      GENERATE(LawCase{"cosmo_bench/kth_r3_00_d06_d09_d10_proradio.jrl", 0, "", kOverKilometres_m},
+      GENERATE(LawCase{"cosmo_bench/kth_r3_00_d06_d09_d10_wifi.jrl", 0, "", kOverKilometres_m},
+               LawCase{"cosmo_bench/kth_r3_00_d06_d09_d10_proradio.jrl", 0, "", kOverKilometres_m},
                LawCase{"cosmo_bench/ntu_r3_02_d02_n04_n13_proradio.jrl", 0, "", kOverKilometres_m},
                LawCase{"pose_graphs/3d/sphere2500.g2o", 5, "", kInRooms_m},
                LawCase{"pose_graphs/3d/sphere_bignoise_vertex3.g2o", 3, "", kInRooms_m},

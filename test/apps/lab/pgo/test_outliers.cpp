@@ -219,7 +219,7 @@ TEST_CASE("a closure that alone corrects a long drift is kept among false ones")
 TEST_CASE("noise of steps and closures that no claim covers rejects nothing") {
   const auto file = shared_data("pose_graphs/3d/sphere_bignoise_vertex3.g2o");
   if (!file) return;
-  const std::size_t robots = GENERATE(1U, 2U, 3U, 5U);
+  const std::size_t robots = GENERATE(1U, 5U);
   CAPTURE(robots);
   const TeamGraph graph = partition_contiguously(read_g2o(*file), robots, file->string());
   CHECK(std::ranges::count(run_agent_team(graph, {}).kept, false) == 0);
