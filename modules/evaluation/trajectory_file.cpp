@@ -121,7 +121,7 @@ StampedPose pose_of(const InputRow& row, const Columns& columns) {
     row.fail(std::string(time) + " is not a stamp in " +
              (columns.is_ns ? "nanoseconds" : "seconds") +
              (columns.is_ns && !columns.is_named
-                  ? "; with commas and seconds a header must name the columns, as in "
+                  ? "; with commas or semicolons and seconds a header must name the columns, as in "
                     "timestamp,tx,ty,tz,qx,qy,qz,qw"
                   : ""));
   return {*stamp, row.pose(columns.pose, columns.w_first)};
