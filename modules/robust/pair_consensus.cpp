@@ -292,10 +292,14 @@ Precision usual_strength(const PairMotions& all) {
 
 void limit_precisions(SessionGraph& graph) {
   if (graph.step_precision.size() < kMajority) return;
-  const Precision own = graph.step_precision[graph.self];
-  std::vector<Precision> steps;
-  for (const auto& [robot, step] : graph.step_precision) steps.push_back(step);
-  const Precision usual = lower_median(steps);
+  const auto claimed_by = [&](RobotId robot) {
+    const Precision step = graph.step_precision[robot], noise = graph.odometry_precision[robot];
+    return Precision{step.kappa / noise.kappa, step.tau / noise.tau};
+  };
+  const Precision own = claimed_by(graph.self);
+  std::vector<Precision> claims;
+  for (const auto& [robot, step] : graph.step_precision) claims.push_back(claimed_by(robot));
+  const Precision usual = lower_median(claims);
   const auto limited = [&](const Precision& p) {
     return Precision{std::min(p.kappa, kMostPrecise * usual.kappa),
                      std::min(p.tau, kMostPrecise * usual.tau)};

@@ -33,10 +33,10 @@ struct SessionGraph {
   std::vector<PoseEdge> to_absent = {};
   /// Start of the public poses of other robots, including absent robots.
   std::map<KeyframeId, SE3> public_poses = {};
-  /// Mean weights of one step of odometry, as reported by each robot.
+  /// Mean actual weights of one step of odometry, as reported by each robot.
   std::map<RobotId, Precision> step_precision = {};
-  /// Actual over claimed weights of closures, as reported by each robot for those inside it.
-  std::map<RobotId, Precision> closure_precision = {};
+  /// Actual over claimed weights of odometry, and of the closures inside each robot, by itself.
+  std::map<RobotId, Precision> odometry_precision = {}, closure_precision = {};
   LaterRuns later_runs = {};  ///< Those of other robots by their public keyframes.
   /// Positions of own keyframes relative to keyframe 0, never weighed: see fix_edges().
   std::vector<PoseEdge> fixes = {};

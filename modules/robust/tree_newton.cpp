@@ -34,6 +34,12 @@ SolverMessage message_to(RobotId to, std::vector<std::uint8_t> bytes) {
   return {to, std::make_shared<const std::vector<std::uint8_t>>(std::move(bytes))};
 }
 
+bool has_noisy_odometry(const SessionGraph& graph) {
+  return std::ranges::any_of(graph.odometry_precision, [](const auto& of_robot) {
+    return std::min(of_robot.second.kappa, of_robot.second.tau) < 1.0;
+  });
+}
+
 }  // namespace
 
 TreeNewton::TreeNewton(SessionGraph graph, TreePlace place, const TreeNewtonOptions& options)
@@ -42,7 +48,8 @@ TreeNewton::TreeNewton(SessionGraph graph, TreePlace place, const TreeNewtonOpti
       edges_(std::move(graph), place_, options),
       accepted_(edges_.graph().start) {
   if (!place_.parent)
-    root_.emplace(place_.members, options_, edges_.graph().upright, edges_.graph().again);
+    root_.emplace(place_.members, options_, edges_.graph().upright, edges_.graph().again,
+                  has_noisy_odometry(edges_.graph()));
 }
 
 void TreeNewton::build_front() {

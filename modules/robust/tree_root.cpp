@@ -176,10 +176,10 @@ DownMessage TreeRoot::decide_start(const TreeSums& sums, std::uint32_t round) {
     const bool deferred = sums.left > kFewOpen && enough && joined(members_, sums.votes);
     return start(deferred, deferred ? sums : *first_);
   }
-  if (!odometry_is_noisy_ && options_.robust && !again_) {
+  if (!weakened_ && options_.robust && !again_) {
     const auto noise = likely_odometry_noise(sums.votes);
     if (!noise.empty()) {
-      odometry_is_noisy_ = true;
+      noisy_ = weakened_ = true;
       DownMessage message = answer(Next::kCount);
       message.verdict.odometry.assign(noise.begin(), noise.end());
       return message;
@@ -247,8 +247,8 @@ DownMessage TreeRoot::step(const TreeSums& sums, const TreeFront& front,
   // If odometry is noisy, the poses may be far from the minimum of the nearly convex cost at the
   // beginning. A large predicted decrease shows that the quadratic model does not hold there; mu
   // then waits for another step.
-  const bool far = odometry_is_noisy_ && !at_base_ && schedule_.is_nearly_convex() &&
-                   0.5 * decrement_ > kFar * cost_;
+  const bool far =
+      noisy_ && !at_base_ && schedule_.is_nearly_convex() && 0.5 * decrement_ > kFar * cost_;
   if (!far && weighing_ != Weighing::kHold) schedule_.next({sums.changed, sums.fractional});
   if (decrement_ <= kNearRounding * (1.0 + cost_))
     for (double* limit : {&options_.tolerance, &options_.absolute_tolerance}) *limit *= kRelax;

@@ -29,10 +29,15 @@ struct TreeNewtonOptions {
 /// which solves the equations of the whole team. Not thread-safe.
 class TreeRoot {
  public:
-  /// `members`: of the session, ascending. `again`: see SessionGraph.
+  /// `members`: of the session, ascending. `again`: see SessionGraph. `noisy`: the odometry of a
+  /// member is noisier than it claims.
   TreeRoot(std::vector<RobotId> members, const TreeNewtonOptions& options, bool upright,
-           bool again = false)
-      : members_(std::move(members)), options_(options), upright_(upright), again_(again) {}
+           bool again = false, bool noisy = false)
+      : members_(std::move(members)),
+        options_(options),
+        upright_(upright),
+        again_(again),
+        noisy_(noisy) {}
 
   /// Decides, before there are equations, when the team starts and with which closures.
   [[nodiscard]] DownMessage decide_start(const TreeSums& sums, std::uint32_t round);
@@ -63,12 +68,13 @@ class TreeRoot {
   TreeNewtonOptions options_;
   bool upright_;
   bool again_;
+  bool noisy_;  // the odometry of a member, by itself or by cycles through other robots
   RobustSchedule schedule_;
-  std::optional<TreeSums> first_;   // sums before any closure was deferred or decided
-  bool odometry_is_noisy_ = false;  // by cycles through other robots
-  bool alone_ = false;              // robots have decided the closures inside them
-  bool may_defer_ = false;          // closures that stand alone are probably false
-  bool deferred_ = false;           // they wait for a second look
+  std::optional<TreeSums> first_;  // sums before any closure was deferred or decided
+  bool weakened_ = false;          // odometry, by cycles through other robots
+  bool alone_ = false;             // robots have decided the closures inside them
+  bool may_defer_ = false;         // closures that stand alone are probably false
+  bool deferred_ = false;          // they wait for a second look
   std::uint32_t round_ = 0;
   double barc_ = 0.0;
   double noise_scale_ = 1.0;

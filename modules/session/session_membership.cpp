@@ -69,6 +69,7 @@ void publish_poses(AgentState& s, TeamOutput& output) {
   message.stage = *s.part->stage();
   message.frame = s.part->session().plan.frame;
   message.step_precision = s.graph.mean_step_precision();
+  message.odometry_precision = s.graph.odometry_noise().corrected({});
   message.closure_precision = s.graph.odometry_noise().corrected_closure({});
   message.keyframes = s.part->public_keyframes();
   message.later_runs = first_in_runs(s.graph.later_runs(), message.keyframes);

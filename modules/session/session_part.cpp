@@ -61,6 +61,7 @@ std::optional<FrozenPart> freeze_part(const Session& session, RobotId self, cons
   frozen.own = graph.own_edges();
   frozen.odometry = graph.keyframes() - 1;
   frozen.step_precision[self] = graph.mean_step_precision();
+  frozen.odometry_precision[self] = graph.odometry_noise().corrected({});
   frozen.closure_precision[self] = graph.odometry_noise().corrected_closure({});
   frozen.later_runs[self] = graph.later_runs();
   frozen.upright = session.upright;
@@ -184,6 +185,7 @@ bool SessionPart::gather(const PublicPoses& published) {
     const MemberPoses& poses = *poses_of(published, robot, *stage());
     add_public_poses(poses, graph_.public_poses);
     if (!graph_.again) graph_.step_precision[robot] = poses.step_precision;
+    graph_.odometry_precision[robot] = poses.odometry_precision;
     graph_.closure_precision[robot] = poses.closure_precision;
     graph_.later_runs[robot] = poses.later_runs;
     for (const auto& [id, kept] : poses.verdicts)

@@ -119,11 +119,12 @@ void describe(auto& archive, As<MemberPoses> auto& m) {
   archive(m.session);
   archive.choice(m.stage, MemberStage::kFailed);
   archive(m.frame);
-  for (auto* precision : {&m.step_precision, &m.closure_precision}) {
+  for (auto* precision : {&m.step_precision, &m.odometry_precision, &m.closure_precision}) {
     describe_weight(archive, precision->kappa);
     describe_weight(archive, precision->tau);
+    archive.require(precision == &m.step_precision ||
+                    (precision->kappa <= 1.0 && precision->tau <= 1.0));
   }
-  archive.require(m.closure_precision.kappa <= 1.0 && m.closure_precision.tau <= 1.0);
   for (const auto& [keyframes, bytes] :
        {std::pair(&m.keyframes, kPoseBytes), std::pair(&m.later_runs, std::size_t{1})}) {
     std::uint64_t next = 0;  // keyframes are sent as differences

@@ -126,10 +126,10 @@ struct MemberPoses {
   SessionId session = {};
   MemberStage stage = MemberStage::kEntered;
   TeamFrame frame = {};
-  Precision step_precision = {};  ///< Mean weights of one step of its odometry.
-  /// Actual over claimed weights of the closures inside it, at most 1: see OdometryNoise.
-  Precision closure_precision = {};
-  std::vector<KeyframeIndex> keyframes = {};  ///< Ascending, 0 first.
+  Precision step_precision = {};  ///< Mean actual weights of one step of its odometry.
+  /// Actual over claimed weights of its odometry, and of the closures inside it: see OdometryNoise.
+  Precision odometry_precision = {}, closure_precision = {};  // at most 1
+  std::vector<KeyframeIndex> keyframes = {};                  ///< Ascending, 0 first.
   /// First of `keyframes` in every later run of the robot, ascending: see LaterRuns.
   std::vector<KeyframeIndex> later_runs = {};
   std::vector<SinglePose> T_frame_kf = {};

@@ -117,6 +117,28 @@ TEST_CASE("pairs are not limited if no robot can be outvoted") {
   CHECK(usual_strength(pairs).tau == kUnlimited.tau);
 }
 
+TEST_CASE("robots that find their odometry noisy do not limit the others") {
+  constexpr Precision kStep{2e4, 1e4}, kClosure{2e3, 1e3};
+  const double factor = 20.0, weight = 1.0 / (factor * factor);
+  SessionGraph graph{.own = {{{1, 0}, {1, 1}, SE3::Identity(), kStep}},
+                     .odometry = 1,
+                     .between = {{{0, 0}, {1, 1}, SE3::Identity(), kClosure}}};
+  graph.self = 1;
+  for (RobotId robot = 0; robot < 4; ++robot) {
+    const double noise = robot % 2 == 0 ? weight : 1.0;
+    graph.step_precision[robot] = {noise * kStep.kappa, noise * kStep.tau};
+    graph.odometry_precision[robot] = {noise, noise};
+  }
+  limit_precisions(graph);
+  CHECK(graph.own[0].precision.tau == kStep.tau);
+  CHECK(graph.between[0].precision.kappa == kClosure.kappa);
+  // A robot that claims more than the others is limited, also if it then finds noise.
+  graph.step_precision[1] = {100.0 * kStep.kappa, 100.0 * kStep.tau};
+  graph.own[0].precision = graph.step_precision[1];
+  limit_precisions(graph);
+  CHECK(graph.own[0].precision.tau < 1.3 * kStep.tau);
+}
+
 TEST_CASE("the motion of a pair is the one on which most closures agree") {
   std::mt19937 rng(3);
   const SE3 T = random_pose(rng, 30.0);

@@ -57,6 +57,7 @@ MemberPoses some_poses() {
                     .stage = MemberStage::kSolved,
                     .frame = {kPeer2, 8},
                     .step_precision = {123.456, 7.0},
+                    .odometry_precision = {0.5, 1.0},
                     .closure_precision = {0.25, 1.0},
                     .keyframes = {0, 1, 5, 200, 4'000'000'000U},
                     .later_runs = {5, 4'000'000'000U}};
@@ -141,7 +142,7 @@ TEST_CASE("A pose of a member takes 29 bytes") {
   many.verdicts.clear();
   for (KeyframeIndex k = 0; k < 1000; ++k) many.keyframes.push_back(3 * k);
   many.T_frame_kf.assign(1000, many.T_frame_kf[0]);
-  CHECK(encode(many).size() < 29 * 1000 + 80);
+  CHECK(encode(many).size() < 29 * 1000 + 96);
 }
 
 TEST_CASE("No truncated message is accepted") {
@@ -232,6 +233,7 @@ TEST_CASE("Invalid poses of a member are refused") {
        {"not finite", [](P& m) { m.T_frame_kf[3].t.z() = static_cast<float>(kInfinity); }},
        {"an invalid rotation", [](P& m) { m.T_frame_kf[3].q.coeffs() *= 1.01F; }},
        {"zero weight", [](P& m) { m.step_precision.tau = 0.0; }},
+       {"odometry better than claimed", [](P& m) { m.odometry_precision.kappa = 2.0; }},
        {"closures without weight", [](P& m) { m.closure_precision.kappa = 0.0; }},
        {"closures better than claimed", [](P& m) { m.closure_precision.tau = 2.0; }},
        {"too much weight", [](P& m) { m.step_precision.kappa = 1e300; }},
