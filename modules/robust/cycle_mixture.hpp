@@ -65,6 +65,9 @@ inline constexpr std::array kNoiseOfClosures{1.0, 2.0, 4.0, 8.0};
 // Priors that fits of noise share.
 inline constexpr double kMostlyTrue = 0.5;  ///< Share of true cycles from which on most are true.
 inline constexpr double kNoiseFactorWidth = 1.0986;  ///< Log 3, of the log of a factor of noise.
-inline constexpr double kThousandToOne = 6.9;        ///< Log of odds against an unusual noise.
+inline constexpr double kThousandToOne = 6.9;  ///< Log of odds against unusual noise of closures.
+/// Log of odds against noise of odometry. A precise robot that seems noisy loses little. A noisy
+/// one that seems precise loses true closures.
+inline constexpr double kTenToOne = 2.3;
 
 }  // namespace km

@@ -24,10 +24,7 @@ constexpr std::size_t kNearestPlaces = 3;  // cycles of a place with other place
 constexpr std::size_t kPlacesBeside = 8;   // places before and after, among which the nearest are
 constexpr std::size_t kMostPlaces = 60;    // bounds the time
 constexpr std::size_t kEnoughPlaces = 3;
-// Log of odds. A precise robot that seems noisy loses little, and a noisy one that seems precise
-// loses true closures. At 1000 to 1, one of 54 buildings in which a robot is 3 times noisier than
-// it claims has 4.1 times the error of the reference. At 10 to 1 it has 1.0 times.
-constexpr double kTenToOne = 2.3;
+constexpr double kMostPlacesTrue = kMostlyTrue * kMostlyTrue;  // share of cycles of two places
 
 double log_prior(double level) {
   const double away = level * std::numbers::ln2 / kNoiseFactorWidth;
@@ -220,23 +217,18 @@ bool rests_on_one_pair(std::span<const PairVote> votes, const Levels& levels, Ro
   return !others_allow(level) && !(level > 1 && others_allow(level - 1));
 }
 
-// The robot whose noise is the least likely one, if the odds are below 10 to 1.
-std::optional<RobotId> least_likely(std::span<const PairVote> votes,
-                                    const std::set<RobotId>& honest, const Levels& levels) {
+// The robot whose noise is the least likely one beside the noise of the others, if the odds are
+// below 10 to 1. If the odds only leave open which one of two robots is noisy, both are likely.
+std::optional<RobotId> least_likely(std::span<const PairVote> votes, const Levels& levels) {
   double least = kTenToOne;
   std::optional<RobotId> doubtful;
   const double most = log_posterior_of(votes, levels);
   for (const auto& [robot, level] : levels) {
     if (level == 0) continue;
     if (rests_on_one_pair(votes, levels, robot)) return robot;
-    std::set<RobotId> others = honest;
-    others.insert(robot);
-    Levels none;
-    for (const auto& [other, any] : levels) none[other] = 0;
-    double without = log_posterior_of(votes, best_levels(votes, others, levels));
-    without = std::max(without, log_posterior_of(votes, best_levels(votes, others, none)));
-    if (!(most - without < least)) continue;
-    least = most - without;
+    const double odds = most - log_posterior_of(votes, with(levels, robot, 0));
+    if (!(odds < least)) continue;
+    least = odds;
     doubtful = robot;
   }
   return doubtful;
@@ -273,11 +265,15 @@ std::optional<std::vector<PairCycle>> if_near(std::vector<PairCycle> cycles, int
   return cycles;
 }
 
-// See odometry_evidence(). Empty if most cycles are false.
-std::vector<float> evidence_of(const std::vector<PairCycle>& cycles,
-                               const std::vector<double>& weights, bool a_is_first, int dimension) {
-  std::vector<float> evidence;
-  double most = -std::numeric_limits<double>::infinity(), share = 0.0;
+struct Evidence {
+  std::vector<float> by_level = {};  // see odometry_evidence()
+  bool mostly_true = false;
+};
+
+Evidence evidence_of(const std::vector<PairCycle>& cycles, const std::vector<double>& weights,
+                     bool a_is_first, int dimension) {
+  Evidence evidence;
+  double most = -std::numeric_limits<double>::infinity();
   constexpr int kLevels = kNoiseLevels;
   for (int i = 0; i < kLevels; ++i)
     for (int j = 0; j < kLevels; ++j) {
@@ -292,12 +288,12 @@ std::vector<float> evidence_of(const std::vector<PairCycle>& cycles,
         best = std::max(best, found);
         if (!(found > most)) continue;
         most = found;
-        share = mixture.share;
+        evidence.mostly_true = mixture.share > kMostPlacesTrue;
       }
       if (!std::isfinite(best)) return {};
-      evidence.push_back(static_cast<float>(best));
+      evidence.by_level.push_back(static_cast<float>(best));
     }
-  return share > kMostlyTrue ? evidence : std::vector<float>();
+  return evidence;
 }
 
 }  // namespace
@@ -314,8 +310,11 @@ std::vector<float> odometry_evidence(std::span<const PoseEdge> closures,
   const std::vector<double> weights(cycles.size(), weight);
   const bool a_is_first = places.front().lower.robot < places.front().upper.robot;
   const std::optional<std::vector<PairCycle>> near = if_near(cycles, dimension);
-  if (near && evidence_of(*near, weights, a_is_first, dimension).empty()) return {};
-  return evidence_of(cycles, weights, a_is_first, dimension);
+  auto [evidence, mostly_true] = evidence_of(cycles, weights, a_is_first, dimension);
+  if (near) mostly_true &= evidence_of(*near, weights, a_is_first, dimension).mostly_true;
+  if (!mostly_true && !evidence.empty())
+    for (float& e : evidence) e = std::min(e, evidence.front());
+  return evidence;
 }
 
 std::map<RobotId, double> likely_odometry_noise(std::span<const PairVote> pairs) {
@@ -328,7 +327,7 @@ std::map<RobotId, double> likely_odometry_noise(std::span<const PairVote> pairs)
   }
   std::set<RobotId> honest;
   levels = best_levels(votes, honest, levels);
-  while (const auto doubtful = least_likely(votes, honest, levels)) {
+  while (const auto doubtful = least_likely(votes, levels)) {
     honest.insert(*doubtful);
     levels = best_levels(votes, honest, levels);
   }

@@ -25,8 +25,8 @@ inline constexpr std::size_t kNoiseLevels = 6;
 /// closure is false (see cycle_mixture.hpp). C are the claimed covariances of the odometry, with
 /// lever arms, and S those of the closures. The factor s of the pair is the likeliest one of 1, 2,
 /// 4 and 8, with the Cauchy prior of closure_noise.hpp. A place counts as one observation. Empty if
-/// there are fewer than three places, or if the likeliest noise leaves most cycles false: noise may
-/// not be what makes false closures true.
+/// there are fewer than three places. If the likeliest noise leaves three quarters of the cycles
+/// false, nothing is likelier than the claims: noise may not be what makes false closures true.
 ///
 /// `closures`: between a and b. `pose`: of their ends, by odometry. `step`: mean weights of a step
 /// of odometry of each robot. Both robots compute equal values. O(n log n) for n closures.
@@ -36,10 +36,10 @@ inline constexpr std::size_t kNoiseLevels = 6;
 
 /// The robots whose odometry is noisier than it claims, with the factor on its standard deviations.
 /// The factors maximise the sum of the evidence of all pairs and the log prior of each robot (the
-/// same Cauchy distribution). A robot is left out unless the odds are 10 to 1, with the best
-/// factors of the other robots in either case. It is also left out if it has evidence in several
-/// pairs, and all but one of them refute its noise, also half of it, with these odds. If more than
-/// half of the robots seem noisy, the closures may be the reason, and the result is empty.
+/// same Cauchy distribution). A robot is left out unless the odds are 10 to 1 beside the factors of
+/// the others. It is also left out if it has evidence in several pairs, and all but one of them
+/// refute its noise, also half of it, with these odds. If more than half of the robots seem noisy,
+/// the closures may be the reason, and the result is empty.
 [[nodiscard]] std::map<RobotId, double> likely_odometry_noise(std::span<const PairVote> pairs);
 
 }  // namespace km

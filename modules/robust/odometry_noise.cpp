@@ -272,7 +272,7 @@ double noise_beside_odometry(const Cycles& all, double otherwise) {
 }
 
 bool is_noisy(const FactorFit& fit) {
-  return fit.log_odds >= kThousandToOne && fit.share > kMostlyTrue;
+  return fit.log_odds >= kTenToOne && fit.share > kMostlyTrue;
 }
 
 }  // namespace
@@ -285,7 +285,7 @@ OdometryNoise estimate_odometry_noise(std::span<const PoseEdge> steps,
   if (cycles.empty()) return noise;
   const double volume = volume_of(chain, closures, dimension);
   FactorFit fit = fit_factors({cycles, volume, dimension});
-  if (!(fit.log_odds >= kThousandToOne)) {
+  if (!(fit.log_odds >= kTenToOne)) {
     noise.beside = noise_beside_odometry({cycles, volume, dimension}, fit.log_posterior);
     return noise;
   }
@@ -303,7 +303,7 @@ OdometryNoise estimate_odometry_noise(std::span<const PoseEdge> steps,
   for (double& factor : common.factors) factor = std::max(1.0, factor);
   if (noise.of_closures)
     fit = common;
-  else if (refined.log_odds >= kThousandToOne)
+  else if (refined.log_odds >= kTenToOne)
     fit = refined;
   else if (!few_are_long)
     return noise;

@@ -130,6 +130,38 @@ TEST_CASE("Pairs that show noise of different sizes blame the odometry of a robo
   CHECK(weak(2.0F).empty());
 }
 
+TEST_CASE("The likelier of two robots is noisy if the odds leave open which one") {
+  const auto of_levels = [](const std::function<double(std::size_t, std::size_t)>& log_likelihood) {
+    std::vector<float> evidence;
+    for (std::size_t i = 0; i < kNoiseLevels; ++i)
+      for (std::size_t j = 0; j < kNoiseLevels; ++j)
+        evidence.push_back(static_cast<float>(log_likelihood(i, j)));
+    return evidence;
+  };
+  // The cycles of robots 0 and 1 need one of them at level 3.
+  const auto either = of_levels([](auto i, auto j) {
+    const double off = static_cast<double>(std::max(i, j)) - 3.0;
+    return -4.0 * off * off - 0.1 * static_cast<double>(j) -
+           3.0 * static_cast<double>(std::min(i, j));
+  });
+  const auto precise = of_levels([](auto i, auto j) { return -0.1 * static_cast<double>(i + j); });
+  const auto found = likely_odometry_noise(std::vector<PairVote>{
+      {.a = 0, .b = 1, .odometry = either}, {.a = 1, .b = 2, .odometry = precise}});
+  CHECK(found.contains(0));
+  CHECK(!found.contains(1));
+}
+
+TEST_CASE("Pairs with many false closures only count against noise") {
+  // Robots 1 and 2 are precise; half of their places are false.
+  const unsigned seed = GENERATE(range(1U, 6U));
+  CAPTURE(seed);
+  Helices team{.rng = std::mt19937(seed), .share_false = 0.6};
+  const std::vector<float> evidence = team.votes(2).front().odometry;
+  REQUIRE(evidence.size() == kNoiseLevels * kNoiseLevels);
+  CHECK(std::ranges::max(evidence) == evidence.front());
+  CHECK(evidence.back() < evidence.front() - 5.0F);
+}
+
 TEST_CASE("One peer alone cannot blame the odometry of a robot") {
   Helices team{.rng = std::mt19937(1)};
   std::vector<PairVote> votes = team.votes(3);

