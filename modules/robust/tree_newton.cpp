@@ -34,12 +34,9 @@ SolverMessage message_to(RobotId to, std::vector<std::uint8_t> bytes) {
   return {to, std::make_shared<const std::vector<std::uint8_t>>(std::move(bytes))};
 }
 
-// True if the odometry of a robot is so noisy that the start may be far from the solution. With
-// up to 2.4 times the claimed noise (recordings at KTH), waiting takes rounds and gains nothing.
 bool has_noisy_odometry(const SessionGraph& graph) {
-  constexpr double kNoise = 4.0;
   return std::ranges::any_of(graph.odometry_precision, [](const auto& of_robot) {
-    return std::min(of_robot.second.kappa, of_robot.second.tau) < 1.0 / (kNoise * kNoise);
+    return std::min(of_robot.second.kappa, of_robot.second.tau) < 1.0;
   });
 }
 
