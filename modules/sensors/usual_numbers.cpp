@@ -4,14 +4,13 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <functional>
-#include <numeric>
 #include <string_view>
 #include <utility>
 
 #include "modules/core/config.hpp"
 #include "modules/core/quantile.hpp"
 #include "modules/core/text_table.hpp"
+#include "modules/recordings/bag_summary.hpp"
 
 namespace km {
 namespace {
@@ -189,19 +188,14 @@ std::vector<Doubt> FirstPackets::add(const SensorPacket& packet) {
   const auto judge = [&doubts](UsualNumber number, double value) {
     if (const auto found = doubt(number, value)) doubts.push_back(*found);
   };
-  const auto judge_rate = [&doubts](UsualNumber number, const auto& all, const auto& stamp_of) {
-    std::vector<double> intervals_s;
-    for (std::size_t k = 1; k < all.size(); ++k)
-      intervals_s.push_back(
-          seconds_between(std::invoke(stamp_of, all[k - 1]), std::invoke(stamp_of, all[k])));
-    const double sum_s = std::accumulate(intervals_s.begin(), intervals_s.end(), 0.0);
-    if (!(sum_s > 0.0)) return;
-    const double rate_hz = static_cast<double>(intervals_s.size()) / sum_s;
-    if (const auto found = rate_doubt(number, rate_hz, quantile(intervals_s, 0.5)))
-      doubts.push_back(*found);
+  const auto judge_rate = [&doubts](UsualNumber number, std::vector<Stamp> stamps) {
+    const StampStatistics all = stamp_statistics(std::move(stamps));
+    if (const auto found = rate_doubt(number, all.rate_hz, all.median_s)) doubts.push_back(*found);
   };
-  judge_rate(UsualNumber::kImageRate_hz, frames_, std::identity());
-  judge_rate(UsualNumber::kImuRate_hz, samples_, &ImuSample::stamp);
+  judge_rate(UsualNumber::kImageRate_hz, frames_);
+  std::vector<Stamp> of_samples;
+  for (const ImuSample& sample : samples_) of_samples.push_back(sample.stamp);
+  judge_rate(UsualNumber::kImuRate_hz, std::move(of_samples));
   if (const auto found = gravity_doubt(samples_)) doubts.push_back(*found);
   const auto unmeasured =
       std::partition(depths_m_.begin(), depths_m_.end(), [](double m) { return m > 0.0; });
