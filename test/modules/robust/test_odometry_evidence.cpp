@@ -152,14 +152,14 @@ TEST_CASE("The likelier of two robots is noisy if the odds leave open which one"
 }
 
 TEST_CASE("Pairs with many false closures only count against noise") {
-  // Robots 1 and 2 are precise; half of their places are false.
-  const unsigned seed = GENERATE(range(1U, 6U));
-  CAPTURE(seed);
-  Helices team{.rng = std::mt19937(seed), .share_false = 0.6};
+  const unsigned seed = GENERATE(range(1U, 11U));
+  const double share_false = GENERATE(0.6, 0.9);
+  CAPTURE(seed, share_false);
+  Helices team{.rng = std::mt19937(seed), .share_false = share_false};
   const std::vector<float> evidence = team.votes(2).front().odometry;
   REQUIRE(evidence.size() == kNoiseLevels * kNoiseLevels);
   CHECK(std::ranges::max(evidence) == evidence.front());
-  CHECK(evidence.back() < evidence.front() - 5.0F);
+  if (share_false == 0.6) CHECK(evidence.back() < evidence.front() - 5.0F);
 }
 
 TEST_CASE("One peer alone cannot blame the odometry of a robot") {

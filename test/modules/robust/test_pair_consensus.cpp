@@ -132,11 +132,12 @@ TEST_CASE("robots that find their odometry noisy do not limit the others") {
   limit_precisions(graph);
   CHECK(graph.own[0].precision.tau == kStep.tau);
   CHECK(graph.between[0].precision.kappa == kClosure.kappa);
-  // A robot that claims more than the others is limited, also if it then finds noise.
-  graph.step_precision[1] = {100.0 * kStep.kappa, 100.0 * kStep.tau};
-  graph.own[0].precision = graph.step_precision[1];
+  // A robot that claims ten times the precision of the others is limited, although it reports
+  // noise.
+  graph.step_precision[1] = kStep;
+  graph.odometry_precision[1] = {0.01, 0.01};
   limit_precisions(graph);
-  CHECK(graph.own[0].precision.tau < 1.3 * kStep.tau);
+  CHECK(graph.own[0].precision.tau == Approx(0.0125 * kStep.tau));
 }
 
 TEST_CASE("the motion of a pair is the one on which most closures agree") {

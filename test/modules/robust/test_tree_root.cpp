@@ -37,9 +37,10 @@ TreeVerdict start_after(std::uint32_t open, std::uint32_t alone) {
 }
 
 // The verdicts on the first two steps of a team of three, with the predicted decreases `first` and
-// `second` of their cost of 2. Robot 0 is 8 times noisier than it claims, or `honest`.
-std::array<TreeVerdict, 2> two_steps(double first, double second, bool honest) {
-  TreeRoot root({0, 1, 2}, {}, false);
+// `second` of their cost of 2. Robot 0 is 8 times noisier than it claims, or `honest`. A robot may
+// itself report noise.
+std::array<TreeVerdict, 2> two_steps(double first, double second, bool honest, bool reported) {
+  TreeRoot root({0, 1, 2}, {}, false, false, reported);
   TreeSums sums{.base_cost = 2.0, .cost = 2.0, .largest = 1e3F, .open = 100, .poses = 100};
   sums.largest_of_all = sums.largest;
   for (const RobotId other : {RobotId{1}, RobotId{2}}) {
@@ -74,13 +75,14 @@ std::array<TreeVerdict, 2> two_steps(double first, double second, bool honest) {
 }  // namespace
 
 TEST_CASE("Closures are weighed more strictly only near the minimum if odometry is noisy") {
-  const auto waits = [](double first, double second, bool honest) {
-    const auto steps = two_steps(first, second, honest);
+  const auto waits = [](double first, double second, bool honest, bool reported = false) {
+    const auto steps = two_steps(first, second, honest, reported);
     return steps[0].mu == steps[1].mu;
   };
   CHECK(waits(1.0, 1.0, false));
   CHECK_FALSE(waits(1.0, 0.1, false));
   CHECK_FALSE(waits(1.0, 1.0, true));
+  CHECK(waits(1.0, 1.0, true, true));
 }
 
 TEST_CASE("Robots decide closures alone if these are a tenth of all") {
