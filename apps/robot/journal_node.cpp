@@ -112,8 +112,9 @@ void JournalNode::step(const Tick& /*tick*/) {
   }
   if (collect())
     results_.append(file_, [this](const auto& file) {
-      do journal_.write();
-      while (collect());
+      // First the rest that did not fit on a full disk, then all else. Events that come meanwhile
+      // wait for the next tick: messages are held back until this one ends.
+      for (int part = 0; part < 2 && collect(); ++part) journal_.write();
       const std::lock_guard lock(mutex_);
       if (!journal_.is_whole())
         throw std::runtime_error(file.string() +

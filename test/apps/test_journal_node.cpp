@@ -1,4 +1,6 @@
+#include <atomic>
 #include <future>
+#include <thread>
 
 #include "apps/result_files.hpp"
 #include "apps/robot/journal_node.hpp"
@@ -96,6 +98,26 @@ TEST_CASE("Loop closure never waits for the journal that waits for it") {
   REQUIRE(answered.get_future().wait_for(kPatience) == std::future_status::ready);
   journal.node.stop();
   CHECK(journal.written<ClosureOutcome>().size() == kOutcomes);
+}
+
+TEST_CASE("The journal passes keyframes while events keep coming") {
+  Journal journal;
+  std::atomic<bool> passed = false;
+  journal.topics.keyframes.subscribe([&](const auto&) { passed = true; });
+  journal.topics.new_keyframes.publish(Keyframe());
+  std::atomic<bool> passed_early = false;
+  {
+    std::vector<std::jthread> nodes;  // so many that events come during each write
+    for (int node = 0; node < 16; ++node)
+      nodes.emplace_back([&] {
+        for (int event = 0; event < 50'000 && !passed; ++event) {
+          journal.topics.outcomes.publish(ClosureOutcome());
+          std::this_thread::sleep_for(std::chrono::microseconds(1));
+        }
+        passed_early = passed_early || passed;
+      });
+  }
+  CHECK(passed_early);
 }
 
 TEST_CASE("Events of nodes that stop later are written, with their times") {
