@@ -108,6 +108,7 @@ struct AgentState {
   bool publish_due = false;
   std::optional<RobotId> published_anchor = {};
   double now_s = 0.0;
+  double patience_s = 15.0;  // a session without progress for this time is replaced
   double session_sent_s = -1e9;
 
   [[nodiscard]] bool in_session() const { return part && is_running(part->state()); }

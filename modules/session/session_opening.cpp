@@ -9,8 +9,8 @@
 namespace km {
 namespace {
 
-// Status periods without progress after which a session is replaced.
-constexpr double kHopelessPeriods = 15.0;
+// Longest patience with a session: as long as a step of a robot may take.
+constexpr double kMostPatience_s = 120.0;
 
 bool same_members(const SessionPlan& x, const SessionPlan& y) {
   return x.members.size() == y.members.size() && !has_lost_member(x, y);
@@ -72,12 +72,14 @@ bool has_moved_on(const AgentState& s) {
   return std::any_of(s.part->members().begin(), s.part->members().end(), elsewhere);
 }
 
+bool is_hopeless(const AgentState& s) {
+  return s.in_session() && s.now_s - s.part->cost().last_activity_s > s.patience_s;
+}
+
 bool should_open(const AgentState& s) {
   if (!s.part) return true;
   const Session& session = s.part->session();
-  const bool hopeless =
-      s.now_s - s.part->cost().last_activity_s > kHopelessPeriods * kTeamStatusPeriod_s;
-  const bool stalled = s.in_session() && (s.deserted || hopeless);
+  const bool stalled = (s.in_session() && s.deserted) || is_hopeless(s);
   if (same_graph(session.plan, s.plan))
     return session.finished ? has_moved_on(s) : !s.in_session() || stalled;
   if (session.id.coordinator != s.self || has_lost_member(session.plan, s.plan)) return true;
@@ -154,7 +156,11 @@ void coordinate(AgentState& s, TeamOutput& output) {
         consider(s, *peer.session);
   }
   if (coordinator_of(s.plan) != s.self.robot) return;
-  if (should_open(s)) open_session(s, output);
+  if (should_open(s)) {
+    // The next session takes slow members as long, also this robot itself.
+    if (is_hopeless(s)) s.patience_s = std::min(2.0 * s.patience_s, kMostPatience_s);
+    open_session(s, output);
+  }
   const bool due = s.now_s - s.session_sent_s >= kTeamStatusPeriod_s;
   if (s.in_session() && s.part->session().id.coordinator == s.self && due) announce(s, output);
 }
