@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <cassert>
 #include <cstddef>
 #include <exception>
@@ -27,7 +28,8 @@ struct WorkerOptions {
   std::string name;       ///< Node::name(), and name of the thread.
   std::size_t queue = 1;  ///< Capacity of the queue.
   Overflow overflow = Overflow::kBlock;
-  double tick_s = 0.0;         ///< Period at which a clock posts Input(); 0: there is no clock.
+  /// Period at which a clock posts Input(), unless one waits in the queue; 0: there is no clock.
+  double tick_s = 0.0;
   bool in_background = false;  ///< See work_in_background().
   double step_limit_s = 30.0;  ///< See Node::step_limit_s().
 };
@@ -73,13 +75,18 @@ class WorkerNode : public Node {
         worker_(
             options_.queue, options_.overflow,
             [this](const Input& input) {
+              if (may_be_tick(input)) tick_waits_ = false;
               if (options_.in_background) work_in_background();
               handle(input);
             },
             options_.name) {
     if (options_.tick_s > 0.0)
       ticks_.emplace(
-          steady_duration(options_.tick_s), [this] { post(Input()); }, options_.name + " tick");
+          steady_duration(options_.tick_s),
+          [this] {
+            if (drops_oldest() || !tick_waits_.exchange(true)) post(Input());
+          },
+          options_.name + " tick");
   }
 
   /// As Worker::post() and Worker::load().
@@ -102,8 +109,16 @@ class WorkerNode : public Node {
   /// Does the remaining work after the last input, unless the node has failed. Called once.
   virtual void conclude() {}
 
+  // A tick can be lost in such a queue, so it is not known whether one waits.
+  [[nodiscard]] bool drops_oldest() const { return options_.overflow == Overflow::kDropOldest; }
+  static bool may_be_tick(const Input& input) {
+    if constexpr (requires { input.index(); }) return input.index() == Input().index();
+    return true;
+  }
+
   const WorkerOptions options_;
   bool is_running_ = false, has_concluded_ = false;
+  std::atomic<bool> tick_waits_ = false;
   Worker<Input> worker_;
   std::optional<Periodic> ticks_;  // last member: stops before the worker to which it posts
 };

@@ -25,8 +25,8 @@ TEST_CASE("A worker handles everything posted, in order, before stop returns") {
 // A node with a clock, whose first step waits until it is released.
 class ToyWorkerNode final : public WorkerNode<Tick> {
  public:
-  ToyWorkerNode(std::vector<std::string>& diary, bool fails)
-      : WorkerNode({.name = "toy", .queue = 1, .tick_s = 1e-4, .step_limit_s = 7.0}),
+  ToyWorkerNode(std::vector<std::string>& diary, bool fails, std::size_t queue = 1)
+      : WorkerNode({.name = "toy", .queue = queue, .tick_s = 1e-4, .step_limit_s = 7.0}),
         diary_(diary),
         fails_(fails) {}
   ~ToyWorkerNode() override { stop(); }
@@ -70,6 +70,17 @@ TEST_CASE("A node ends its sources, then its clock and its worker, and concludes
   std::vector<std::string> expected{"sources", "no sources", "end", "no sources"};
   if (fails) std::erase(expected, "end");
   CHECK(diary == expected);
+}
+
+TEST_CASE("During a long step, one tick waits and leaves the queue to others") {
+  std::vector<std::string> diary;
+  ToyWorkerNode node(diary, false, 1000);
+  node.start();
+  while (node.handled() == 0 || node.load().size == 0) std::this_thread::yield();
+  std::this_thread::sleep_for(std::chrono::milliseconds(20));  // 200 periods
+  CHECK(node.load().size == 1);
+  node.release();
+  while (node.handled() < 5) std::this_thread::yield();  // the clock continues
 }
 
 TEST_CASE("A worker that throws keeps the exception and releases the threads that wait for it") {
