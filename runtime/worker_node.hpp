@@ -30,8 +30,8 @@ struct WorkerOptions {
   Overflow overflow = Overflow::kBlock;
   /// Period at which a clock posts Input(), unless one waits in the queue; 0: there is no clock.
   double tick_s = 0.0;
-  bool in_background = false;  ///< See work_in_background().
-  double step_limit_s = 30.0;  ///< See Node::step_limit_s().
+  bool in_background = false;   ///< See work_in_background().
+  double step_limit_s = 120.0;  ///< See Node::step_limit_s().
 };
 
 /// A node with one Worker, which calls handle() for each input, and perhaps a clock. It owns start,

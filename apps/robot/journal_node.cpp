@@ -35,11 +35,7 @@ KeyframeIndex last_end(const Closure& closure, RobotId robot) {
 JournalNode::JournalNode(std::filesystem::path file, ResultWriter& results,
                          const JournalStart& start, const RestoredRun* restored,
                          const CameraCalibration& correction, const JournalTopics& topics)
-    // Disks that spin up or wait for other requests take long.
-    : WorkerNode({.name = "journal",
-                  .queue = kJournalQueue,
-                  .tick_s = kSyncPeriod_s,
-                  .step_limit_s = 120.0}),
+    : WorkerNode({.name = "journal", .queue = kJournalQueue, .tick_s = kSyncPeriod_s}),
       file_(std::move(file)),
       results_(results),
       correction_(correction),

@@ -85,12 +85,10 @@ struct RunConfig {
     visitor.field(
         "settle_s", settle_s, {0.1, 600.0},
         "[s] the robot leaves when it and all present peers have been idle for this time");
-    visitor.field(
-        "patience", patience, {0.1, 100.0},
-        "increase on slow computers: factor on the time limit for one step of a module "
-        "(30 s; pose graph, map, journal, network and viewers: 120 s; files of meshes and "
-        "of the record: 300 s); a module that exceeds its limit counts as hung, and the "
-        "robot ends without it");
+    visitor.field("patience", patience, {0.1, 100.0},
+                  "increase on slow computers: factor on the time limit for one step of a module "
+                  "(120 s; objects, and files of meshes and of the record: 300 s); a module that "
+                  "exceeds its limit counts as hung, and the robot ends without it");
   }
 };
 

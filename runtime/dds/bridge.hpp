@@ -148,8 +148,6 @@ class DdsBridge final : public Node {
   std::exception_ptr error() const override;
   DurationHistogram timing() const override { return sender_.timing(); }
   std::vector<Heartbeat*> heartbeats() override;
-  /// A slow link can block the socket this long.
-  double step_limit_s() const override { return 120.0; }
 
  private:
   OutgoingTopic& add_outgoing(TopicSpec spec);

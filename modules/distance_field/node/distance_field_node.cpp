@@ -14,10 +14,7 @@ constexpr std::size_t kQueue = 256;
 }  // namespace
 
 DistanceFieldNode::DistanceFieldNode(const DistanceFieldTopics& topics)
-    : WorkerNode({.name = "distance_field",
-                  .queue = kQueue,
-                  .in_background = true,
-                  .step_limit_s = 120.0}),
+    : WorkerNode({.name = "distance_field", .queue = kQueue, .in_background = true}),
       slices_(topics.slices) {
   follow(topics.space);
 }

@@ -22,11 +22,7 @@ constexpr double kShare = 0.2;
 
 Map2dNode::Map2dNode(const Map2dConfig& config, const LabelPalette& palette, RayThinner thinner,
                      const Map2dTopics& topics)
-    // The time of a map is proportional to the size of the mesh.
-    : WorkerNode({.name = Map2dConfig::kSection,
-                  .queue = kQueue,
-                  .in_background = true,
-                  .step_limit_s = 120.0}),
+    : WorkerNode({.name = Map2dConfig::kSection, .queue = kQueue, .in_background = true}),
       config_(checked(config)),
       palette_(palette),
       maps_(topics.maps),

@@ -31,12 +31,10 @@ std::size_t keyframes_of(const MapMesh& map) {
 
 MeshDeformationNode::MeshDeformationNode(const MeshDeformationConfig& config, RobotId self,
                                          const MeshDeformationTopics& topics)
-    // The time of a correction is proportional to the size of the mesh.
     : WorkerNode({.name = MeshDeformationConfig::kSection,
                   .queue = kQueue,
                   .tick_s = checked(config).period_s / kTicksPerPeriod,
-                  .in_background = true,
-                  .step_limit_s = 120.0}),
+                  .in_background = true}),
       config_(config),
       self_(self),
       optimized_(topics.optimized),

@@ -16,12 +16,10 @@ constexpr std::size_t kFirstFrames = 5;  // frames whose depths decide on the si
 SemanticMappingNode::SemanticMappingNode(const SemanticMappingConfig& config, const Camera& camera,
                                          const LabelPalette& palette, double mesh_interval_s,
                                          Overflow overflow, const SemanticMappingTopics& topics)
-    // A mesh of the whole map is made in one step, whose time is proportional to the map.
     : WorkerNode({.name = SemanticMappingConfig::kSection,
                   .queue = kQueuedFrames,
                   .overflow = overflow,
-                  .in_background = true,
-                  .step_limit_s = 120.0}),
+                  .in_background = true}),
       config_(checked(config)),
       camera_(camera),
       palette_(palette),

@@ -23,11 +23,7 @@ Overloaded(Handlers...) -> Overloaded<Handlers...>;  // Clang before 17 does not
 TeamNode::TeamNode(const PoseGraphConfig& config, TeamPeer self, MemberSolverFactory solvers,
                    std::function<std::uint64_t()> sent_bytes, const TeamTopics& topics,
                    int dimension)
-    // The time of a round grows with the graph.
-    : WorkerNode({.name = PoseGraphConfig::kSection,
-                  .queue = kQueue,
-                  .tick_s = kTick_s,
-                  .step_limit_s = 120.0}),
+    : WorkerNode({.name = PoseGraphConfig::kSection, .queue = kQueue, .tick_s = kTick_s}),
       self_(self),
       topics_(topics),
       sent_bytes_(std::move(sent_bytes)),

@@ -39,12 +39,10 @@ constexpr double kUnlimited = std::numeric_limits<double>::infinity();
 
 ViewNode::ViewNode(const ViewConfig& config, const DdsParticipant& participant,
                    const std::optional<Camera>& camera, const ViewTopics& topics)
-    // A slow link may block the socket for long.
     : WorkerNode({.name = ViewConfig::kSection,
                   .queue = kQueue,
                   .overflow = Overflow::kDropOldest,
-                  .tick_s = kTick_s,
-                  .step_limit_s = 120.0}),
+                  .tick_s = kTick_s}),
       config_(checked(config)),
       participant_(participant),
       self_(participant.identity().robot),
