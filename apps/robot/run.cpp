@@ -171,9 +171,12 @@ int run_robot(const RobotOptions& asked, SignalWatch& signals,
   std::optional<Watch> watch;
   watch.emplace(options, config, continues, std::move(partners), robot, results);
   const RunResult result = robot.run([&] {
+    std::size_t images = 0, keyframes = 0;
     (void)robot.recorder().try_with_record([&](const RunRecord& record) {
-      room.grow(record.odometry().size(), record.keyframes().size());
+      images = record.odometry().size();
+      keyframes = record.keyframes().size();
     });
+    room.grow(images, keyframes);  // not under the lock of the record: the disk may stall
     return watch->poll();
   });
   const auto end = [&](const RunRecord& record) {
