@@ -30,8 +30,8 @@ struct WorkerOptions {
   Overflow overflow = Overflow::kBlock;
   /// Period at which a clock posts Input(), unless one waits in the queue; 0: there is no clock.
   double tick_s = 0.0;
-  bool in_background = false;   ///< See work_in_background().
-  double step_limit_s = 120.0;  ///< See Node::step_limit_s().
+  bool in_background = false;          ///< See work_in_background().
+  double step_limit_s = kStepLimit_s;  ///< See Node::step_limit_s().
 };
 
 /// A node with one Worker, which calls handle() for each input, and perhaps a clock. It owns start,
@@ -75,7 +75,7 @@ class WorkerNode : public Node {
         worker_(
             options_.queue, options_.overflow,
             [this](const Input& input) {
-              if (may_be_tick(input)) tick_waits_ = false;
+              if (may_be_tick(input)) tick_waits_ = false;  // another one may wait from now on
               if (options_.in_background) work_in_background();
               handle(input);
             },
@@ -84,7 +84,9 @@ class WorkerNode : public Node {
       ticks_.emplace(
           steady_duration(options_.tick_s),
           [this] {
-            if (drops_oldest() || !tick_waits_.exchange(true)) post(Input());
+            // A queue that drops its oldest input can lose a tick.
+            const bool waits = tick_waits_.exchange(true);
+            if (!waits || options_.overflow == Overflow::kDropOldest) post(Input());
           },
           options_.name + " tick");
   }
@@ -109,10 +111,9 @@ class WorkerNode : public Node {
   /// Does the remaining work after the last input, unless the node has failed. Called once.
   virtual void conclude() {}
 
-  // A tick can be lost in such a queue, so it is not known whether one waits.
-  [[nodiscard]] bool drops_oldest() const { return options_.overflow == Overflow::kDropOldest; }
+  // Ticks are the first alternative of a variant. Without a variant every input may be one.
   static bool may_be_tick(const Input& input) {
-    if constexpr (requires { input.index(); }) return input.index() == Input().index();
+    if constexpr (requires { input.index(); }) return input.index() == 0;
     return true;
   }
 
