@@ -152,6 +152,7 @@ TEST_CASE("The likelier of two robots is noisy if the odds leave open which one"
 }
 
 TEST_CASE("Pairs with many false closures only count against noise") {
+  // Robots 1 and 2 are precise. With few true places there is also little evidence against noise.
   const unsigned seed = GENERATE(range(1U, 11U));
   const double share_false = GENERATE(0.6, 0.9);
   CAPTURE(seed, share_false);
