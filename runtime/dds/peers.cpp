@@ -25,6 +25,9 @@ constexpr double kAnnouncementPeriod_s = 5.0;  // shortest interval between anno
 constexpr double kIsolated_s = 15.0;
 constexpr double kIsolatedLater_s = 60.0;
 constexpr int kOftenRenewed = 6;
+// Samples of one call. A call that lends samples writes as many pointers as the largest loan of its
+// reader had, also for fewer samples.
+constexpr std::uint32_t kBatch = 16;
 constexpr std::size_t kMaxEvents = 1024;  // maximum number of waiting events, because any
                                           // participant can cause them
 
@@ -229,7 +232,6 @@ void Peers::poll() {
 
 // Announcements stay in the reader: see announce().
 void Peers::take_discovered() {
-  constexpr std::uint32_t kBatch = 16;
   bool has_gone = false;
   while (true) {
     std::array<void*, kBatch> samples{};
@@ -260,7 +262,6 @@ void Peers::take(const dds_builtintopic_participant_t& sample, const dds_sample_
 
 // Removes the announcements of participants that have gone from the reader.
 void Peers::remove_gone() {
-  constexpr std::uint32_t kBatch = 16;
   std::array<void*, kBatch> samples{};
   std::array<dds_sample_info_t, kBatch> infos{};
   dds_return_t count = 0;
@@ -279,13 +280,13 @@ void Peers::announce(const Guid& guid) {
   dds_builtintopic_participant_t key{};
   std::ranges::copy(guid, key.key.v);
   const dds_instance_handle_t instance = dds_lookup_instance(reader_.handle(), &key);
-  void* loan = nullptr;
+  std::array<void*, kBatch> samples{};
   dds_sample_info_t info{};
   if (instance == DDS_HANDLE_NIL ||
-      dds_read_instance(reader_.handle(), &loan, &info, 1, 1, instance) <= 0)
+      dds_read_instance(reader_.handle(), samples.data(), &info, 1, 1, instance) <= 0)
     return;
-  take(*static_cast<const dds_builtintopic_participant_t*>(loan), info);
-  dds_return_loan(reader_.handle(), &loan, 1);
+  take(*static_cast<const dds_builtintopic_participant_t*>(samples[0]), info);
+  dds_return_loan(reader_.handle(), samples.data(), 1);
 }
 
 void Peers::take_liveliness() {
