@@ -18,9 +18,10 @@ namespace km {
 namespace {
 
 constexpr std::size_t kMaxStreams = 4096;  // senders whose message numbers a topic stores
-// Maximum time for which a message waits until its writer is known. DDS may deliver messages before
-// it announces their robot. A restarted robot is not accepted until its former process is lost.
-constexpr double kPatience_s = 8.0;
+// Maximum time for which a message waits until its writer is known, beyond dds.liveliness_s. DDS
+// may deliver messages before it announces their robot. A restarted robot is not accepted until its
+// former process is lost.
+constexpr double kPatience_s = 6.0;
 // Maximum time for which a message waits for its key: the sender repeats a lost key before.
 constexpr double kKeyPatience_s = 1.5 * kKeyPeriod_s;
 constexpr double kRetry_s = 0.1;
@@ -145,13 +146,14 @@ void IncomingTopic::announce(const km_wire_Envelope& envelope, const Guid& write
 }
 
 void IncomingTopic::recall(double now_s) {
+  const double patience_s = participant_.config().liveliness_s + kPatience_s;
   const auto take = [&](const Guid& writer, Received& envelope, double waited_s) {
     const Peers::Claim claim = peers_.claim_of(writer);
     if (is_settled(claim.standing)) {
       admit(std::move(envelope), writer, claim, now_s);
       return true;
     }
-    if (claim.standing == Standing::kArriving || waited_s < kPatience_s) return false;
+    if (claim.standing == Standing::kArriving || waited_s < patience_s) return false;
     refuse("its sender is not a known robot, or has not proven its identity");
     return true;
   };

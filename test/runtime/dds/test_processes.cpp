@@ -69,9 +69,32 @@ TEST_CASE("Robots meet although a program has announced more participants than t
     REQUIRE(a->wait_for("refused 3", refused + 1));
     refused = a->lines("refused 3").size();
   }
+  // The announcement of a robot is discarded before its statuses arrive, and read again.
+  std::jthread inventor([&](const std::stop_token& stop) {
+    while (!stop.stop_requested()) {
+      stranger.invent(3, 10);
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+  });
   const auto b = start_peer(4, settings, 0, keys.of(4));
+  std::this_thread::sleep_for(std::chrono::seconds(3));
+  inventor.request_stop();
+  inventor.join();
   CHECK(a->wait_for("joined 4"));
   CHECK(b->wait_for("joined 3"));
+}
+
+TEST_CASE("Messages of a restarted robot wait until its former process counts as lost") {
+  const auto settings = own_team() + std::vector<std::string>{"interface=lo", "liveliness_s=11"};
+  const auto a = start_peer(3, settings);
+  auto b = start_peer(4, settings);
+  REQUIRE(a->wait_for("joined 4"));
+  b->kill(SIGKILL);
+  b->wait();
+  b = start_peer(4, settings);
+  b->send_line("ping 0 9");
+  CHECK(a->wait_for("restarted 4"));
+  CHECK(a->wait_for("ping 4 9", 1, std::chrono::seconds(9)));
 }
 
 TEST_CASE("Teams in one domain do not see each other") {
