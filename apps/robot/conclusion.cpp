@@ -220,6 +220,7 @@ int conclude(const StoppedRun& run, std::optional<Watch>& watch, FinalRoom& room
   const auto& [options, config, robot, result, record] = run;
   watch->finish(record);
   RunEnd end = end_of(options, robot, result, watch->reason(), record);
+  end.is_alone = watch->is_alone();
   end.missed = watch->missed();
   end.unmet = watch->unmet();
   RunSummary summary = summary_of(record);

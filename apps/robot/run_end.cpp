@@ -70,6 +70,10 @@ void Absentees::update(double now_s, const std::map<RobotId, Known>& known,
   now_s_ = now_s;
   std::map<RobotId, Missed> missed;
   for (const auto& [robot, peer] : known) {
+    if (peer.contact == Contact::kReceived)
+      received_s_[robot] = now_s;
+    else if (peer.contact != Contact::kSilent)
+      received_s_.erase(robot);
     if (peer.contact == Contact::kLeft || std::ranges::find(members, robot) != members.end())
       continue;
     const bool second_hand = peer.contact == Contact::kReported;
@@ -89,6 +93,11 @@ void Absentees::miss(RobotId robot, const Missed& missed, std::map<RobotId, Miss
   const auto before = missed_.find(robot);
   const bool continues = before != missed_.end() && before->second.why == missed.why;
   now.emplace(robot, missed).first->second.since_s = continues ? before->second.since_s : now_s_;
+}
+
+bool Absentees::is_present(RobotId robot, double patience_s) const {
+  const auto received = received_s_.find(robot);
+  return received != received_s_.end() && now_s_ - received->second < patience_s;
 }
 
 std::vector<MissedPeer> Absentees::missed(double second_hand_s) const {
@@ -137,7 +146,9 @@ Verdict verdict_of_run(const RunEnd& end) {
   if (!end.odometry_fault.empty())
     return {kNothingEstimated, "odometry is wrong: " + end.odometry_fault};
   const std::string departure = end.departure != nullptr ? end.departure : "unknown";
-  if (end.missed.empty() && end.unmet.empty()) return {0, departure};
+  if (end.missed.empty() && end.unmet.empty())
+    return {0, end.is_alone && departure == kAllSettled ? "settled; no other robot was met"
+                                                        : departure};
   return {0, (departure == kAllSettled ? "settled" : departure) + " without " + names_of(end)};
 }
 

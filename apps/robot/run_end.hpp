@@ -82,6 +82,9 @@ class Absentees {
   void update(double now_s, const std::map<RobotId, Known>& known,
               std::span<const RobotId> members);
 
+  /// True if the robot is received, or has been silent for less than `patience_s` and has not left.
+  [[nodiscard]] bool is_present(RobotId robot, double patience_s) const;
+
   /// Missed robots as of the last update(), ascending by id. A former member that this robot never
   /// received is listed only after it has been missed for `second_hand_s`, because it may have sent
   /// its leave message to other robots.
@@ -99,6 +102,7 @@ class Absentees {
   double now_s_ = 0.0;
   std::set<RobotId> ever_members_;
   std::map<RobotId, Missed> missed_;
+  std::map<RobotId, double> received_s_;  // when last, of robots that have not left
 };
 
 /// Number of images of a recording by their use.
@@ -120,6 +124,7 @@ struct RunEnd {
   bool is_live = false;                    ///< With live sensors, a signal is the usual end.
   /// By file, the reason why a result could not be written.
   std::map<std::string, std::string> lost_results = {};
+  bool is_alone = false;                ///< It has never met another robot.
   std::vector<MissedPeer> missed = {};  ///< Robots of the team that were missing at the end.
   std::map<std::string, std::string> unmet = {};  ///< At the end: see PeerTable::unmet().
 };

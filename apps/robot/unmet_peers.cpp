@@ -1,5 +1,6 @@
 #include "apps/robot/unmet_peers.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "runtime/log.hpp"
@@ -10,6 +11,7 @@ void UnmetPeers::update(double now_s, std::span<const Peer> met,
                         std::map<std::string, std::string> unmet) {
   // A participant that was named stays while a new one of its program is discovered.
   constexpr double kUnmet_s = 5.0, kKept_s = 10.0;
+  is_alone_ = met.empty();
   if (met.empty() && unmet.empty())
     for (const std::string& host : hosts_)
       unmet["dds.peers " + host] =
@@ -26,6 +28,14 @@ void UnmetPeers::update(double now_s, std::span<const Peer> met,
     return gone_s > (entry.first.ends_with(')') ? kKept_s : 0.0);
   });
   for (const Peer& peer : met) unmet_.erase(to_string(peer.identity));
+}
+
+bool UnmetPeers::awaits(double now_s) const {
+  constexpr double kAlone_s = 6.0;     // three announcements, and the time to start another robot
+  constexpr double kNoticed_s = 30.0;  // twice the time after which a participant is renewed
+  return (is_alone_ && now_s < kAlone_s) || std::ranges::any_of(unmet_, [now_s](const auto& entry) {
+           return now_s - entry.second.since_s < kNoticed_s;
+         });
 }
 
 std::map<std::string, std::string> UnmetPeers::reasons() const {

@@ -11,8 +11,8 @@
 namespace km {
 
 /// Programs that are noticed on the network and cannot be met, with the reasons. Logs each once
-/// that stays unmet for some time, because discovery takes less. Time is an argument [s], with any
-/// origin. Not thread-safe.
+/// that stays unmet for some time, because discovery takes less. Time is an argument [s], from the
+/// start of the robot. Not thread-safe.
 class UnmetPeers {
  public:
   /// `hosts`: other hosts in dds.peers.
@@ -20,6 +20,10 @@ class UnmetPeers {
 
   /// `met`: all robots met so far. `unmet`: the others, see PeerTable::unmet().
   void update(double now_s, std::span<const Peer> met, std::map<std::string, std::string> unmet);
+
+  /// True while a robot that has nothing left to do should wait for robots that it may still meet.
+  /// It waits longer if it notices one or knows its host.
+  [[nodiscard]] bool awaits(double now_s) const;
 
   /// Reason by name, as of the last update().
   [[nodiscard]] std::map<std::string, std::string> reasons() const;
@@ -31,6 +35,7 @@ class UnmetPeers {
     bool is_logged = false;
   };
   std::vector<std::string> hosts_;
+  bool is_alone_ = true;
   std::map<std::string, Unmet> unmet_;  // by name
 };
 

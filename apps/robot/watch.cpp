@@ -48,6 +48,7 @@ Watch::Watch(const RobotOptions& options, const RobotConfig& config, bool contin
       is_past_(!options.session.empty()),
       partners_(std::move(partners)),
       serve_limit_s_(options.serve_limit_s),
+      lease_s_(config.dds.lease_s),
       departure_(config.run.settle_s, options.serve_limit_s),
       unmet_(other_hosts(config, robot.interface())),
       start_s_(steady_now_s()),
@@ -86,10 +87,13 @@ bool Watch::poll() {
 }
 
 void Watch::update_phase(double now_s, bool ended, const RunRecord& record) {
+  const auto& team = record.progress().members;
+  absentees_.update(now_s, known_peers(), team);
+  unmet_.update(now_s, robot_.bridge().peers().list(),
+                robot_.bridge().peers().ask(&PeerTable::unmet));
   const std::map<RobotId, Departure::Present> peers = present_peers();
   std::vector<Departure::Present> present;
   for (const auto& [robot, peer] : peers) present.push_back(peer);
-  const auto& team = record.progress().members;
   const auto not_received = std::count_if(team.begin(), team.end(), [&](RobotId member) {
     return member != record.robot() && !peers.contains(member);
   });
@@ -101,11 +105,8 @@ void Watch::update_phase(double now_s, bool ended, const RunRecord& record) {
                                 .activity = record.activity(),
                                 .present_peers = present,
                                 .not_received = static_cast<std::size_t>(not_received),
-                                .awaits_peers = ended && awaits_peers(team)});
+                                .awaits_peers = ended && awaits_peers(now_s, team)});
   robot_.set_settled(reported);
-  absentees_.update(now_s, known_peers(), team);
-  unmet_.update(now_s, robot_.bridge().peers().list(),
-                robot_.bridge().peers().ask(&PeerTable::unmet));
   const auto running = [](const auto& peer) { return peer.phase == RobotPhase::kRunning; };
   if (reported.phase == RobotPhase::kSettled && std::ranges::none_of(present, running))
     robot_.expect_no_more_closures();
@@ -120,7 +121,7 @@ void Watch::finish(const RunRecord& record) {
 
 // The robot of a finished run awaits any other robot. A recorded graph has closures to robots that
 // may start later.
-bool Watch::awaits_peers(std::span<const RobotId> team) {
+bool Watch::awaits_peers(double now_s, std::span<const RobotId> team) {
   const std::vector<Peer> met = robot_.bridge().peers().list();
   for (const Peer& peer : met) partners_.erase(peer.identity.robot);
   for (const RobotId robot : team) partners_.erase(robot);  // that other robots receive
@@ -130,7 +131,7 @@ bool Watch::awaits_peers(std::span<const RobotId> team) {
     log::info("robot") << "closures of the graph lead to robots that have not come:" << names
                        << "; waits for them, up to --serve-limit " << serve_limit_s_ << " s";
   }
-  return !partners_.empty() || (is_past_ && met.empty());
+  return !partners_.empty() || (is_past_ && met.empty()) || unmet_.awaits(now_s);
 }
 
 // Publishes that the robot leaves, and freezes the record, so that all robots end with the same
@@ -178,15 +179,16 @@ std::map<RobotId, Absentees::Known> Watch::known_peers() const {
   return known;
 }
 
-// A peer that is present but has not yet sent a status counts as running, regardless of the last
-// status of its former process.
+// A peer that is silent may be busy, and counts with its last status for the lease. One that is
+// present but has not yet sent a status counts as running, regardless of the last status of its
+// former process.
 std::map<RobotId, Departure::Present> Watch::present_peers() const {
   std::map<TeamPeer, Departure::Present> reported;
   for (const RobotStatus& status : robot_.status_node().peers())
     reported[{status.robot, status.boot}] = {status.phase, status.settled_links};
   std::map<RobotId, Departure::Present> present;
   for (const auto& [identity, state, addresses] : robot_.bridge().peers().list())
-    if (state == PeerState::kAlive)
+    if (absentees_.is_present(identity.robot, lease_s_))
       present[identity.robot] = reported[{identity.robot, identity.boot}];
   return present;
 }

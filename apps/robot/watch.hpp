@@ -36,11 +36,12 @@ class Watch {
   [[nodiscard]] double seconds() const;
   [[nodiscard]] const char* reason() const { return departure_.reason(); }
   [[nodiscard]] std::vector<MissedPeer> missed() const;
+  [[nodiscard]] bool is_alone() const { return robot_.bridge().peers().list().empty(); }
   [[nodiscard]] std::map<std::string, std::string> unmet() const { return unmet_.reasons(); }
 
  private:
   void update_phase(double now_s, bool ended, const RunRecord& record);
-  bool awaits_peers(std::span<const RobotId> team);
+  bool awaits_peers(double now_s, std::span<const RobotId> team);
   bool leave_notice_sent(double now_s);
   void log_progress(double now_s, const RunRecord& record, const TrafficSnapshot& traffic);
   void show_status(const RunRecord& record, const TrafficSnapshot& traffic);
@@ -53,7 +54,7 @@ class Watch {
   const bool is_past_;
   std::set<RobotId> partners_;  // robots of the recorded graph that have not come yet
   bool told_ = false;           // the log names them
-  const double serve_limit_s_;
+  const double serve_limit_s_, lease_s_;
   Departure departure_;
   Absentees absentees_;
   UnmetPeers unmet_;

@@ -76,7 +76,7 @@ struct DdsConfig {
                   "robots looked for at each peer; each costs 0.25 kB per 2 s on the air");
     visitor.field("lease_s", lease_s, {3.0, 3600.0},
                   "[s] silence after which a robot is removed: longer than ordinary outages; "
-                  "requests are kept equally long");
+                  "requests are kept, and robots at their end wait for it, equally long");
     visitor.field("spdp_interval_s", spdp_interval_s, {0.1, 60.0}, "[s] between announcements");
     visitor.field("liveliness_s", liveliness_s, {0.2, 60.0},
                   "[s] silence after which a peer counts as lost");

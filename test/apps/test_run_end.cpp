@@ -172,6 +172,7 @@ TEST_CASE("A run is judged by the gravest that happened to it") {
        0,
        "settled without dora (never met: its announcements are forged)"},
       {{miss_both, interrupt}, 0, "interrupted"},  // before it could leave
+      {{[](RunEnd& end) { end.is_alone = true; }}, 0, "settled; no other robot was met"},
       {{lose_results},
        4,
        "all present robots have settled; 2 results lost: out/a: cannot be written: No space left "
@@ -214,11 +215,14 @@ TEST_CASE("A robot is missed for as long as it has been silent or in another fra
   absentees.update(103.0, {{2, {"bob", kSilent}}, {7, {"carol", kSilent}}}, alone);
   absentees.update(110.0, {{2, {"bob", kSilent}}, {7, {"carol", kSilent}}}, alone);
   CHECK(text_of(absentees) == "bob silent 10 carol silent 7 ");
+  CHECK(absentees.is_present(2, 11.1));
+  CHECK_FALSE(absentees.is_present(2, 11.0));
   absentees.update(110.0, {{2, {"bob", kSilent}}, {7, {"carol", kSilent}}}, with_bob);
   CHECK(text_of(absentees) == "carol silent 7 ");  // others receive bob
   absentees.update(111.0, {{2, {"bob", kReceived}}, {7, {"carol", kSilent}}}, alone);
   absentees.update(112.0, {{2, {"bob", kReceived}}, {7, {"carol", kLeft}}}, alone);
   CHECK(text_of(absentees) == "bob apart 1 ");
+  CHECK_FALSE(absentees.is_present(7, 60.0));  // it has left
 }
 
 TEST_CASE("A member that only others received is missed once it cannot have left in order") {
@@ -237,15 +241,22 @@ TEST_CASE("A member that only others received is missed once it cannot have left
   CHECK(text_of(absentees, 5.0).empty());
 }
 
-TEST_CASE("A robot that is noticed is unmet until it is met") {
+TEST_CASE("A robot that is noticed is unmet, and awaited for a time, until it is met") {
+  UnmetPeers alone({});
+  alone.update(0.0, {}, {});
+  CHECK(alone.awaits(5.9));
+  CHECK_FALSE(alone.awaits(6.0));
   UnmetPeers unmet({"10.0.0.7"});
   Peer bob;
   bob.identity.name = "bob";
   const std::map<std::string, std::string> noticed = {{to_string(bob.identity), "no keys"}};
   unmet.update(0.0, {}, noticed);
   CHECK(unmet.reasons() == noticed);
+  CHECK(unmet.awaits(29.9));
+  CHECK_FALSE(unmet.awaits(30.0));
   unmet.update(1.0, {{bob}}, {});
   CHECK(unmet.reasons().empty());
+  CHECK_FALSE(unmet.awaits(1.0));
 
   SECTION("a named host counts only while no robot is noticed") {
     unmet.update(2.0, {}, {});

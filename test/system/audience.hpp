@@ -52,12 +52,14 @@ class Audience {
 
 /// Command of a robot that walks, 20 keyframes a second. It ends by itself.
 inline std::vector<std::string> robot_on(const Walk& walk, const Walk& other,
-                                         const fs::path& folder, int domain) {
+                                         const fs::path& folder, int domain,
+                                         const std::string& rate = "20",
+                                         std::uint32_t last = kLap) {
   const std::string name = robot_name(walk.robot);
-  const fs::path graph = write_walk(walk, other, kLap, folder / (name + ".g2o"));
+  const fs::path graph = write_walk(walk, other, last, folder / (name + ".g2o"));
   return words_of(KM_BIN_DIR "/kimera_multi_robot --robot " + std::to_string(walk.robot) +
-                  " --name " + name + " --graph " + graph.string() + " --rate 20 --output " +
-                  (folder / name).string() + " --domain " + std::to_string(domain));
+                  " --name " + name + " --graph " + graph.string() + " --rate " + rate +
+                  " --output " + (folder / name).string() + " --domain " + std::to_string(domain));
 }
 
 /// Runs two robots that meet, watched from beginning to end.

@@ -102,14 +102,33 @@ TEST_CASE("A viewer receives nothing without --view, and nothing from a team wit
   CHECK((robot.output.find("without encryption") != std::string::npos) == has_keys);
 }
 
-// A robot that is killed and restarted with its id, while the other one continues.
-
 bool has_keyframes(const std::string& status, std::uint32_t least) {
   const auto end = status.find(" keyframes |");
   if (end == std::string::npos) return false;
   const auto begin = status.find_last_of(' ', end - 1) + 1;
   return std::strtoul(status.c_str() + begin, nullptr, 10) >= least;
 }
+
+TEST_CASE("A robot with a short input meets a later one, and does not leave it when it is busy") {
+  const TemporaryFolder folder;
+  const int domain = random_domain();
+  const Walk a{0, 0}, b{1, 40};
+  Process first(robot_on(a, b, folder.path(), domain, "max", 0));  // no closures
+  REQUIRE_FALSE(first.wait_within(std::chrono::seconds(5)));
+  Process second(robot_on(b, a, folder.path(), domain, "20", 0));
+  REQUIRE(
+      first.wait_until([](const auto& line) { return line.find("peers: robot1") != line.npos; }));
+  REQUIRE(second.wait_until([](const auto& line) { return has_keyframes(line, 30); }));
+  second.kill(SIGSTOP);
+  CHECK_FALSE(first.wait_within(std::chrono::seconds(8)));
+  second.kill(SIGCONT);
+  CHECK(second.wait() == 0);
+  CHECK(first.wait() == 0);
+  CHECK_THAT(first.lines().back().text, Contains("peers: robot1 left |"));
+  CHECK_THAT(second.lines().back().text, Contains("peers: robot0 left |"));
+}
+
+// A robot that is killed and restarted with its id, while the other one continues.
 
 TEST_CASE(
     "A robot that is killed and restarted joins its team again, with its new incarnation only") {
