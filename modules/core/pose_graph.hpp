@@ -105,7 +105,7 @@ struct Trajectory {
 /// State of distributed optimisation as seen by one robot, for status lines and tables.
 struct OptimizerProgress {
   RobotId anchor = 0;
-  std::vector<RobotId> members;  ///< Robots that optimise together, ascending.
+  std::vector<RobotId> members;  ///< Those in reach of the last session, ascending.
   /// Members whose place in the frame is not certain: closures at a single place tie them to this
   /// robot. Ascending.
   std::vector<RobotId> tentative = {};

@@ -64,12 +64,11 @@ bool is_next_due(const AgentState& s) {
          s.schedule.is_worthwhile(s.part->cost().last_activity_s, s.now_s);
 }
 
-// True if a member has been in another session since the last one.
+// True if a member of the plan has been in another session since the last one.
 bool has_moved_on(const AgentState& s) {
-  const auto elsewhere = [&](RobotId robot) {
-    return robot != s.self.robot && s.poses_of(robot, MemberStage::kEntered) == nullptr;
-  };
-  return std::any_of(s.part->members().begin(), s.part->members().end(), elsewhere);
+  return std::ranges::any_of(s.plan.members, [&](const SessionMember& member) {
+    return member.peer != s.self && s.poses_of(member.peer.robot, MemberStage::kEntered) == nullptr;
+  });
 }
 
 bool is_hopeless(const AgentState& s) {
@@ -80,7 +79,8 @@ bool should_open(const AgentState& s) {
   if (!s.part) return true;
   const Session& session = s.part->session();
   const bool stalled = (s.in_session() && s.deserted) || is_hopeless(s);
-  if (same_graph(session.plan, s.plan))
+  // A member that leaves takes no measurement back: the solution with it remains.
+  if (same_graph(session.plan, s.plan) || (s.is_solved() && has_nothing_new(session.plan, s.plan)))
     return session.finished ? has_moved_on(s) : !s.in_session() || stalled;
   if (session.id.coordinator != s.self || has_lost_member(session.plan, s.plan)) return true;
   return s.in_session() ? stalled : !session.finished || is_next_due(s);

@@ -168,7 +168,10 @@ OptimizerProgress make_progress(const AgentState& s) {
   if (!s.part) return progress;
   const Session& session = s.part->session();
   if (s.in_session() || s.is_solved()) {
-    progress.members = s.part->members();
+    progress.members.clear();
+    for (const SessionMember& member : session.plan.members)
+      if (s.roster.in_reach(member.peer)) progress.members.push_back(member.peer.robot);
+    std::ranges::sort(progress.members);
     progress.tentative = s.ties.tentative;
     progress.not_joined = s.ties.not_joined;
   }

@@ -192,11 +192,21 @@ bool is_well_formed(const SessionPlan& plan) {
 }
 
 bool same_graph(const SessionPlan& x, const SessionPlan& y) {
-  const auto same = [](const SessionMember& a, const SessionMember& b) {
-    return a.peer == b.peer && a.revision == b.revision && a.datum == b.datum;
+  return x.members.size() == y.members.size() && has_nothing_new(x, y);
+}
+
+bool has_nothing_new(const SessionPlan& session, const SessionPlan& now) {
+  const auto was_member = [&](const SessionMember& member) {
+    return std::ranges::any_of(session.members, [&](const SessionMember& before) {
+      return before.peer == member.peer && before.revision == member.revision &&
+             before.datum == member.datum;
+    });
   };
-  return x.pairs == y.pairs && std::is_permutation(x.members.begin(), x.members.end(),
-                                                   y.members.begin(), y.members.end(), same);
+  std::vector<SessionPair> pairs = session.pairs;
+  std::erase_if(pairs, [&](const SessionPair& pair) {
+    return !now.has_member(pair.a) || !now.has_member(pair.b);
+  });
+  return std::ranges::all_of(now.members, was_member) && pairs == now.pairs;
 }
 
 bool has_lost_member(const SessionPlan& session, const SessionPlan& now) {

@@ -50,6 +50,10 @@ void plan_tree(SessionPlan& plan, const std::map<RobotId, TeamStatus>& statuses,
 /// of order, frame and tree.
 [[nodiscard]] bool same_graph(const SessionPlan& x, const SessionPlan& y);
 
+/// True if `now` has nothing that `session` lacks: the same edges of the same processes, except for
+/// those of robots out of reach.
+[[nodiscard]] bool has_nothing_new(const SessionPlan& session, const SessionPlan& now);
+
 /// True if a process of `session` is not in the plan `now`.
 [[nodiscard]] bool has_lost_member(const SessionPlan& session, const SessionPlan& now);
 

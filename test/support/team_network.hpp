@@ -210,11 +210,12 @@ class TeamNetwork {
 
   /// True if all running robots are members of one settled session.
   [[nodiscard]] bool all_settled() const {
-    std::size_t alive = 0;
-    for (const auto& [id, robot] : robots) alive += robot.dead ? 0 : 1;
-    return std::all_of(robots.begin(), robots.end(), [&](const auto& entry) {
-      const Robot& robot = entry.second;
-      return robot.dead || (robot.progress.settled && robot.progress.members.size() == alive);
+    std::vector<RobotId> running;
+    for (const auto& [id, robot] : robots)
+      if (!robot.dead) running.push_back(id);
+    return std::ranges::all_of(running, [&](RobotId id) {
+      const OptimizerProgress& progress = robots.at(id).progress;
+      return progress.settled && progress.members == running;
     });
   }
 

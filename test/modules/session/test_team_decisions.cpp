@@ -236,6 +236,10 @@ TEST_CASE("decisions that a team makes without a robot do not outlast its absenc
   };
   check_kept(true);
   network.kill(9);
+  KeyframeOdometry next;  // the next session waits for a measurement of a member
+  next.id = {5, kSquareKeyframes};
+  next.covariance = covariance_of(problem.edges.back().precision);
+  REQUIRE(network.agent(5).add(next));
   (void)network.run(10.0);
   REQUIRE(settle(network));
   check_kept(false);

@@ -175,6 +175,30 @@ TEST_CASE("a team reaches its optimum although a fifth of all messages is lost")
   check_optimal(network, problem, descends ? kRbcdTolerance : kTolerance);
 }
 
+TEST_CASE("a robot that leaves does not change the solution, also when it returns") {
+  const RobotId gone = GENERATE(RobotId{1}, RobotId{2}, RobotId{4});
+  CAPTURE(gone);
+  const auto ids = numbered(4);
+  TeamNetwork network;
+  add_all(network, problem_of(ids, {{1, 2}, {2, 3}, {3, 4}, {1, 4}}, 5));
+  REQUIRE(settle(network, 30.0));
+  const auto sessions = [&] {
+    std::map<RobotId, SessionId> ids_of;
+    for (const auto& [id, robot] : network.robots)
+      if (!robot.dead) ids_of[id] = robot.agent->part()->session().id;
+    return ids_of;
+  };
+  const auto with_all = sessions();
+  auto without = with_all;
+  without.erase(gone);
+  for (const bool dead : {true, false}) {
+    dead ? network.kill(gone) : network.revive(gone);
+    (void)network.run(kHour_s);
+    CHECK(network.all_settled());
+    CHECK(sessions() == (dead ? without : with_all));
+  }
+}
+
 TEST_CASE("the others complete a session when a member stops, and it catches up when it returns") {
   const RobotId gone = GENERATE(RobotId{1}, RobotId{2}, RobotId{4});
   const std::size_t after_packets = GENERATE(range<std::size_t>(0, 320, 20));
@@ -218,9 +242,7 @@ TEST_CASE("the others complete a session when a member stops, and it catches up 
   const double gone_s = network.now_s();
   const double before = CentralProblem(more).cost(network.trajectories());
   (void)network.run(1.0);
-  REQUIRE(network.run(60.0, [&] {
-    return network.all_settled() && network.robots.at(3).progress.members.size() == 3;
-  }));
+  REQUIRE(settle(network, 60.0));
   CHECK(network.now_s() - gone_s < 20.0);
   for (const auto& [id, robot] : network.robots)
     if (id != gone) CHECK(robot.trajectory->anchor == 1);  // `world` keeps its place

@@ -197,4 +197,13 @@ TEST_CASE("plans with different trees and frames can have the same graph") {
   CHECK(has_lost_member(x, y));
 }
 
+TEST_CASE("a plan without a robot has nothing new, unless another has changed") {
+  const SessionPlan plan = planned(chain_of({1, 2, 3}, {1, 1}), links_of({{1, 2}, {2, 3}}), 1);
+  SessionPlan without = planned(chain_of({1, 2}, {1}), links_of({{1, 2}}), 1);
+  CHECK(has_nothing_new(plan, without));
+  CHECK_FALSE(has_nothing_new(without, plan));
+  ++without.members.front().revision;
+  CHECK_FALSE(has_nothing_new(plan, without));
+}
+
 }  // namespace km
