@@ -68,7 +68,8 @@ SensorSample sample_of(DatasetReader& reader, double live_s, const ReportProgres
   for (double done = 0.0; const auto packet = reader.next(); ++done) {
     report_progress("looking at images", total > 0.0 ? done / total : 0.0);
     sampler.add(*packet);
-    for (Doubt& found : first.add(*packet)) doubts.push_back(std::move(found));
+    for (Doubt& found : first.add(*packet, reader.rig().stereo.cameras[0]))
+      doubts.push_back(std::move(found));
   }
   return sampler.sample();
 }

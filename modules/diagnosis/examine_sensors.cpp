@@ -431,8 +431,6 @@ Examination examine_depth(const SensorSample& sample, const StereoRig& rig) {
   if (depths_m.size() < kLeastStereoPoints) return result;
   const double depth_m = quantile(std::move(depths_m), 0.5);
   result.figure("depth images", "median depth " + fixed(depth_m, 2) + " m at corners");
-  if (const auto unusual = doubt(UsualNumber::kDepth_m, depth_m))
-    result.findings.push_back(finding_of(*unusual));
   if (ratios.size() < kLeastStereoPoints) return result;
   const double ratio = quantile(std::move(ratios), 0.5);
   constexpr double kMostOff = 1.25;

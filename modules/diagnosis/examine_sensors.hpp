@@ -30,8 +30,7 @@ namespace km {
 /// stereo.other_mode, stereo.baseline, extrinsics.lever.
 [[nodiscard]] Examination examine_stereo(const SensorSample& sample, const StereoRig& rig);
 
-/// Examines the size of recorded depth, and compares it with that of the right image. Ids:
-/// depth.size, depth.stereo.
+/// Compares recorded depth with that of the right image. Id: depth.stereo.
 [[nodiscard]] Examination examine_depth(const SensorSample& sample, const StereoRig& rig);
 
 /// Compares rotations of gyroscope and images (see InertialFit) and accelerations (see

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <opencv2/core/types.hpp>
 #include <string_view>
 #include <utility>
 
@@ -27,6 +28,7 @@ struct Row {
   Bounds<double> usual;
   std::array<Confusion, 4> confusions;  // a factor of 0 is none
   std::string_view means, to_do;
+  Bounds<double> possible = usual;  // a confusion is only a question within it
 };
 
 constexpr double kG_mps2 = 9.80665;
@@ -34,7 +36,7 @@ constexpr std::string_view kStamps =
     "check the unit of the stamps: the reader takes a whole number as nanoseconds";
 
 // In the order of UsualNumber.
-constexpr std::array<Row, 7> kRows = {{
+constexpr std::array<Row, 8> kRows = {{
     {"stereo.baseline",
      "a baseline",
      "m",
@@ -81,10 +83,15 @@ constexpr std::array<Row, 7> kRows = {{
     {"depth.size",
      "depth with a median",
      "m",
-     {0.1, 50.0},
-     {{{1e3, "in millimetres"}, {1e-3, "multiplied by 0.001 twice"}, {10.0, "in units of 0.1 mm"}}},
+     {0.35, 50.0},
+     {{{1e3, "in millimetres"},
+       {1e-3, "multiplied by 0.001 twice"},
+       {10.0, "in units of 0.1 mm"},
+       {0.1, "in centimetres"}}},
      "if its unit is wrong, all lengths are wrong by the same factor",
-     "state depth: {scale_m: ...} in the rig file, the depth of one unit of a 16-bit image"},
+     "state depth: {scale_m: ...} in the rig file (depth_scale: of a folder), the depth of one "
+     "unit of a 16-bit image: 0.01 for centimetres",
+     {0.1, 50.0}},
     {"depth.share",
      "depth for a share",
      "of the pixels",
@@ -93,6 +100,13 @@ constexpr std::array<Row, 7> kRows = {{
      "odometry and map get no depth",
      "check depth: {scale_m, min_range_m, max_range_m} in the rig file against the unit of the "
      "images"},
+    {"depth.ray",
+     "depth on planes that follows the length of the ray with a power",
+     "",
+     {-0.5, 0.5},
+     {},
+     "images of z have the power 0; with 1 they hold the distance along the ray, and walls bend",
+     "let the driver or simulator write z, the distance along the optical axis"},
 }};
 
 // Value with four digits, "20000" and not "2e+04".
@@ -107,13 +121,60 @@ double median_norm(const std::vector<ImuSample>& samples, Eigen::Vector3d ImuSam
   return quantile(std::move(norms), 0.5);
 }
 
+// The power p with which depth z |ray|^p follows the length of its ray on a plane: 0 for z, 1 for
+// distances along the ray. On a plane 1/z = a x + b y + c on bearings (x, y), so that depth d has
+// 1/d = a x + b y + c - p log|ray| / d to first order. nullopt if the patch is not planar, or too
+// small for a power within kMaxSigma.
+std::optional<double> depth_power(const DepthImage& depth, const Camera& camera,
+                                  const cv::Rect& patch) {
+  constexpr double kLeastShare = 0.7, kMostNoise = 0.01, kMaxSigma = 0.05, kSure = 3.0,
+                   kLeast = 1e-9;
+  const int step = std::max(depth.width / 80, 1);
+  std::vector<Eigen::Matrix<double, 5, 1>> rows;  // the four factors, and 1/d
+  std::size_t pixels = 0;
+  for (int v = patch.y; v < patch.br().y; v += step)
+    for (int u = patch.x; u < patch.br().x; u += step) {
+      ++pixels;
+      const auto at = static_cast<std::size_t>(v) * static_cast<std::size_t>(depth.width) +
+                      static_cast<std::size_t>(u);
+      const auto bearing = camera.unproject({u, v});
+      if (depth.millimetres[at] == 0 || !bearing) continue;
+      const double inverse = 1e3 / depth.millimetres[at];
+      const double length = bearing->homogeneous().norm();
+      rows.push_back({bearing->x(), bearing->y(), 1.0, -std::log(length) * inverse, inverse});
+    }
+  for (int round = 0; static_cast<double>(rows.size()) > kLeastShare * static_cast<double>(pixels);
+       ++round) {
+    Eigen::Matrix4d A = Eigen::Matrix4d::Zero();
+    Eigen::Vector4d b = Eigen::Vector4d::Zero();
+    for (const auto& row : rows) {
+      A += row.head<4>() * row.head<4>().transpose();
+      b += row.head<4>() * row[4];
+    }
+    const Eigen::Matrix4d inverse = A.inverse();
+    const Eigen::Vector4d factors = inverse * b;
+    std::vector<double> errors;
+    for (const auto& row : rows) errors.push_back(std::abs(row[4] - factors.dot(row.head<4>())));
+    const double sigma = 1.4826 * quantile(std::move(errors), 0.5);
+    if (round == 3) {
+      const bool is_good =
+          sigma < kMostNoise * b[2] / A(2, 2) && sigma * std::sqrt(inverse(3, 3)) < kMaxSigma;
+      return is_good ? std::optional(factors[3]) : std::nullopt;
+    }
+    std::erase_if(rows, [&](const auto& row) {
+      return std::abs(row[4] - factors.dot(row.template head<4>())) > kSure * sigma + kLeast;
+    });
+  }
+  return std::nullopt;
+}
+
 }  // namespace
 
 std::optional<Doubt> doubt(UsualNumber number, double value) {
   const Row& row = kRows.at(static_cast<std::size_t>(number));
   if (std::isnan(value) || row.usual.contains(value)) return std::nullopt;
   const auto text = [&row](double shown) {
-    return number_text(shown) + ' ' + std::string(row.unit);
+    return number_text(shown) + (row.unit.empty() ? "" : " ") + std::string(row.unit);
   };
   Doubt doubt{.id = std::string(row.id),
               .what = std::string(row.name) + " of " + text(value) + ", usually " +
@@ -127,6 +188,7 @@ std::optional<Doubt> doubt(UsualNumber number, double value) {
     if (!confusion.id.empty() && !doubt.is_explained) doubt.id = confusion.id;
     doubt.is_explained = true;
   }
+  if (row.possible.contains(value)) doubt.is_explained = false;
   if (number == UsualNumber::kGravity_mps2 && !doubt.is_explained && value < row.usual.min / 2.0) {
     doubt.id = "imu.no_gravity";
     doubt.what += ": the driver subtracts gravity, or uses another unit";
@@ -171,18 +233,23 @@ std::optional<Doubt> gravity_doubt(const std::vector<ImuSample>& samples) {
   return found;
 }
 
-void FirstPackets::add_depth(const StereoFrame& frame) {
+void FirstPackets::add_depth(const DepthImage& depth, const Camera& camera) {
   constexpr std::size_t kStep = 101;  // not a divisor of usual widths
-  if (frame.depth == nullptr) return;
-  const std::vector<std::uint16_t>& depth_mm = frame.depth->millimetres;
+  const std::vector<std::uint16_t>& depth_mm = depth.millimetres;
   for (std::size_t k = 0; k < depth_mm.size(); k += kStep) depths_m_.push_back(1e-3 * depth_mm[k]);
+  // Patches of a third of the image, which overlap by half.
+  for (int i = 0; i < 25; ++i)
+    if (const auto power = depth_power(
+            depth, camera,
+            {i % 5 * depth.width / 6, i / 5 * depth.height / 6, depth.width / 3, depth.height / 3}))
+      powers_.push_back(*power);
 }
 
-std::vector<Doubt> FirstPackets::add(const SensorPacket& packet) {
+std::vector<Doubt> FirstPackets::add(const SensorPacket& packet, const Camera& camera) {
   if (frames_.size() >= kFrames) return {};
   frames_.push_back(packet.frame->stamp);
   samples_.insert(samples_.end(), packet.imu.begin(), packet.imu.end());
-  add_depth(*packet.frame);
+  if (packet.frame->depth != nullptr) add_depth(*packet.frame->depth, camera);
   if (frames_.size() < kFrames) return {};
   std::vector<Doubt> doubts;
   const auto judge = [&doubts](UsualNumber number, double value) {
@@ -204,7 +271,9 @@ std::vector<Doubt> FirstPackets::add(const SensorPacket& packet) {
         static_cast<double>(count) / static_cast<double>(depths_m_.size()));  // NaN without depth
   depths_m_.resize(count);
   judge(UsualNumber::kDepth_m, quantile(depths_m_, 0.5));
-  depths_m_ = {};
+  constexpr std::size_t kLeastPatches = 20;
+  if (powers_.size() >= kLeastPatches) judge(UsualNumber::kDepthPower, quantile(powers_, 0.5));
+  depths_m_ = powers_ = {};
   samples_ = {};
   return doubts;
 }

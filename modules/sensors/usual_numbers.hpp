@@ -18,7 +18,8 @@ enum class UsualNumber {
   kImuRate_hz,
   kGravity_mps2,
   kDepth_m,
-  kDepthShare
+  kDepthShare,
+  kDepthPower
 };
 
 /// A value outside the range that robots have.
@@ -27,7 +28,7 @@ struct Doubt {
   std::string what;  ///< "a baseline of 11.01 m, usually 0.01 to 1 m: 0.1101 m if in centimetres".
   std::string means;
   std::string to_do;
-  bool is_explained = false;  ///< A known confusion gives a usual value.
+  bool is_explained = false;  ///< A known confusion makes an impossible value usual.
 };
 
 /// The doubt about a value, from a table with the usual range and the usual confusions of each
@@ -50,17 +51,19 @@ struct Doubt {
 /// Judges rates, accelerations and depths of the first packets of a source.
 class FirstPackets {
  public:
-  /// The doubts when kFrames frames have been added, once; empty before and afterwards.
-  [[nodiscard]] std::vector<Doubt> add(const SensorPacket& packet);
+  /// The doubts when kFrames frames have been added, once; empty before and afterwards. `camera` is
+  /// that of the depth images.
+  [[nodiscard]] std::vector<Doubt> add(const SensorPacket& packet, const Camera& camera);
 
   static constexpr std::size_t kFrames = 30;
 
  private:
-  void add_depth(const StereoFrame& frame);
+  void add_depth(const DepthImage& depth, const Camera& camera);
 
   std::vector<Stamp> frames_;
   std::vector<ImuSample> samples_;
   std::vector<double> depths_m_;  // at some pixels, 0: not measured
+  std::vector<double> powers_;    // powers of planar patches, see depth_power()
 };
 
 }  // namespace km

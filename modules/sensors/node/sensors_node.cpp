@@ -73,7 +73,7 @@ void SensorsNode::decode() {
 }
 
 void SensorsNode::note_doubts(const SensorPacket& packet) {
-  std::vector<Doubt> doubts = first_.add(packet);
+  std::vector<Doubt> doubts = first_.add(packet, reader_->rig().stereo.cameras[0]);
   if (!std::exchange(has_looked_, true)) {
     const std::vector<Doubt> of_rig = rig_doubts(reader_->rig().stereo);
     doubts.insert(doubts.end(), of_rig.begin(), of_rig.end());

@@ -1,3 +1,5 @@
+#include <random>
+
 #include "modules/core/lie.hpp"
 #include "modules/core/stamp.hpp"
 #include "modules/sensors/sample_streams.hpp"
@@ -282,7 +284,9 @@ TEST_CASE("Numbers of sensors outside the usual range are named by their confusi
       Case{UsualNumber::kGravity_mps2, 0.3, "imu.no_gravity", "subtracts gravity"},
       Case{UsualNumber::kGravity_mps2, 20.0, "imu.gravity", "usually 8.3 to 11.3"},
       Case{UsualNumber::kDepthShare, 0.001, "depth.share", "a share of 0.001 of the pixels"},
-      Case{UsualNumber::kDepth_m, 1800.0, "depth.size", "1.8 m if in millimetres"});
+      Case{UsualNumber::kDepth_m, 1800.0, "depth.size", "1.8 m if in millimetres"},
+      Case{UsualNumber::kDepth_m, 0.06, "depth.size", "0.6 m if in centimetres"},
+      Case{UsualNumber::kDepthPower, 1.0, "depth.ray", "power of 1, usually -0.5 to 0.5"});
   CAPTURE(c.id, c.value);
   const auto found = doubt(c.number, c.value);
   REQUIRE(found);
@@ -290,6 +294,11 @@ TEST_CASE("Numbers of sensors outside the usual range are named by their confusi
   CHECK_THAT(found->what, Contains(c.words));
   CHECK_FALSE(doubt(UsualNumber::kBaseline_m, 0.54));  // KITTI
   CHECK_FALSE(doubt(UsualNumber::kImageRate_hz, std::nan("")));
+  CHECK_FALSE(doubt(UsualNumber::kDepth_m, 0.5));  // a desk
+  CHECK(doubt(UsualNumber::kDepth_m, 0.06)->is_explained);
+  const auto question = doubt(UsualNumber::kDepth_m, 0.18);
+  REQUIRE(question);
+  CHECK_FALSE(question->is_explained);
   const auto exchanged = gravity_doubt({{1, {0.0, 9.8, 0.0}, {0.1, 0.0, 0.0}}});
   REQUIRE(exchanged);
   CHECK(exchanged->id == "imu.exchanged");
@@ -306,12 +315,37 @@ TEST_CASE("The first packets of a source show its rates and units once") {
     SensorPacket packet{frame, {}};
     for (Stamp i = 0; i < 10; ++i)
       packet.imu.push_back({50'000 * k + 5'000 * i, Eigen::Vector3d::Zero(), {0, 0, 9.81}});
-    for (const Doubt& doubt : first.add(packet)) found.push_back(doubt);
+    for (const Doubt& doubt : first.add(packet, {64, 48, 50, 50, 32, 24})) found.push_back(doubt);
   }
   REQUIRE(found.size() == 3);
   CHECK_THAT(found[0].what, Contains("20000 Hz, usually 1 to 1000 Hz: 20 Hz if of stamps"));
   CHECK(found[2].id == "depth.size");
   CHECK(found[1].id == "imu.stamps");
+}
+
+TEST_CASE("Depth along the ray in place of z is found by the planes of the first packets") {
+  const bool is_range = GENERATE(false, true);
+  const Camera camera{.width = 320, .height = 240, .fx = 250, .fy = 250, .cx = 160, .cy = 120};
+  std::mt19937 rng(7);
+  std::normal_distribution<double> noise(0.0, 2e-3);  // relative to z^2 [1/m]
+  FirstPackets first;
+  std::vector<Doubt> found;
+  for (std::size_t k = 0; k < FirstPackets::kFrames; ++k) {
+    auto frame = std::make_shared<StereoFrame>();
+    frame->stamp = 50'000'000 * static_cast<Stamp>(k);
+    DepthImage depth{320, 240, {}};
+    for (int v = 0; v < depth.height; ++v)
+      for (int u = 0; u < depth.width; ++u) {  // two walls that meet in a corner
+        const Eigen::Vector3d ray = camera.unproject({u, v})->homogeneous();
+        const double z = 3.0 / std::max(1.0 - 0.3 * ray.x(), 1.2 + 0.5 * ray.x());
+        depth.millimetres.push_back(static_cast<std::uint16_t>(1e3 * (z + z * z * noise(rng)) *
+                                                               (is_range ? ray.norm() : 1.0)));
+      }
+    frame->depth = std::make_shared<DepthImage>(std::move(depth));
+    for (const Doubt& doubt : first.add({frame, {}}, camera)) found.push_back(doubt);
+  }
+  REQUIRE(found.size() == (is_range ? 1 : 0));
+  if (is_range) CHECK(found[0].id == "depth.ray");
 }
 
 TEST_CASE("Microseconds in a field of nanoseconds are named, and bursts of samples are none") {
