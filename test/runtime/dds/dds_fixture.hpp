@@ -108,6 +108,11 @@ inline std::string robot_name(RobotId id) {
   return name;
 }
 
+/// The identity of a robot that starts.
+inline RobotIdentity new_process(RobotId id) {
+  return {id, robot_name(id), kProtocolVersion, random_boot_id()};
+}
+
 /// A robot that does nothing but talk: status, pings to all, pings to one.
 struct TestRobot {
   using MakeSeal = std::function<std::shared_ptr<SharedSeal>(const RobotIdentity&)>;
@@ -115,11 +120,9 @@ struct TestRobot {
   explicit TestRobot(std::shared_ptr<const DdsDomain> domain, RobotId id,
                      TopicKind ping_kind = TopicKind::kEvent,
                      TopicKind addressed_kind = TopicKind::kRequest)
-      : TestRobot(std::move(domain), {id, robot_name(id), kProtocolVersion, random_boot_id()},
-                  nullptr, ping_kind, addressed_kind) {}
+      : TestRobot(std::move(domain), new_process(id), nullptr, ping_kind, addressed_kind) {}
   TestRobot(std::shared_ptr<const DdsDomain> domain, RobotId id, const MakeSeal& make_seal)
-      : TestRobot(std::move(domain), {id, robot_name(id), kProtocolVersion, random_boot_id()},
-                  make_seal) {}
+      : TestRobot(std::move(domain), new_process(id), make_seal) {}
   /// `network`: a domain that robots share, or a configuration.
   template <typename Network>
   TestRobot(Network network, const RobotIdentity& identity, const MakeSeal& make_seal,

@@ -28,33 +28,14 @@ void print_line(const std::string& line) {
   std::cout << line << std::endl;
 }
 
-const char* name_of(PeerEventKind kind) {
-  switch (kind) {
-    case PeerEventKind::kJoined:
-      return "joined";
-    case PeerEventKind::kReported:
-      return "reported";
-    case PeerEventKind::kLost:
-      return "lost";
-    case PeerEventKind::kReturned:
-      return "returned";
-    case PeerEventKind::kLeft:
-      return "left";
-    case PeerEventKind::kResumed:
-      return "resumed";
-    case PeerEventKind::kRestarted:
-      return "restarted";
-    case PeerEventKind::kRefused:
-      return "refused";
-    case PeerEventKind::kConflict:
-      break;
-  }
-  return "conflict";
-}
+constexpr const char* kEventNames[] = {"joined", "reported",  "lost",    "returned", "resumed",
+                                       "left",   "restarted", "refused", "conflict"};
+static_assert(std::size(kEventNames) == static_cast<std::size_t>(PeerEventKind::kConflict) + 1);
 
 void report(TestRobot& robot) {
   robot.bridge.peers().events().subscribe([](const auto& event) {
-    print_line(std::string(name_of(event->kind)) + ' ' + std::to_string(event->identity.robot));
+    print_line(std::string(kEventNames[static_cast<std::size_t>(event->kind)]) + ' ' +
+               std::to_string(event->identity.robot));
   });
   const auto print = [](const char* what) {
     return [what](const std::shared_ptr<const Ping>& ping) {
@@ -98,8 +79,7 @@ int run(int argc, char** argv) {
     return std::make_shared<SharedSeal>(load_robot_keys(keys), own,
                                         static_cast<std::int64_t>(wall_now_s()));
   };
-  TestRobot robot(config, {id, robot_name(id), kProtocolVersion, random_boot_id()},
-                  keys.empty() ? TestRobot::MakeSeal() : seal_of);
+  TestRobot robot(config, new_process(id), keys.empty() ? TestRobot::MakeSeal() : seal_of);
   report(robot);
   robot.start();
   obey(robot);

@@ -21,6 +21,8 @@ struct Pair {
         a(start(network, 1, settings)),
         b(start(network, 2, settings)) {}
 
+  [[nodiscard]] bool have_met() const { return a->wait_for("joined 4") && b->wait_for("joined 3"); }
+
   std::unique_ptr<TeamOfTwo> keys;  // null: the team has none
   std::unique_ptr<Process> a, b;
 
@@ -60,8 +62,7 @@ TEST_CASE("On a host with several interfaces the robot uses the configured one")
   VirtualNetwork network(2);
   for (const int host : {1, 2}) network.add_dead_interface(host);
   const Pair robots(network, own_team() + std::vector<std::string>{"interface=eth0"});
-  CHECK(robots.a->wait_for("joined 4"));
-  CHECK(robots.b->wait_for("joined 3"));
+  CHECK(robots.have_met());
 }
 
 TEST_CASE("Without configuration a robot uses the interface with a carrier, and moves to it") {
@@ -80,8 +81,7 @@ TEST_CASE("Without configuration a robot uses the interface with a carrier, and 
     std::this_thread::sleep_for(std::chrono::seconds(2));  // the condition is time itself
     network.set_link(1, true);
   }
-  CHECK(robots.a->wait_for("joined 4"));
-  CHECK(robots.b->wait_for("joined 3"));
+  CHECK(robots.have_met());
 }
 
 TEST_CASE("A robot that is received but does not receive this one is unmet, with the cause") {
@@ -128,8 +128,7 @@ TEST_CASE("A link that fails and returns loses no event") {
   const std::string discovery = GENERATE("multicast", "peers");
   VirtualNetwork network(2);
   const Pair robots(network, discovery_settings(discovery));
-  REQUIRE(robots.a->wait_for("joined 4"));
-  REQUIRE(robots.b->wait_for("joined 3"));
+  REQUIRE(robots.have_met());
   robots.a->send_line("ping 0 49");
   REQUIRE(robots.b->wait_for("ping 3 49"));
 
@@ -183,8 +182,7 @@ TEST_CASE("A robot whose own address changes returns to its team, and nothing is
   network.set_address(1, VirtualNetwork::address(1) + "/24");
   const Pair robots(network, discovery_settings(discovery),
                     has_keys ? std::make_unique<TeamOfTwo>() : nullptr);
-  REQUIRE(robots.a->wait_for("joined 4"));
-  REQUIRE(robots.b->wait_for("joined 3"));
+  REQUIRE(robots.have_met());
   exchange(robots, 0, 49);
   check_received(robots, 49);
 
@@ -261,8 +259,7 @@ TEST_CASE(
       network,
       discovery_settings("multicast") + std::vector<std::string>{"lease_s=3", "liveliness_s=0.5"},
       std::make_unique<TeamOfTwo>());
-  REQUIRE(robots.a->wait_for("joined 4"));
-  REQUIRE(robots.b->wait_for("joined 3"));
+  REQUIRE(robots.have_met());
   robots.a->send_line("ping 0 49");
   REQUIRE(robots.b->wait_for("ping 3 49"));
   network.set_link(2, false);

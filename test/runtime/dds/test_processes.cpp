@@ -5,9 +5,10 @@
 namespace km {
 namespace {
 
+const std::vector<std::string> kOnLoopback{"interface=lo", "spdp_interval_s=0.2"};
+
 TEST_CASE("Robots with keys return after a forged packet has declared that they are gone") {
-  const auto settings =
-      own_team() + std::vector<std::string>{"interface=lo", "spdp_interval_s=0.2"};
+  const auto settings = own_team() + kOnLoopback;
   const TeamOfTwo keys;
   const auto a = start_peer(3, settings, 0, keys.of(3));
   const auto b = start_peer(4, settings, 0, keys.of(4));
@@ -26,8 +27,7 @@ TEST_CASE("Robots with keys return after a forged packet has declared that they 
 }
 
 TEST_CASE("Robots meet after forged packets have replaced the announcement of one of them") {
-  const auto settings =
-      own_team() + std::vector<std::string>{"interface=lo", "spdp_interval_s=0.2"};
+  const auto settings = own_team() + kOnLoopback;
   const TeamOfTwo keys;
   using enum ForgedDiscovery::Change;
   const auto [has_keys, change] = GENERATE(table<bool, ForgedDiscovery::Change>(
@@ -57,8 +57,7 @@ TEST_CASE("Robots meet after forged packets have replaced the announcement of on
 }
 
 TEST_CASE("Robots meet although a program has announced more participants than they remember") {
-  const auto settings =
-      own_team() + std::vector<std::string>{"interface=lo", "spdp_interval_s=0.2"};
+  const auto settings = own_team() + kOnLoopback;
   const TeamOfTwo keys;
   const auto a = start_peer(3, settings, 0, keys.of(3));
   ForgedDiscovery stranger(loopback_config().domain);
@@ -98,7 +97,7 @@ TEST_CASE("Messages of a restarted robot wait until its former process counts as
 }
 
 TEST_CASE("Teams in one domain do not see each other") {
-  const auto team = own_team() + std::vector<std::string>{"interface=lo"};
+  const auto team = own_team() + kOnLoopback;
   const auto a = start_peer(3, team);
   const auto other = start_peer(5, team + std::vector<std::string>{"team=other"});
   const auto b = start_peer(4, team);

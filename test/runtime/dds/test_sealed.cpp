@@ -61,9 +61,9 @@ TEST_CASE("Renewed writers send all events again, in a team with keys", "[sealed
   CAPTURE(has_keys);
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
   const auto robot = [&](RobotId id) {
-    return std::make_unique<TestRobot>(
-        domain, RobotIdentity{id, robot_name(id), kProtocolVersion, random_boot_id()},
-        has_keys ? member_of(team) : TestRobot::MakeSeal(), TopicKind::kEvent, TopicKind::kEvent);
+    return std::make_unique<TestRobot>(domain, new_process(id),
+                                       has_keys ? member_of(team) : TestRobot::MakeSeal(),
+                                       TopicKind::kEvent, TopicKind::kEvent);
   };
   const auto a = robot(3), b = robot(4);
   meet({a.get(), b.get()});
@@ -91,10 +91,9 @@ TEST_CASE("Renewed writers send all events again, in a team with keys", "[sealed
 TEST_CASE("Writers are not renewed while messages wait for the budget", "[sealed]") {
   const ToyTeam team;
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
-  TestRobot a(domain, {3, robot_name(3), kProtocolVersion, random_boot_id()}, member_of(team),
-              TopicKind::kEvent, TopicKind::kEvent, {.bytes_per_s = 20'000.0});
-  TestRobot b(domain, {4, robot_name(4), kProtocolVersion, random_boot_id()}, member_of(team),
-              TopicKind::kEvent, TopicKind::kEvent);
+  TestRobot a(domain, new_process(3), member_of(team), TopicKind::kEvent, TopicKind::kEvent,
+              {.bytes_per_s = 20'000.0});
+  TestRobot b(domain, new_process(4), member_of(team), TopicKind::kEvent, TopicKind::kEvent);
   meet({&a, &b});
   a.ping_one(4, 2);
   REQUIRE(b.received_addressed.wait_for(1).size() == 1);
@@ -140,7 +139,7 @@ TEST_CASE("Replayed credentials and messages make no participant a member", "[se
   auto b = std::make_unique<TestRobot>(domain, 4, member_of(team));
   // Records credentials and messages of robot 3, which then ends.
   std::string shown;
-  const RobotIdentity identity{3, "robot3", kProtocolVersion, random_boot_id()};
+  const RobotIdentity identity = new_process(3);
   {
     TestRobot a(domain, identity, [&](const RobotIdentity& own) {
       auto seal = member_of(team)(own);
@@ -294,10 +293,10 @@ TEST_CASE("Messages for a robot reach its resumed process and not its next incar
                                        has_keys ? member_of(team) : TestRobot::MakeSeal(),
                                        TopicKind::kEvent, kind);
   };
-  const auto a = make({3, robot_name(3), kProtocolVersion, random_boot_id()});
-  const auto c = make({5, robot_name(5), kProtocolVersion, random_boot_id()});
+  const auto a = make(new_process(3));
+  const auto c = make(new_process(5));
   meet({a.get(), c.get()});
-  const RobotIdentity former{4, robot_name(4), kProtocolVersion, random_boot_id()};
+  const RobotIdentity former = new_process(4);
   {
     const auto first = make(former);
     first->start();
@@ -335,9 +334,8 @@ TEST_CASE("Messages for a robot reach its resumed process and not its next incar
 TEST_CASE("Messages for a robot of an earlier process wait until its keys are known", "[sealed]") {
   const ToyTeam team;
   const auto domain = std::make_shared<const DdsDomain>(loopback_config());
-  const RobotIdentity met{4, robot_name(4), kProtocolVersion, random_boot_id()};
-  TestRobot a(domain, {3, robot_name(3), kProtocolVersion, random_boot_id()}, member_of(team),
-              TopicKind::kEvent, TopicKind::kEvent);
+  const RobotIdentity met = new_process(4);
+  TestRobot a(domain, new_process(3), member_of(team), TopicKind::kEvent, TopicKind::kEvent);
   a.bridge.peers().tell(&PeerTable::recall, met);
   a.start();
   for (std::uint32_t i = 0; i < 3; ++i) a.ping_one(4, i);
