@@ -21,13 +21,10 @@ class EurocFolder {
 
   explicit EurocFolder(const std::string& extension = ".png") {
     for (const char* camera : {"cam0", "cam1"}) {
-      std::string list = "#timestamp [ns],filename\n";
-      for (int i = 0; i < kPairs; ++i) {
-        const std::string name = std::to_string(image_stamp(i)) + extension;
-        list += std::to_string(image_stamp(i)) + ',' + name + '\n';
-        write_image(std::string(camera) + "/data/" + name, 32, 24, 10 * (i + 1));
-      }
-      write(std::string(camera) + "/data.csv", list);
+      write_list(camera, 1, extension);
+      for (int i = 0; i < kPairs; ++i)
+        write_pixels(side_image(camera, i, extension),
+                     cv::Mat(24, 32, CV_8UC1, cv::Scalar(10 * (i + 1))));
     }
     write("cam0/sensor.yaml", camera_yaml(0.0));
     write("cam1/sensor.yaml", camera_yaml(0.1));
@@ -39,9 +36,7 @@ class EurocFolder {
 
   const fs::path& root() const { return folder_.path(); }
   fs::path mav0() const { return root() / "mav0"; }
-  fs::path image(const std::string& camera, int i) const {
-    return mav0() / camera / "data" / (std::to_string(image_stamp(i)) + ".png");
-  }
+  fs::path image(const std::string& camera, int i) const { return mav0() / side_image(camera, i); }
 
   void write(const std::string& relative, const std::string& text) const {
     folder_.write("mav0/" + relative, text);
@@ -52,9 +47,6 @@ class EurocFolder {
     std::string text = read(relative);
     text.replace(text.find(from), from.size(), to);  // throws if it is not there
     write(relative, text);
-  }
-  void write_image(const std::string& relative, int width, int height, int grey) const {
-    write_pixels(relative, cv::Mat(height, width, CV_8UC1, cv::Scalar(grey)));
   }
 
   /// Writes depth0 with an image every `every` frames, all at `depth` units, a scale of 1 mm.
@@ -75,8 +67,9 @@ class EurocFolder {
     fs::remove_all(mav0() / "cam1");
     add_depth(depth_every);
   }
-  static std::string side_image(const std::string& sensor, int i) {
-    return sensor + "/data/" + std::to_string(image_stamp(i)) + ".png";
+  static std::string side_image(const std::string& sensor, int i,
+                                const std::string& extension = ".png") {
+    return sensor + "/data/" + std::to_string(image_stamp(i)) + extension;
   }
   void write_pixels(const std::string& relative, const cv::Mat& pixels) const {
     fs::create_directories((mav0() / relative).parent_path());
@@ -123,11 +116,12 @@ class EurocFolder {
   }
 
  private:
-  void write_list(const std::string& sensor, int every) const {
+  void write_list(const std::string& sensor, int every,
+                  const std::string& extension = ".png") const {
     std::string list = "#timestamp [ns],filename\n";
     for (int i = 0; i < kPairs; i += every) {
       const std::string stamp = std::to_string(image_stamp(i));
-      list.append(stamp).append(",").append(stamp).append(".png\n");
+      list += stamp + ',' + stamp + extension + '\n';
     }
     write(sensor + "/data.csv", list);
   }
