@@ -85,12 +85,12 @@ TEST_CASE("closures of V1_01 are many, accurate, and as uncertain as they state"
 TEST_CASE("closures of an RGB-D recording are in the right place") {
   const auto folder = shared_data("7scenes_redkitchen");
   if (!folder) return;
-  RecordedKitchen kitchen(*folder);
+  RecordedKitchen kitchen(*folder, 24);
   KeyframeFeatureExtractor extractor(kitchen.rig(), {});
   std::vector<RecordedKeyframe> keyframes[2];
-  for (int i = 0; const auto frame = kitchen.next(); i += 6, kitchen.skip(5))
-    keyframes[i / 125].push_back(
-        {frame->frame->stamp, frame->T_world_cam, extractor.extract(*frame->frame)});
+  while (const auto frame = kitchen.next())
+    keyframes[frame->stamp / nanoseconds(500.0 / 30.0)].push_back(
+        {frame->stamp, kitchen.T_world_cam(*frame), extractor.extract(*frame)});
   const Verifier verifier({});
   std::vector<double> metres, radians;
   for (const RecordedKeyframe& from : keyframes[0])

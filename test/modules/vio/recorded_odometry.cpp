@@ -7,7 +7,6 @@
 #include <memory>
 #include <numbers>
 #include <optional>
-#include <string>
 #include <utility>
 
 #include "modules/core/depth_lookup.hpp"
@@ -16,31 +15,22 @@
 #include "modules/evaluation/trajectory_error.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
 #include "modules/sensors/node/open_folder.hpp"
-#include "modules/sensors/text_file.hpp"
 #include "test/support/euroc_copy.hpp"
 #include "test/support/temporary_folder.hpp"
 
 namespace km {
 namespace {
 
-// Poses of the body from poses.txt, whose rows are 3x4 matrices of camera poses. A row belongs to
-// the row of times.txt (KITTI), or begins with the number of the frame at 30 Hz (7-Scenes).
-std::vector<StampedPose> read_camera_poses(const std::filesystem::path& folder,
-                                           const SE3& T_cam_body) {
-  const bool is_kitti = layout_of(folder) == FolderLayout::kKitti;
-  const std::string text = read_file(folder / "poses.txt");
-  const std::string times = is_kitti ? read_file(folder / "times.txt") : "";
-  const std::vector<TextRow> stamps = split_rows(times);
-  std::vector<StampedPose> poses;
-  for (const TextRow& row : split_rows(text)) {
-    const double t_s =
-        is_kitti ? number_in(stamps.at(poses.size()), 0).value() : number_in(row, 0).value() / 30.0;
-    Eigen::Matrix<double, 3, 4, Eigen::RowMajor> T;
-    for (std::size_t i = 0; i < 12; ++i)
-      T.data()[i] = number_in(row, i + (is_kitti ? 0 : 1)).value();
-    poses.push_back(
-        {nanoseconds(t_s), make_pose(nearest_rotation(T.leftCols<3>()), T.col(3)) * T_cam_body});
+// Poses of the body by the truth in `folder`; none if there is no truth.
+std::vector<StampedPose> read_truth(const std::filesystem::path& folder, const SensorRig& rig) {
+  const FolderLayout layout = layout_of(folder);
+  if (layout == FolderLayout::kEuroc) {
+    const auto states = folder / "mav0/state_groundtruth_estimate0";
+    return std::filesystem::exists(states) ? read_trajectory(states) : std::vector<StampedPose>{};
   }
+  std::vector<StampedPose> poses =
+      read_trajectory(folder / (layout == FolderLayout::kTum ? "groundtruth.txt" : "poses.txt"));
+  for (StampedPose& pose : poses) pose.T = pose.T * rig.stereo.cameras[0].T_body_cam.inverse();
   return poses;
 }
 
@@ -50,19 +40,6 @@ struct SeenRay {
   Eigen::Vector2d rectified_px;
   double depth_ratio = 0.0;
 };
-
-// Poses of the body by the truth in `folder`; none if there is no truth.
-std::vector<StampedPose> read_truth(const std::filesystem::path& folder, const SensorRig& rig) {
-  const SE3 T_cam_body = rig.stereo.cameras[0].T_body_cam.inverse();
-  if (layout_of(folder) == FolderLayout::kEuroc) {
-    const auto states = folder / "mav0/state_groundtruth_estimate0";
-    return std::filesystem::exists(states) ? read_trajectory(states) : std::vector<StampedPose>{};
-  }
-  if (layout_of(folder) != FolderLayout::kTum) return read_camera_poses(folder, T_cam_body);
-  std::vector<StampedPose> poses = read_trajectory(folder / "groundtruth.txt");
-  for (StampedPose& pose : poses) pose.T = pose.T * T_cam_body;
-  return poses;
-}
 
 // Rays of all pixels of the left camera; nullopt if its lens has no bearing there.
 std::vector<std::optional<SeenRay>> seen_rays(const Camera& rectified, const Camera& left) {

@@ -21,9 +21,8 @@ struct Recording {
   std::vector<SE3> T_world_body;  ///< NaN where the truth has a gap.
 };
 
-/// Images of `folder` (see FolderLayout) from `from_s` to `to_s`, with the poses of its
-/// groundtruth_tum.txt, groundtruth.txt or poses.txt, if there is one. `imu`: with the inertial
-/// sensor, if there is one.
+/// Images of `folder` in the layout of EuRoC, TUM RGB-D or KITTI from `from_s` to `to_s`, with its
+/// true poses, if it has any. `imu`: with the inertial sensor, if there is one.
 Recording read_recording(const std::filesystem::path& folder, double from_s, double to_s,
                          bool imu = true);
 
