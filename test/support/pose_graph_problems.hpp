@@ -38,18 +38,6 @@ inline WholeGraph read_whole_graph(const std::filesystem::path& file) {
   return whole;
 }
 
-/// Minimum of a whole graph by the solver's own parts from chordal initialisation, to rounding.
-/// Independent only of the distribution: its costs are tested against published optima.
-inline TruncatedNewtonResult solve_centrally(const WholeGraph& graph, Eigen::Index rank = 3) {
-  QuadraticProblem problem(rank, graph.poses, graph.edges, {});
-  const auto start = chordal_initialisation(graph.poses, graph.edges);
-  return minimise(problem, lift(start, rank),
-                  {.max_iterations = 100,
-                   .max_cg_iterations = 2000,
-                   .cg_tolerance = 1e-3,
-                   .gradient_tolerance = 1e-6});
-}
-
 /// Feasible poses with uniform rotations and rank r: the product of random ones with a random
 /// matrix of St(3, r).
 inline LiftedPoses random_lifted_poses(std::mt19937& rng, Eigen::Index rank, Eigen::Index poses) {

@@ -14,13 +14,10 @@
 #include <vector>
 
 #include "modules/core/lie.hpp"
-#include "modules/rbcd/truncated_newton.hpp"
-#include "modules/recorded_graph/g2o_io.hpp"
 #include "modules/robust/member_solver.hpp"
 #include "modules/robust/session_graph.hpp"
 #include "modules/session/team_messages.hpp"
-#include "modules/tree_newton/chordal.hpp"
-#include "test/support/random_pose.hpp"
+#include "test/support/pose_graph_problems.hpp"
 
 namespace km {
 
@@ -75,14 +72,7 @@ struct TeamProblem {
 /// A g2o file of one robot split among robots 1, 3, 5, ... in blocks of equal length. It starts
 /// from chordal initialisation.
 [[nodiscard]] inline TeamProblem deal_file(const std::filesystem::path& file, std::size_t robots) {
-  const G2oGraph graph = read_g2o(file);
-  std::vector<BlockEdge> whole;
-  Eigen::Index poses = 0;
-  for (const RelativePose& e : graph.edges) {
-    const Precision weight = precision_of(e.covariance);
-    whole.push_back({e.from.index, e.to.index, e.T_from_to, weight.kappa, weight.tau});
-    poses = std::max({poses, Eigen::Index{e.from.index} + 1, Eigen::Index{e.to.index} + 1});
-  }
+  const auto [poses, edges] = read_whole_graph(file);
   const auto length = static_cast<std::uint32_t>(poses) / static_cast<std::uint32_t>(robots);
   const auto dealt = [&](Eigen::Index pose) {
     const auto index = static_cast<std::uint32_t>(pose);
@@ -90,10 +80,10 @@ struct TeamProblem {
     return KeyframeId{static_cast<RobotId>(2 * k + 1), index - k * length};
   };
   TeamProblem problem;
-  const std::vector<SE3> start = chordal_initialisation(poses, whole);
+  const std::vector<SE3> start = chordal_initialisation(poses, edges);
   for (Eigen::Index i = 0; i < poses; ++i)
     problem.start[dealt(i).robot].push_back(start[static_cast<std::size_t>(i)]);
-  for (const BlockEdge& e : whole)
+  for (const BlockEdge& e : edges)
     problem.edges.push_back({dealt(e.i), dealt(e.j), e.T_i_j, {e.kappa, e.tau}});
   problem.edges = in_order(problem.edges);
   problem.start = with_public_poses_rounded(std::move(problem.start), problem.edges);
@@ -328,7 +318,6 @@ class SolverTeam {
       busy = true;
       if (faults_.max_delay > 0 && std::bernoulli_distribution(0.5)(rng_)) continue;
       for (SolverMessage& message : member->advance()) send(robot, std::move(message));
-      if (after_advance) after_advance(robot, *member);
     }
     return busy;
   }
@@ -346,16 +335,9 @@ class SolverTeam {
     for (const auto& [robot, member] : members_) poses[robot] = member->poses();
     return poses;
   }
-  /// Bytes sent by `robot`, without copies.
-  [[nodiscard]] std::size_t bytes_of(RobotId robot) const {
-    const auto found = bytes_.find(robot);
-    return found == bytes_.end() ? 0 : found->second;
-  }
-  [[nodiscard]] std::size_t refused() const {
-    return refused_;
-  }  ///< Refused messages, copies included.
+  /// Refused messages, copies included.
+  [[nodiscard]] std::size_t refused() const { return refused_; }
 
-  std::function<void(RobotId, const MemberSolver&)> after_advance = {};
   std::function<void(RobotId, std::span<const std::uint8_t>)> on_sent = {};  ///< From, bytes.
 
  private:
@@ -365,7 +347,6 @@ class SolverTeam {
   };
 
   void send(RobotId from, SolverMessage message) {
-    bytes_[from] += message.bytes->size();
     if (on_sent) on_sent(from, *message.bytes);
     const int copies = std::bernoulli_distribution(faults_.duplicated)(rng_) ? 2 : 1;
     for (int copy = 0; copy < copies; ++copy) {
@@ -390,7 +371,6 @@ class SolverTeam {
   TransportFaults faults_;
   std::mt19937 rng_;
   std::multimap<std::size_t, Delivery> in_flight_;
-  std::map<RobotId, std::size_t> bytes_;
   std::size_t refused_ = 0;
   std::size_t now_ = 0;
 };

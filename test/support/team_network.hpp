@@ -38,9 +38,8 @@ inline constexpr double kCostTolerance = 1e-6;
   return problem;
 }
 
-/// A link between two robots, the same in both directions.
-struct NetworkLink {
-  bool up = true;
+/// Properties of all links, the same in both directions.
+struct NetworkLinks {
   double min_delay_s = 1e-3;
   double max_delay_s = 1e-3;  ///< Uniform: reorders if it is above the least.
   double lost = 0.0;          ///< Probability.
@@ -67,28 +66,23 @@ class TeamNetwork {
     OptimizerProgress progress = {};
     ClosureVerdicts verdicts = {};
     std::vector<std::string> notices = {}, news = {};
-    std::size_t bytes =
-        0;  ///< Bytes sent, counted for every reader, including relayed and lost ones.
+    std::size_t bytes = 0;  ///< Sent, counted for every reader, including relayed and lost ones.
     std::size_t session_bytes = 0;  ///< The part of them that belongs to sessions.
-    std::size_t packets = 0;        ///< Messages sent, counted in the same way.
     std::uint64_t links_version = 0;
     bool steps_now = true;
   };
 
   explicit TeamNetwork(unsigned seed = 1) : rng_(seed) {}
 
-  NetworkLink usual = {};  ///< Properties of links that are not set.
+  NetworkLinks links = {};
   /// Time for which the ends of a failed link do not notice the failure: short gaps have no effect.
   double lease_s = 0.2;
   std::map<RobotId, Robot> robots = {};
   std::size_t undecodable = 0;  ///< Invalid messages that agents have sent.
-  std::size_t lost = 0;         ///< Lost messages.
   /// After every step of a robot.
   std::function<void(const Robot&)> on_step = {};
   /// Called with every message of the pose graph before it is sent.
   std::function<void(RobotId from, const LinkPacket&)> on_packet = {};
-  /// Loses the messages for which it returns true.
-  std::function<bool(RobotId from, const LinkPacket&)> loses = {};
 
   TeamAgent& add(TeamPeer peer, const PoseGraphConfig& config, const MemberSolverFactory& factory) {
     Robot& robot = robots[peer.robot];
@@ -100,21 +94,9 @@ class TeamNetwork {
     return *robot.agent;
   }
 
-  /// Sets a link; by default it is `usual`.
-  void set_link(RobotId a, RobotId b, const NetworkLink& link) {
-    links_[std::minmax(a, b)] = link;
-    renew(a, b);
-  }
-  void cut(RobotId a, RobotId b) { switch_link(a, b, false); }
-  void restore(RobotId a, RobotId b) { switch_link(a, b, true); }
   void switch_link(RobotId a, RobotId b, bool up) {
-    NetworkLink link = this->link(a, b);
-    link.up = up;
-    set_link(a, b, link);
-  }
-  [[nodiscard]] NetworkLink link(RobotId a, RobotId b) const {
-    const auto found = links_.find(std::minmax(a, b));
-    return found == links_.end() ? usual : found->second;
+    up_[std::minmax(a, b)] = up;
+    renew(a, b);
   }
   /// Leaves only the links of `pairs`.
   void wire(const std::vector<std::pair<RobotId, RobotId>>& pairs) {
@@ -226,12 +208,6 @@ class TeamNetwork {
       if (robot.trajectory) poses[id] = robot.trajectory->T_world_kf;
     return poses;
   }
-  /// Present poses of the agents, each in its own frame().
-  [[nodiscard]] TeamPoses poses() const {
-    TeamPoses poses;
-    for (const auto& [id, robot] : robots) poses[id] = robot.agent->poses();
-    return poses;
-  }
 
  private:
   static constexpr double kTick_s = 0.02;
@@ -249,8 +225,9 @@ class TeamNetwork {
 
   [[nodiscard]] bool connected(RobotId a, RobotId b) const {
     const auto at_a = robots.find(a), at_b = robots.find(b);
+    const auto link = up_.find(std::minmax(a, b));
     return at_a != robots.end() && at_b != robots.end() && !at_a->second.dead &&
-           !at_b->second.dead && link(a, b).up;
+           !at_b->second.dead && (link == up_.end() || link->second);
   }
 
   // The ends of a link notice a change: at once if it returns, after the lease if it fails.
@@ -325,46 +302,35 @@ class TeamNetwork {
     for (auto& [id, robot] : robots) {
       if (robot.dead) continue;
       for (const auto& [neighbour, state] : robot.overlay->robots().neighbours())
-        launch(robot, {id, neighbour, nullptr, robot.overlay->summary()}, false);
+        launch(robot, {id, neighbour, nullptr, robot.overlay->summary()});
     }
   }
 
   void send(Robot& from, const OverlayPacket& packet) {
     const OverlayStream stream = packet.message->stream;
-    bool is_lost = false;
-    if ((on_packet || loses) && stream > OverlayStream::kLinks) {
+    if (on_packet && stream > OverlayStream::kLinks) {
       const Decoded<TeamMessage> message = team_message(*packet.message);
-      if (message.value) {
-        const LinkPacket seen{packet.neighbour, std::make_shared<const TeamMessage>(*message.value),
-                              packet.message->number};
-        if (on_packet) on_packet(from.peer.robot, seen);
-        is_lost = loses && loses(from.peer.robot, seen);
-      }
+      if (message.value)
+        on_packet(from.peer.robot,
+                  {packet.neighbour, std::make_shared<const TeamMessage>(*message.value),
+                   packet.message->number});
     }
     const std::vector<std::uint8_t> bytes = encode(packet);
     const auto across = decode_overlay_packet(bytes, from.peer, lane_of(stream));
     if (!across.value) ++undecodable;
     from.bytes += bytes.size();
     if (stream > OverlayStream::kTeamStatus) from.session_bytes += bytes.size();
-    ++from.packets;
-    launch(from, {from.peer.robot, packet.neighbour, across.value->message, {}}, is_lost);
+    launch(from, {from.peer.robot, packet.neighbour, across.value->message, {}});
   }
 
-  void launch(const Robot& from, const Delivery& delivery, bool is_lost) {
-    if (!connected(from.peer.robot, delivery.to)) {
-      ++lost;
-      return;
-    }
-    const NetworkLink link = this->link(from.peer.robot, delivery.to);
+  void launch(const Robot& from, const Delivery& delivery) {
+    if (!connected(from.peer.robot, delivery.to)) return;
     std::uniform_real_distribution<double> uniform(0.0, 1.0);
-    if (uniform(rng_) < link.lost || is_lost) {
-      ++lost;
-      return;
-    }
-    const int copies = uniform(rng_) < link.duplicated ? 2 : 1;
+    if (uniform(rng_) < links.lost) return;
+    const int copies = uniform(rng_) < links.duplicated ? 2 : 1;
     for (int copy = 0; copy < copies; ++copy) {
       const double delay_s =
-          link.min_delay_s + (link.max_delay_s - link.min_delay_s) * uniform(rng_);
+          links.min_delay_s + (links.max_delay_s - links.min_delay_s) * uniform(rng_);
       in_flight_.emplace(now_s_ + delay_s, delivery);
     }
   }
@@ -373,10 +339,7 @@ class TeamNetwork {
     while (!in_flight_.empty() && in_flight_.begin()->first <= now_s_) {
       const Delivery delivery = in_flight_.extract(in_flight_.begin()).mapped();
       Robot& to = robots.at(delivery.to);
-      if (!connected(delivery.from, delivery.to)) {
-        ++lost;
-        continue;
-      }
+      if (!connected(delivery.from, delivery.to)) continue;
       if (delivery.summary)
         to.overlay->update(delivery.from, *delivery.summary, now_s_);
       else
@@ -388,7 +351,7 @@ class TeamNetwork {
   }
 
   std::mt19937 rng_;
-  std::map<std::pair<RobotId, RobotId>, NetworkLink> links_;
+  std::map<std::pair<RobotId, RobotId>, bool> up_;  // by default true
   std::map<std::pair<RobotId, RobotId>, std::optional<TeamPeer>> reported_;
   std::multimap<double, Delivery> in_flight_;
   std::multimap<double, std::function<void()>> schedule_;
@@ -399,17 +362,10 @@ class TeamNetwork {
   bool busy_ = false;
 };
 
-/// Gives an agent the odometry of its robot.
-inline void feed_odometry(TeamAgent& agent, RobotId robot, const TeamProblem& problem) {
-  KeyframeOdometry first;
-  first.id = {robot, 0};
-  (void)agent.add(first);
-  for (const PoseEdge& e : problem.edges) {
-    if (!is_step(e) || e.from.robot != robot) continue;
-    KeyframeOdometry keyframe{
-        .id = e.to, .T_previous_kf = e.T_from_to, .covariance = covariance_of(e.precision)};
-    (void)agent.add(keyframe);
-  }
+/// The keyframe at the end of a step.
+[[nodiscard]] inline KeyframeOdometry keyframe_after(const PoseEdge& step) {
+  return {
+      .id = step.to, .T_previous_kf = step.T_from_to, .covariance = covariance_of(step.precision)};
 }
 
 /// A closure; with `problem` its start is the odometry of both ends.
@@ -448,14 +404,39 @@ inline void feed_closures(TeamAgent& agent, RobotId robot, const TeamProblem& pr
   for (const RobotId other : others) (void)agent.add(inlier_set(problem, robot, other, version));
 }
 
+/// Gives an agent the odometry and the closures of its robot.
 inline void feed(TeamAgent& agent, RobotId robot, const TeamProblem& problem) {
-  feed_odometry(agent, robot, problem);
+  (void)agent.add(KeyframeOdometry{.id = {robot, 0}});
+  for (const PoseEdge& e : problem.edges)
+    if (is_step(e) && e.from.robot == robot) (void)agent.add(keyframe_after(e));
   feed_closures(agent, robot, problem);
+}
+
+/// Adds all robots of the problem with their graphs.
+inline void add_all(TeamNetwork& network, const TeamProblem& problem,
+                    const MemberSolverFactory& factory, const PoseGraphConfig& config = {}) {
+  for (const auto& [robot, start] : problem.start)
+    feed(network.add({robot, 1}, config, factory), robot, problem);
 }
 
 /// Runs until all running robots are members of one settled session. False if that takes longer.
 inline bool settle(TeamNetwork& network, double within_s = 300.0) {
   return network.run(within_s, [&] { return network.all_settled(); });
+}
+
+/// Checks that the published poses, in one frame, are the optimum of the problem.
+inline void check_cost(const TeamNetwork& network, const TeamProblem& problem,
+                       double tolerance = kCostTolerance) {
+  const CentralProblem whole(problem);
+  CHECK(whole.cost(network.trajectories()) ==
+        Approx(whole.optimum(problem.start)).epsilon(tolerance));
+}
+
+[[nodiscard]] inline bool has_notice(const TeamNetwork& network, RobotId robot,
+                                     const std::string& text) {
+  return std::ranges::any_of(network.robots.at(robot).notices, [&](const std::string& notice) {
+    return notice.find(text) != notice.npos;
+  });
 }
 
 }  // namespace km

@@ -1,9 +1,5 @@
-#include "modules/core/measurement_limits.hpp"
-#include "modules/rbcd/solver_choice.hpp"
 #include "modules/robust/fix_placement.hpp"
-#include "test/support/random_pose.hpp"
-#include "test/support/team_network.hpp"
-#include "test/support/test.hpp"
+#include "test/modules/session/placed_run.hpp"
 
 // Robots with absolute fixes: keyframe 0 is the origin of the absolute frame, and the step to
 // keyframe 1 is unknown.
@@ -11,7 +7,6 @@
 namespace km {
 namespace {
 
-constexpr KeyframeIndex kRunKeyframes = 60;
 constexpr double kSigma_m = 0.3;
 const Eigen::Vector3d kAntenna(0.3, -0.2, 0.4);
 // 30 fixes along 30 m determine the position to 0.06 m on each axis. They determine the heading to
@@ -25,36 +20,25 @@ SE3 level_pose(std::mt19937& rng) {
                    30.0 * random_vector<3>(rng));
 }
 
-class Run {
+class Run : public PlacedRun {
  public:
   Run(TeamNetwork& network, RobotId robot, unsigned seed, bool has_fixes, PgoMethod method,
       double step_m = 0.5)
-      : rng_(seed),
-        network_(network),
-        robot_(robot),
-        agent_(network.add({robot, 1}, {.method = method}, solver_choice({.method = method}))) {
-    truth_.push_back(has_fixes ? SE3::Identity() : level_pose(rng_));
-    add(has_fixes ? SE3::Identity() : level_pose(rng_), Matrix6::Zero());
+      : PlacedRun(network, robot, seed, method, true) {
+    const SE3 first = has_fixes ? SE3::Identity() : level_pose(rng_);
+    begin(first, has_fixes ? SE3::Identity() : level_pose(rng_));
     if (has_fixes) {
-      truth_.push_back(level_pose(rng_));
-      add(level_pose(rng_), isotropic(2.0, kUnknownStep_m));
+      const SE3 second = level_pose(rng_);
+      jump(second, level_pose(rng_));
     }
-    while (truth_.size() < kRunKeyframes) {
-      const SE3 step = se3_exp(Vector6{0.0, 0.0, 0.03, step_m, 0.0, 0.1 * step_m});
-      truth_.push_back(truth_.back() * step);
-      Vector6 noise = random_vector<6>(rng_);
-      noise.head<3>() *= 0.002;
-      noise.tail<3>() *= 0.01;
-      add(step * se3_exp(noise), isotropic(0.002, 0.01));
-    }
+    walk(se3_exp(Vector6{0.0, 0.0, 0.03, step_m, 0.0, 0.1 * step_m}));
   }
 
   void fix(KeyframeIndex at, const Eigen::Vector3d& error = Eigen::Vector3d::Zero(),
            double sigma_m = kSigma_m) {
-    const SE3& T_datum_kf = truth_[at];
-    CHECK(agent_.add(
-        PositionFix{.keyframe = {robot_, at},
-                    .p_datum = T_datum_kf * kAntenna + sigma_m * random_vector<3>(rng_) + error,
+    CHECK(agent().add(
+        PositionFix{.keyframe = {robot(), at},
+                    .p_datum = truth(at) * kAntenna + sigma_m * random_vector<3>(rng_) + error,
                     .p_kf = kAntenna,
                     .sigma_m = sigma_m,
                     .stamp = 1'000'000'000 * static_cast<Stamp>(at),
@@ -64,43 +48,12 @@ class Run {
   void fix_all() {
     for (KeyframeIndex i = 1; i < kRunKeyframes; ++i) fix(i);
   }
-  [[nodiscard]] const TeamNetwork::Robot& state() const { return network_.robots.at(robot_); }
-  [[nodiscard]] TeamAgent& agent() { return agent_; }
-  [[nodiscard]] RobotId robot() const { return robot_; }
-  [[nodiscard]] const SE3& truth(KeyframeIndex i) const { return truth_[i]; }
-  // Largest distance of a keyframe from its true position in the absolute frame.
-  [[nodiscard]] double error_m() const {
-    double largest = 0.0;
-    for (KeyframeIndex i = 0; i < kRunKeyframes; ++i)
-      largest = std::max(
-          largest,
-          (state().trajectory->T_world_kf[i].translation() - truth_[i].translation()).norm());
-    return largest;
-  }
   [[nodiscard]] Eigen::Vector3d random_outlier() {
     return 10.0 * random_vector<3>(rng_).normalized();
   }
 
   std::uint64_t datum = 77;
   double correlation_s = 0.0;
-
- private:
-  void add(const SE3& T_previous_kf, const Matrix6& covariance) {
-    KeyframeOdometry keyframe{.id = {robot_, static_cast<KeyframeIndex>(next_++)}};
-    keyframe.T_previous_kf = T_previous_kf;
-    keyframe.T_odom_kf = T_odom_kf_ = T_odom_kf_ * T_previous_kf;
-    keyframe.covariance = covariance;
-    keyframe.vertical = Vertical{truth_[keyframe.id.index].linear().row(2).transpose(), 0.01};
-    CHECK(agent_.add(keyframe));
-  }
-
-  std::mt19937 rng_;
-  TeamNetwork& network_;
-  RobotId robot_;
-  TeamAgent& agent_;
-  std::vector<SE3> truth_;  // T_datum_kf
-  SE3 T_odom_kf_ = SE3::Identity();
-  std::size_t next_ = 0;
 };
 
 bool each_settles_again(TeamNetwork& network) {
@@ -152,24 +105,6 @@ TEST_CASE("fixes do not locate a robot before it has moved") {
   CHECK(moving.state().progress.located);
   REQUIRE(moving.state().trajectory);
   CHECK(moving.error_m() < kLargest_m / kSigma_m);
-}
-
-// Gives both robots closures between equal keyframes of two places, off by `error`.
-std::vector<ClosureId> close(Run& low, Run& high, const SE3& error = SE3::Identity(),
-                             const std::vector<KeyframeIndex>& at = {10, 11, 12, 40, 41, 42}) {
-  std::vector<ClosureId> between;
-  for (const KeyframeIndex i : at) {
-    Closure closure;
-    closure.from.id = {low.robot(), i};
-    closure.to.id = {high.robot(), i};
-    closure.T_from_to = low.truth(i).inverse() * high.truth(i) * error;
-    closure.covariance = isotropic(0.005, 0.02);
-    between.push_back(closure.id());
-    for (Run* const run : {&low, &high}) CHECK(run->agent().add(closure));
-  }
-  for (Run* const run : {&low, &high})
-    CHECK(run->agent().add(InlierSet{low.robot(), high.robot(), 1, between}));
-  return between;
 }
 
 TEST_CASE("closures bring a robot without fixes into the absolute frame") {
@@ -339,10 +274,7 @@ TEST_CASE("robots share an absolute frame without closures if they have one datu
   REQUIRE(high.state().trajectory);
   CHECK(low.state().trajectory->anchor == 3);
   CHECK(high.state().trajectory->anchor == (is_one_datum ? 3 : 6));
-  const auto names_datum = [](const std::string& notice) {
-    return notice.find("absolute_fixes.datum") != std::string::npos;
-  };
-  CHECK(std::ranges::any_of(high.state().notices, names_datum) == !is_one_datum);
+  CHECK(has_notice(network, 6, "absolute_fixes.datum") == !is_one_datum);
   for (const Run* const run : {&low, &high}) CHECK(run->error_m() < kLargest_m);
 }
 

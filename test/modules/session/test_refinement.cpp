@@ -42,11 +42,7 @@ struct TwoRobots {
     });
     for (const PoseEdge& e : inside.edges) {
       if (!is_step(e)) continue;
-      KeyframeOdometry keyframe;
-      keyframe.id = e.to;
-      keyframe.T_previous_kf = e.T_from_to;
-      keyframe.covariance = covariance_of(e.precision);
-      REQUIRE(network.agent(1).add(keyframe));
+      REQUIRE(network.agent(1).add(keyframe_after(e)));
     }
     feed_closures(network.agent(1), 1, inside, 2);
     (void)network.run(1.0);  // the next session waits for two seconds at rest

@@ -27,9 +27,7 @@ void check_optimum(const TeamNetwork& network, const TeamProblem& problem) {
     REQUIRE(robot.trajectory);
     CHECK(robot.trajectory->anchor == problem.start.begin()->first);
   }
-  const CentralProblem whole(problem);
-  CHECK(whole.cost(network.trajectories()) ==
-        Approx(whole.optimum(problem.start)).epsilon(kCostTolerance));
+  check_cost(network, problem);
 }
 
 }  // namespace
@@ -133,8 +131,7 @@ TEST_CASE("decisions on closures are valid for both robots") {
   PoseGraphConfig config;
   config.exchange_budget_kb_s = 1e6;
   TeamNetwork network;
-  for (const RobotId id : kIds)
-    feed(network.add({id, 1}, config, gather({.rejects = {wrong.id()}})), id, problem);
+  add_all(network, problem, gather({.rejects = {wrong.id()}}), config);
   REQUIRE(settle(network));
   for (const RobotId id : {RobotId{7}, RobotId{33}}) {
     CAPTURE(id);
@@ -155,7 +152,7 @@ TEST_CASE("a graph that cannot be solved ends the session for all, with a notice
   for (const RobotId id : kIds)
     feed(network.add({id, 1}, {}, id == 50 ? gather(options) : gather()), id, problem);
   (void)network.run(60.0);
-  CHECK_THAT(network.robots.at(50).notices.front(), Contains("cannot be solved"));
+  CHECK(has_notice(network, 50, "cannot be solved"));
   for (const RobotId id : kIds) {
     CAPTURE(id);
     CHECK_FALSE(network.agent(id).in_session());
@@ -179,11 +176,11 @@ std::optional<SessionId> session_of(const TeamMessage& message) {
 }
 
 TEST_CASE("the member that has sent most determines the wait for the next session") {
-  const std::vector<RobotId> ids{7, 33, 50};
   constexpr double kBudget_kb_s = 5.0;
   std::vector<std::pair<RobotId, RobotId>> pairs(8, {33, 50});
   pairs.emplace_back(7, 33);
-  TeamProblem problem = random_team_problem({.robots = ids, .pairs = pairs, .keyframes = 40}, 15);
+  const TeamProblem problem =
+      random_team_problem({.robots = {7, 33, 50}, .pairs = pairs, .keyframes = 40}, 15);
   PoseGraphConfig config;
   config.exchange_budget_kb_s = kBudget_kb_s;
   config.session_wait_s = 600.0;
@@ -193,7 +190,7 @@ TEST_CASE("the member that has sent most determines the wait for the next sessio
     sent_in[session_of(*packet.message)][from] +=
         static_cast<double>(encode(*packet.message).size());
   };
-  for (const RobotId id : ids) feed(network.add({id, 1}, config, gather()), id, problem);
+  add_all(network, problem, gather(), config);
   network.wire({{7, 33}, {33, 50}});
   REQUIRE(settle(network));
   const double first_s = network.now_s();
@@ -217,7 +214,7 @@ TEST_CASE("early stopping ends a session after the given rounds") {
   PoseGraphConfig config;
   config.max_rounds = 2;
   TeamNetwork network;
-  for (const RobotId id : kIds) feed(network.add({id, 1}, config, gather()), id, problem);
+  add_all(network, problem, gather(), config);
   REQUIRE(settle(network));
   for (const RobotId id : kIds) CHECK(network.agent(id).part()->progress().round == 2);
 }
@@ -235,8 +232,7 @@ TEST_CASE("robots with different methods optimise separately, with a notice") {
            network.robots.at(7).progress.members.size() == 3;
   }));
   CHECK(network.robots.at(33).progress.members == std::vector<RobotId>{33});
-  REQUIRE_FALSE(network.robots.at(7).notices.empty());
-  CHECK_THAT(network.robots.at(7).notices.front(), Contains("another method"));
+  CHECK(has_notice(network, 7, "another method"));
 }
 
 TEST_CASE("refused inputs are counted, with a notice") {
@@ -268,8 +264,8 @@ TEST_CASE("false messages are refused or do no lasting harm") {
   std::mt19937 rng(seed);
   const TeamProblem problem = ring(11);
   TeamNetwork network(seed);
-  network.usual.max_delay_s = 0.01;
-  for (const RobotId id : kIds) feed(network.add({id, 1}, {}, gather()), id, problem);
+  network.links.max_delay_s = 0.01;
+  add_all(network, problem, gather());
   std::uniform_int_distribution<std::uint32_t> any(0, 20);
   const auto robot = [&] {
     const std::vector<RobotId> robots{7, 33, 50, 1200, 666, 667};
@@ -320,7 +316,7 @@ TEST_CASE("false messages are refused or do no lasting harm") {
 TEST_CASE("verdicts on unknown closures, or from robots outside the session, decide nothing") {
   const TeamProblem problem = ring(11);
   TeamNetwork network;
-  for (const RobotId id : kIds) feed(network.add({id, 1}, {}, gather()), id, problem);
+  add_all(network, problem, gather());
   REQUIRE(settle(network));
   (void)network.run(1.0);
   const TeamAgent& victim = network.agent(7);
@@ -352,7 +348,7 @@ TEST_CASE("verdicts on unknown closures, or from robots outside the session, dec
 TEST_CASE("a session with unknown closures is refused") {
   const TeamProblem problem = ring(11);
   TeamNetwork network;
-  for (const RobotId id : kIds) feed(network.add({id, 1}, {}, gather()), id, problem);
+  add_all(network, problem, gather());
   REQUIRE(settle(network));
   const TeamAgent& agent = network.agent(33);
   const Session running = agent.part()->session();
@@ -371,12 +367,12 @@ TEST_CASE("every message may arrive late, twice and in any order") {
   CAPTURE(seed);
   const TeamProblem problem = ring(seed);
   TeamNetwork network(seed);
-  network.usual = {.max_delay_s = 0.3, .lost = 0.05, .duplicated = 0.5};
+  network.links = {.max_delay_s = 0.3, .lost = 0.05, .duplicated = 0.5};
   std::vector<std::pair<RobotId, LinkPacket>> seen;
   network.on_packet = [&](RobotId from, const LinkPacket& packet) {
     seen.emplace_back(from, packet);
   };
-  for (const RobotId id : kIds) feed(network.add({id, 1}, {}, gather()), id, problem);
+  add_all(network, problem, gather());
   std::mt19937 rng(seed);
   for (int k = 0; k < 200; ++k) {
     (void)network.run(0.01);

@@ -21,12 +21,6 @@ TeamProblem problem_of(unsigned seed) {
                              seed);
 }
 
-void add_four(TeamNetwork& network, const TeamProblem& problem,
-              const MemberSolverFactory& factory = solver_choice({})) {
-  for (const auto& [robot, start] : problem.start)
-    feed(network.add({robot, 100U + robot}, {}, factory), robot, problem);
-}
-
 std::size_t closures_of(const TeamProblem& problem) {
   return static_cast<std::size_t>(std::count_if(problem.edges.begin(), problem.edges.end(),
                                                 [](const PoseEdge& e) { return !is_step(e); }));
@@ -92,12 +86,6 @@ void check_ends_agree(const TeamNetwork& network) {
       CHECK(decided.try_emplace(closure, kept).first->second == kept);
 }
 
-void check_cost(const TeamNetwork& network, const TeamProblem& problem) {
-  const CentralProblem whole(problem);
-  CHECK(whole.cost(network.trajectories()) ==
-        Approx(whole.optimum(problem.start)).epsilon(kCostTolerance));
-}
-
 }  // namespace
 
 TEST_CASE("random false closures are rejected and leave the optimum of the true ones") {
@@ -106,8 +94,8 @@ TEST_CASE("random false closures are rejected and leave the optimum of the true 
   TeamProblem problem = problem_of(seed);
   const std::set<ClosureId> wrong = add_random_false(problem, 0.3, seed);
   TeamNetwork network(seed);
-  network.usual = {.max_delay_s = 0.05, .lost = 0.05, .duplicated = 0.05};
-  add_four(network, problem);
+  network.links = {.max_delay_s = 0.05, .lost = 0.05, .duplicated = 0.05};
+  add_all(network, problem, solver_choice({}));
   network.wire({{2, 3}, {3, 5}, {5, 9}});
   REQUIRE(settle(network));
   CHECK(rejected(network) == wrong);
@@ -122,8 +110,8 @@ TEST_CASE("false closures that agree with each other are rejected if others cont
   TeamProblem problem = problem_of(seed);
   const std::set<ClosureId> wrong = add_cluster(problem, count, seed);
   TeamNetwork network(seed);
-  network.usual = {.max_delay_s = 0.05, .lost = 0.05};
-  add_four(network, problem);
+  network.links = {.max_delay_s = 0.05, .lost = 0.05};
+  add_all(network, problem, solver_choice({}));
   REQUIRE(settle(network));
   CHECK(rejected(network) == wrong);
   check_ends_agree(network);
@@ -140,16 +128,13 @@ TEST_CASE("a wrong step of odometry is corrected, and closures are kept") {
     if (is_step(e) && e.from == KeyframeId{2, 30})
       e.T_from_to = e.T_from_to * make_pose(so3_exp({0.0, 0.8, 1.6}), {5.0, -3.0, 1.0});
   TeamNetwork network(seed);
-  add_four(network, problem);
+  add_all(network, problem, solver_choice({}));
   REQUIRE(settle(network));
   // The step is known up to the nearest ends of closures, so closures between may be rejected.
   CHECK(rejected(network).size() <= 3);
   CHECK(network.robots.at(2).progress.odometry_breaks == 1);
   CHECK(network.robots.at(5).progress.odometry_breaks == 0);
-  const auto& notices = network.robots.at(2).notices;
-  CHECK(std::ranges::any_of(notices, [](const std::string& notice) {
-    return notice.find("odometry is wrong near keyframe") != notice.npos;
-  }));
+  CHECK(has_notice(network, 2, "odometry is wrong near keyframe"));
 }
 
 TEST_CASE("a session after new closures decides on all as a single session does") {
@@ -164,7 +149,7 @@ TEST_CASE("a session after new closures decides on all as a single session does"
       later.insert(e.id());
   REQUIRE(later.size() == 3);
   TeamNetwork network(seed);
-  add_four(network, without(all, later));
+  add_all(network, without(all, later), solver_choice({}));
   REQUIRE(settle(network));
   REQUIRE(rejected(network) == wrong);
   for (const RobotId robot : {RobotId{3}, RobotId{5}}) {
@@ -175,7 +160,7 @@ TEST_CASE("a session after new closures decides on all as a single session does"
   (void)network.run(1.0);
   REQUIRE(settle(network));
   TeamNetwork single(seed);
-  add_four(single, all);
+  add_all(single, all, solver_choice({}));
   REQUIRE(settle(single));
   CHECK(rejected(network) == rejected(single));
   check_ends_agree(network);
@@ -209,7 +194,7 @@ TEST_CASE("the second look of a session gets the decisions of the first, and dec
     return std::make_unique<ScriptedSolver>(std::move(graph), std::move(place), options);
   };
   TeamNetwork network;
-  add_four(network, problem, factory);
+  add_all(network, problem, factory);
   REQUIRE(settle(network));
   (void)network.run(30.0);
   REQUIRE(settle(network));
@@ -228,7 +213,7 @@ TEST_CASE("decisions that a team makes without a robot do not outlast its absenc
     return std::make_unique<ScriptedSolver>(std::move(graph), std::move(place), options);
   };
   TeamNetwork network;
-  add_four(network, problem, factory);
+  add_all(network, problem, factory);
   REQUIRE(settle(network));
   const auto check_kept = [&](bool kept) {
     for (const RobotId robot : {RobotId{2}, RobotId{3}})
@@ -253,7 +238,7 @@ TEST_CASE("decisions that a team makes without a robot do not outlast its absenc
 TEST_CASE("closures to a robot out of reach that no session has kept move no robot") {
   TeamProblem problem = problem_of(3);
   TeamNetwork network;
-  add_four(network, problem);
+  add_all(network, problem, solver_choice({}));
   REQUIRE(settle(network));
   network.kill(9);
   (void)network.run(10.0);

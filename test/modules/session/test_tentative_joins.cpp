@@ -45,12 +45,6 @@ std::set<ClosureId> add_false(TeamProblem& problem, std::uint32_t first, std::ui
   return added;
 }
 
-void add_robots(TeamNetwork& network, const TeamProblem& problem,
-                const MemberSolverFactory& factory = solver_choice({})) {
-  for (const auto& [robot, start] : problem.start)
-    feed(network.add({robot, 100U + robot}, {}, factory), robot, problem);
-}
-
 const OptimizerProgress& progress_of(const TeamNetwork& network, RobotId robot) {
   return network.robots.at(robot).progress;
 }
@@ -71,12 +65,6 @@ bool settle_and_report(TeamNetwork& network) {
   return settled;
 }
 
-bool has_notice(const TeamNetwork& network, RobotId robot, const std::string& text) {
-  return std::ranges::any_of(network.robots.at(robot).notices, [&](const std::string& notice) {
-    return notice.find(text) != notice.npos;
-  });
-}
-
 }  // namespace
 
 TEST_CASE("Robots that closures at one place join are tentative, and report it") {
@@ -86,7 +74,7 @@ TEST_CASE("Robots that closures at one place join are tentative, and report it")
   for (std::uint32_t k = 0; k < count; ++k) at.insert(10 + k);
   const TeamProblem problem = team_of_three(1, at);
   TeamNetwork network;
-  add_robots(network, problem);
+  add_all(network, problem, solver_choice({}));
   REQUIRE(settle_and_report(network));
   CHECK(progress_of(network, 2).tentative == Robots{4, 6});
   CHECK(progress_of(network, 4).tentative == Robots{2});
@@ -107,7 +95,7 @@ TEST_CASE("Robots that share one way are certain unless a closure between them i
   TeamProblem problem = team_of_three(1, at);
   if (contradicted) (void)add_false(problem, 38, 1);
   TeamNetwork network;
-  add_robots(network, problem);
+  add_all(network, problem, solver_choice({}));
   REQUIRE(settle_and_report(network));
   CHECK(progress_of(network, 2).tentative == (contradicted ? Robots{4, 6} : Robots{}));
 }
@@ -123,7 +111,7 @@ TEST_CASE(
   for (const PoseEdge& e : all.edges)
     if (e.from.robot == 2 && e.to.robot == 4 && !wrong.contains(e.id())) later.insert(e.id());
   TeamNetwork network(seed);
-  add_robots(network, without(all, later));
+  add_all(network, without(all, later), solver_choice({}));
   REQUIRE(settle_and_report(network));
   CHECK(progress_of(network, 2).tentative == Robots{4, 6});
 
@@ -140,9 +128,7 @@ TEST_CASE(
   CHECK(network.robots.at(2).news ==
         std::vector<std::string>{"no longer joined tentatively, but by closures at several places: "
                                  "with robots 4, 6"});
-  const CentralProblem whole(without(all, wrong));
-  CHECK(whole.cost(network.trajectories()) ==
-        Approx(whole.optimum(all.start)).epsilon(kCostTolerance));
+  check_cost(network, without(all, wrong));
 }
 
 TEST_CASE("Robots with two single closures that contradict each other are not joined") {
@@ -151,7 +137,7 @@ TEST_CASE("Robots with two single closures that contradict each other are not jo
   TeamProblem problem = team_of_three(seed, {8});
   (void)add_false(problem, 40, 1);
   TeamNetwork network(seed);
-  add_robots(network, problem);
+  add_all(network, problem, solver_choice({}));
   REQUIRE(settle_and_report(network));
   CHECK(progress_of(network, 2).not_joined == Robots{4, 6});
   CHECK(progress_of(network, 4).not_joined == Robots{2});
@@ -167,7 +153,7 @@ TEST_CASE("Robots are not joined if as many places agree on another relative pos
   for (const std::uint32_t first : {35U, 52U})
     (void)add_false(problem, first, 2, alike ? std::optional(seed) : std::nullopt);
   TeamNetwork network(seed);
-  add_robots(network, problem);
+  add_all(network, problem, solver_choice({}));
   REQUIRE(settle_and_report(network));
   CHECK(progress_of(network, 2).tentative.empty());
   CHECK(progress_of(network, 2).not_joined == (alike ? Robots{4, 6} : Robots{}));
@@ -189,7 +175,7 @@ TEST_CASE("Robots whose closures are all rejected publish in two frames, until o
     return std::make_unique<ScriptedSolver>(std::move(graph), std::move(place), options);
   };
   TeamNetwork network;
-  add_robots(network, without(problem, later), factory);
+  add_all(network, without(problem, later), factory);
   REQUIRE(settle_and_report(network));
   CHECK(progress_of(network, 2).not_joined == Robots{4, 6});
   CHECK(progress_of(network, 4).not_joined == Robots{2});
@@ -258,7 +244,7 @@ TEST_CASE(
     return std::make_unique<ScriptedSolver>(std::move(graph), std::move(place), options);
   };
   TeamNetwork network;
-  add_robots(network, without(problem, later), factory);
+  add_all(network, without(problem, later), factory);
   REQUIRE(settle_and_report(network));
   REQUIRE(progress_of(network, 6).not_joined == Robots{2});
 
