@@ -1,15 +1,26 @@
 #pragma once
 
 #include <cmath>
-#include <filesystem>
 #include <numbers>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "apps/lab/pgo/team_graph_file.hpp"
 #include "modules/core/lie.hpp"
 #include "test/support/random_pose.hpp"
+#include "test/support/shared_data.hpp"
 
 namespace km {
+
+/// A recorded graph divided among `robots`, or with 0 the folder of a team; nullopt if it is
+/// missing.
+inline std::optional<TeamGraph> recorded_team(const std::string& name, std::size_t robots) {
+  const auto path = shared_data(name);
+  if (!path) return std::nullopt;
+  return robots == 0 ? read_team_folder(*path)
+                     : partition_contiguously(read_g2o(*path), robots, name);
+}
 
 /// A chain of `poses` with edges also to the fifth pose after each and to a far one. It is exact
 /// except for noise of `sigma` in each component. Every third pose has a vertical with the same

@@ -68,12 +68,6 @@ double cost_of_poses(const TeamGraph& graph, const std::vector<SE3>& poses) {
   return problem_of(graph, 3).cost(lift(poses, 3));
 }
 
-std::optional<TeamGraph> partitioned(const std::string& name, std::size_t robots) {
-  const auto path = shared_data(name);
-  if (!path) return std::nullopt;
-  return partition_contiguously(read_g2o(*path), robots, name);
-}
-
 // Until rounding limits the cost. As much patience as second derivatives save here.
 const TreeNewtonOptions kExact{.absolute_tolerance = 0.0, .patience_rounds = 8.0};
 const TreeNewtonOptions kTrusting{
@@ -94,7 +88,7 @@ TEST_CASE("A team that trusts its closures reaches the certified optimum") {
                        Certified{kSphere, 1687.005815, 7}, Certified{kGarage, 1.26252443, 7},
                        Certified{"pose_graphs/3d/torus3D.g2o", 24227.04556, 7}}));
   CAPTURE(name);
-  const auto graph = partitioned(name, 5);
+  const auto graph = recorded_team(name, 5);
   if (!graph) return;
   AskedTeam asked(*graph, chordal_initialisation(graph->poses(), graph->edges), kTrusting);
   int rounds = 0;
@@ -116,7 +110,7 @@ TEST_CASE("A team that trusts its closures reaches the certified optimum") {
 // rounds: 3.
 TEST_CASE("Weighing true closures costs few bytes") {
   const std::size_t robots = GENERATE(2U, 5U);
-  const auto graph = partitioned(kSphere, robots);
+  const auto graph = recorded_team(kSphere, robots);
   if (!graph) return;
   const AgentTeamRun weighed = run_agent_team(*graph, {});
   const AgentTeamRun trusted = run_agent_team(*graph, {.pose_graph = {.robust = false}});
@@ -177,7 +171,7 @@ void check_decided_once(const AskedTeam& asked, const TeamGraph& graph) {
 }
 
 TEST_CASE("Every closure is decided by exactly one of its two robots") {
-  const auto clean = partitioned("pose_graphs/3d/smallGrid3D.g2o", 4);
+  const auto clean = recorded_team("pose_graphs/3d/smallGrid3D.g2o", 4);
   if (!clean) return;
   const std::vector<bool> odometry = odometry_edges(*clean);
   const auto closures = static_cast<double>(std::ranges::count(odometry, false));
@@ -202,9 +196,9 @@ std::size_t groups_of(const TeamGraph& graph, const std::vector<bool>& kept) {
 }
 
 TEST_CASE("The robots of the tunnels estimate their noise and reach one frame") {
-  const auto folder = shared_data("multi_robot/tunnels_8robots");
-  if (!folder) return;
-  const TeamGraph graph = read_team_folder(*folder);
+  const auto recorded = recorded_team("multi_robot/tunnels_8robots", 0);
+  if (!recorded) return;
+  const TeamGraph& graph = *recorded;
   const AgentTeamRun run = run_agent_team(graph, {});
   CHECK(run.settled);
   CHECK(run.last.round <= 100);
@@ -222,16 +216,9 @@ TEST_CASE("The robots of the tunnels estimate their noise and reach one frame") 
         static_cast<std::ptrdiff_t>(graph.robots()));
 }
 
-std::optional<TeamGraph> recorded(const std::string& name, std::size_t robots) {
-  const auto path = shared_data(name);
-  if (!path) return std::nullopt;
-  if (robots == 0) return read_team_folder(*path);
-  return partition_contiguously(read_g2o(*path), robots, name);
-}
-
 struct Recorded {
   const char* name;
-  std::size_t robots;  // 0: those of the recording
+  std::size_t robots;
 };
 
 const auto kGraphs = {Recorded{"pose_graphs/3d/sphere2500.g2o", 5},
@@ -243,7 +230,7 @@ constexpr int kRounds = 12;
 TEST_CASE("No private pose can be derived from the poses and edges that robots send", "[slow]") {
   const auto [name, robots] = GENERATE(values(kGraphs));
   CAPTURE(name);
-  const auto clean = recorded(name, robots);
+  const auto clean = recorded_team(name, robots);
   if (!clean) return;
   const TeamGraph graph =
       robots == 0 ? *clean : corrupt(*clean, clean->edges.size() / 10, 5.0, 4);  // to be weighed

@@ -7,7 +7,6 @@
 #include "modules/core/lie.hpp"
 #include "test/support/command.hpp"
 #include "test/support/random_pose.hpp"
-#include "test/support/shared_data.hpp"
 #include "test/support/team_graphs.hpp"
 #include "test/support/temporary_folder.hpp"
 #include "test/support/test.hpp"
@@ -140,11 +139,10 @@ TEST_CASE("pairwise consistency keeps true closures and no false ones") {
 
 // Few closures, most of which stand alone, and odometry that claims 1.3 rad after 500 steps.
 TEST_CASE("a robot with few closures and imprecise odometry keeps its true ones") {
-  const auto file = shared_data("pose_graphs/2d/input_MITb_g2o.g2o");
-  if (!file) return;
-  const TeamGraph graph = partition_contiguously(read_g2o(*file), 1, file->string());
+  const auto graph = recorded_team("pose_graphs/2d/input_MITb_g2o.g2o", 1);
+  if (!graph) return;
   const OutlierStudy study = run_outlier_study(
-      graph, {.shares_percent = {0.0, 30.0}, .methods = {"robots"}, .seeds = {1, 2, 3}}, {});
+      *graph, {.shares_percent = {0.0, 30.0}, .methods = {"robots"}, .seeds = {1, 2, 3}}, {});
   for (const OutlierResult& result : study.results) {
     CAPTURE(result.seed, result.share_percent);
     CHECK(result.true_lost == 0);
@@ -155,11 +153,10 @@ TEST_CASE("a robot with few closures and imprecise odometry keeps its true ones"
 // Most closures inside a robot are false then. Noise of odometry that makes them true lets others
 // bend the stretches of up to 56 poses without closures. Recorded closures have no labels.
 TEST_CASE("random closures do not pass for noise of odometry") {
-  const auto folder = shared_data("multi_robot/tunnels_8robots");
-  if (!folder) return;
-  const OutlierStudy study =
-      run_outlier_study(read_team_folder(*folder),
-                        {.shares_percent = {10.0}, .methods = {"robots"}, .seeds = {1}}, {});
+  const auto graph = recorded_team("multi_robot/tunnels_8robots", 0);
+  if (!graph) return;
+  const OutlierStudy study = run_outlier_study(
+      *graph, {.shares_percent = {10.0}, .methods = {"robots"}, .seeds = {1}}, {});
   CHECK(study.results.front().false_kept == 0);
 }
 
@@ -167,13 +164,12 @@ TEST_CASE("random closures do not pass for noise of odometry") {
 // others hold, and have no residual there.
 TEST_CASE("false closures within the claimed noise are rejected if the true noise is smaller") {
   const std::string name = GENERATE("intel", "input_M3500_g2o");
-  const int robots = GENERATE(1, 3);
+  const std::size_t robots = GENERATE(1U, 3U);
   CAPTURE(name, robots);
-  const auto file = shared_data("pose_graphs/2d/" + name + ".g2o");
-  if (!file) return;
-  const TeamGraph graph = partition_contiguously(read_g2o(*file), robots, file->string());
-  const OutlierStudy study =
-      run_outlier_study(graph, {.shares_percent = {30.0}, .methods = {"robots"}, .seeds = {1}}, {});
+  const auto graph = recorded_team("pose_graphs/2d/" + name + ".g2o", robots);
+  if (!graph) return;
+  const OutlierStudy study = run_outlier_study(
+      *graph, {.shares_percent = {30.0}, .methods = {"robots"}, .seeds = {1}}, {});
   const OutlierResult& result = study.results.front();
   CHECK(result.false_kept == 0);
   CHECK(100 * result.true_lost <= result.true_closures);
@@ -217,12 +213,11 @@ TEST_CASE("a closure that alone corrects a long drift is kept among false ones")
 }
 
 TEST_CASE("noise of steps and closures that no claim covers rejects nothing") {
-  const auto file = shared_data("pose_graphs/3d/sphere_bignoise_vertex3.g2o");
-  if (!file) return;
   const std::size_t robots = GENERATE(1U, 5U);
   CAPTURE(robots);
-  const TeamGraph graph = partition_contiguously(read_g2o(*file), robots, file->string());
-  CHECK(std::ranges::count(run_agent_team(graph, {}).kept, false) == 0);
+  const auto graph = recorded_team("pose_graphs/3d/sphere_bignoise_vertex3.g2o", robots);
+  if (!graph) return;
+  CHECK(std::ranges::count(run_agent_team(*graph, {}).kept, false) == 0);
 }
 
 TEST_CASE("rejected closures do not distort the map, and kept false ones do") {

@@ -44,7 +44,6 @@ TEST_CASE("pcm reports the fault of its input") {
   (void)folder.write("gap.g2o", "EDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\nEDGE_SE2 0 3 1 0 0 1 0 0 1 0 1\n");
   const auto [arguments, message] = GENERATE(table<std::string, std::string>(
       {{"", "FILE is required"},
-       {"missing.g2o", "missing.g2o"},
        {"two.g2o --search best", "best not in {"},
        {"two.g2o --outliers -1", "--outliers"},
        {"two.g2o --json no/out.json", "no"},

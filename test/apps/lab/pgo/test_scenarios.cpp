@@ -2,8 +2,6 @@
 #include "apps/lab/pgo/scenario.hpp"
 #include "apps/lab/pgo/team_graph_file.hpp"
 #include "modules/core/lie.hpp"
-#include "modules/recorded_graph/g2o_io.hpp"
-#include "test/support/shared_data.hpp"
 #include "test/support/team_graphs.hpp"
 #include "test/support/test.hpp"
 
@@ -313,11 +311,11 @@ TEST_CASE("The robots' sessions stand noise and places that are not as claimed",
                            Row{"clusters", "parking-garage", 0.0, 1.01},
                            Row{"three-folders", "sphere2500", 0.0, 1.1},
                            Row{"place-bias", "parking-garage", 0.01, 1.1});
-  const auto file = shared_data("pose_graphs/3d/" + row.graph + ".g2o");
-  if (!file) return;
+  const auto graph = recorded_team("pose_graphs/3d/" + row.graph + ".g2o", 1);
+  if (!graph) return;
   CAPTURE(row.scenario);
   const OutlierStudy study = run_outlier_study(
-      partition_contiguously(read_g2o(*file), 1, row.graph),
+      *graph,
       {.scenario = scenario_of(row.scenario), .methods = {"robots", "reference"}, .seeds = {4}},
       {});
   const OutlierResult& robots = study.results.at(0);
@@ -329,16 +327,15 @@ TEST_CASE("The robots' sessions stand noise and places that are not as claimed",
 }
 
 TEST_CASE("Odometry that is 20 times as noisy as it claims costs no true closure") {
-  const auto file = shared_data("pose_graphs/3d/sphere2500.g2o");
-  if (!file) return;
+  const auto graph = recorded_team("pose_graphs/3d/sphere2500.g2o", 1);
+  if (!graph) return;
   Scenario scenario = scenario_of("noisy-odometry");
   scenario.odometry_noise = {{1, 20.0}};
   // With seed 10, robots whose closures inside are not weighed again lose 9 of 37 between robots.
   const unsigned seed = GENERATE(2U, 10U);
   CAPTURE(seed);
   const OutlierStudy study = run_outlier_study(
-      partition_contiguously(read_g2o(*file), 1, "sphere2500"),
-      {.scenario = scenario, .methods = {"robots", "reference"}, .seeds = {seed}}, {});
+      *graph, {.scenario = scenario, .methods = {"robots", "reference"}, .seeds = {seed}}, {});
   CHECK(study.results.at(0).true_lost == 0);
   CHECK(study.results.at(0).rms_m <= 1.1 * study.results.at(1).rms_m);
 }
