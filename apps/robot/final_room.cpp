@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "apps/result_files.hpp"
+#include "modules/core/descriptor.hpp"
 #include "runtime/log.hpp"
 
 namespace km {
@@ -15,12 +16,11 @@ namespace {
 
 // Allocates the bytes of a file from its present end up to `bytes`. Returns an error, or 0.
 int allocate(const std::filesystem::path& file, std::uint64_t from, std::uint64_t bytes) {
-  const int descriptor = open(file.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
-  if (descriptor < 0) return errno;
+  const Descriptor opened(open(file.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666));
+  if (opened.get() < 0) return errno;
   const int error =
-      posix_fallocate(descriptor, static_cast<off_t>(from), static_cast<off_t>(bytes - from));
-  if (error != 0) (void)!ftruncate(descriptor, static_cast<off_t>(from));
-  close(descriptor);
+      posix_fallocate(opened.get(), static_cast<off_t>(from), static_cast<off_t>(bytes - from));
+  if (error != 0) (void)!ftruncate(opened.get(), static_cast<off_t>(from));
   return error;
 }
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/descriptor.hpp"
+#include "modules/core/descriptor.hpp"
 #include "modules/link_emulation/link_emulator.hpp"
 #include "runtime/guarded_thread.hpp"
 

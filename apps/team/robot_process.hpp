@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/descriptor.hpp"
+#include "modules/core/descriptor.hpp"
 
 namespace km {
 

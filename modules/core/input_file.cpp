@@ -10,6 +10,8 @@
 #include <cstddef>
 #include <system_error>
 
+#include "modules/core/descriptor.hpp"
+
 namespace km {
 namespace {
 
@@ -25,21 +27,6 @@ constexpr int kPipe_ms = 10'000;  // longest wait for bytes of a pipe
 [[noreturn]] void fail_as_too_large(const fs::path& file, std::uintmax_t max_bytes) {
   fail(file, "larger than " + std::to_string(max_bytes >> 20U) + " MiB, which no input is");
 }
-
-class Descriptor {
- public:
-  explicit Descriptor(int number) : number_(number) {}
-  ~Descriptor() {
-    if (number_ >= 0) close(number_);
-  }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-
-  [[nodiscard]] int number() const { return number_; }
-
- private:
-  const int number_;
-};
 
 // Waits until the pipe has bytes, or its writer has closed it.
 void await_pipe(int descriptor, const fs::path& file) {
@@ -99,7 +86,7 @@ InputFile open_input_file(const fs::path& file, std::uintmax_t max_bytes) {
   // Opening a pipe does not wait for its writer.
   const Descriptor opened(open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
   struct stat status {};
-  if (opened.number() < 0 || fstat(opened.number(), &status) != 0)
+  if (opened.get() < 0 || fstat(opened.get(), &status) != 0)
     fail(file, "cannot be opened: " + std::generic_category().message(errno));
   // The bytes from a pipe are counted while they are read
   const bool is_regular = S_ISREG(status.st_mode);
@@ -112,11 +99,11 @@ InputFile open_input_file(const fs::path& file, std::uintmax_t max_bytes) {
                                 static_cast<fs::perms>(status.st_mode) & fs::perms::mask)};
   if (is_regular) read.bytes.reserve(static_cast<std::size_t>(status.st_size));
   for (bool more = true; more;) {
-    if (!is_regular) await_pipe(opened.number(), file);
+    if (!is_regular) await_pipe(opened.get(), file);
     const std::size_t before = read.bytes.size();
     const auto room = static_cast<std::size_t>(std::min(kChunk_bytes, max_bytes + 1));
     read.bytes.resize(before + room);
-    const ssize_t count = ::read(opened.number(), read.bytes.data() + before, room);
+    const ssize_t count = ::read(opened.get(), read.bytes.data() + before, room);
     if (count < 0 && errno != EINTR && errno != EAGAIN) fail(file, "cannot be read to its end");
     read.bytes.resize(before + static_cast<std::size_t>(std::max<ssize_t>(count, 0)));
     if (read.bytes.size() > max_bytes) fail_as_too_large(file, max_bytes);

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "modules/core/decoded.hpp"
+#include "modules/core/descriptor.hpp"
 #include "modules/recordings/bag_reader.hpp"
 
 namespace km {
@@ -101,9 +102,6 @@ class RandomAccessFile {
  public:
   /// Throws InputFileError if `path` is no readable regular file.
   explicit RandomAccessFile(const std::filesystem::path& path);
-  ~RandomAccessFile();
-  RandomAccessFile(const RandomAccessFile&) = delete;
-  RandomAccessFile& operator=(const RandomAccessFile&) = delete;
 
   /// Size of the file when it was opened [bytes].
   [[nodiscard]] std::uint64_t size() const { return size_; }
@@ -125,7 +123,7 @@ class RandomAccessFile {
 
  private:
   std::filesystem::path path_;
-  int descriptor_ = -1;
+  Descriptor descriptor_;
   std::uint64_t size_ = 0;
 };
 

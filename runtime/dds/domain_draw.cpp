@@ -19,6 +19,8 @@
 #include <system_error>
 #include <vector>
 
+#include "modules/core/descriptor.hpp"
+
 namespace km {
 namespace {
 
@@ -27,12 +29,10 @@ bool is_taken(unsigned port) {
   sockaddr_in address{};
   address.sin_family = AF_INET;
   address.sin_port = htons(static_cast<std::uint16_t>(port));
-  const int tried = socket(AF_INET, SOCK_DGRAM, 0);
-  if (tried < 0) return false;
-  const bool is_bound = bind(tried, reinterpret_cast<sockaddr*>(&address), sizeof address) == 0;
-  const bool taken = !is_bound && errno == EADDRINUSE;
-  close(tried);
-  return taken;
+  const Descriptor tried(socket(AF_INET, SOCK_DGRAM, 0));
+  return tried.get() >= 0 &&
+         bind(tried.get(), reinterpret_cast<sockaddr*>(&address), sizeof address) != 0 &&
+         errno == EADDRINUSE;
 }
 
 // True if a program on this host takes part in the domain, whether it has drawn it or not. It has

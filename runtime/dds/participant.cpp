@@ -8,7 +8,6 @@
 #include <netdb.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -23,6 +22,7 @@
 #include <system_error>
 
 #include "modules/core/config.hpp"
+#include "modules/core/descriptor.hpp"
 #include "modules/core/xml_text.hpp"
 #include "runtime/log.hpp"
 #include "runtime/thread.hpp"
@@ -54,15 +54,12 @@ std::string why_unknown(const std::string& host) {
 class QuerySocket {
  public:
   QuerySocket() : socket_(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {}
-  ~QuerySocket() { close(socket_); }
-  QuerySocket(const QuerySocket&) = delete;
-  QuerySocket& operator=(const QuerySocket&) = delete;
 
   // 0 if unknown.
   [[nodiscard]] int mtu_of(const char* interface) const {
     ifreq request{};
     std::strncpy(request.ifr_name, interface, IFNAMSIZ - 1);
-    return ioctl(socket_, SIOCGIFMTU, &request) == 0 ? request.ifr_mtu : 0;
+    return ioctl(socket_.get(), SIOCGIFMTU, &request) == 0 ? request.ifr_mtu : 0;
   }
 
   // True for a bridge without members, for instance of containers: it has a carrier nevertheless.
@@ -71,14 +68,16 @@ class QuerySocket {
     std::array<int, 256> bridges{}, members{};
     Arguments list = {BRCTL_GET_BRIDGES, reinterpret_cast<unsigned long>(bridges.data()), 256, 0};
     const int index = static_cast<int>(if_nametoindex(interface));
-    if (ioctl(socket_, SIOCGIFBR, list.data()) <= 0 || std::ranges::count(bridges, index) == 0)
+    if (ioctl(socket_.get(), SIOCGIFBR, list.data()) <= 0 ||
+        std::ranges::count(bridges, index) == 0)
       return false;
     Arguments ports = {BRCTL_GET_PORT_LIST, reinterpret_cast<unsigned long>(members.data()), 256,
                        0};
     ifreq request{};
     std::strncpy(request.ifr_name, interface, IFNAMSIZ - 1);
     request.ifr_data = reinterpret_cast<char*>(ports.data());
-    return ioctl(socket_, SIOCDEVPRIVATE, &request) >= 0 && std::ranges::count(members, 0) == 256;
+    return ioctl(socket_.get(), SIOCDEVPRIVATE, &request) >= 0 &&
+           std::ranges::count(members, 0) == 256;
   }
 
   struct Route {
@@ -92,9 +91,9 @@ class QuerySocket {
     address.sin_addr = host;
     socklen_t size = sizeof address, mtu_size = sizeof(int);
     Route route;
-    if (connect(socket_, reinterpret_cast<const sockaddr*>(&address), size) != 0 ||
-        getsockname(socket_, reinterpret_cast<sockaddr*>(&address), &size) != 0 ||
-        getsockopt(socket_, IPPROTO_IP, IP_MTU, &route.mtu, &mtu_size) != 0)
+    if (connect(socket_.get(), reinterpret_cast<const sockaddr*>(&address), size) != 0 ||
+        getsockname(socket_.get(), reinterpret_cast<sockaddr*>(&address), &size) != 0 ||
+        getsockopt(socket_.get(), IPPROTO_IP, IP_MTU, &route.mtu, &mtu_size) != 0)
       return {};
     route.own_address = dotted(address.sin_addr);
     return route;
@@ -107,7 +106,7 @@ class QuerySocket {
   }
 
  private:
-  int socket_;
+  Descriptor socket_;
 };
 
 void add_routes(const std::vector<std::string>& hosts, std::vector<NetworkInterface>& interfaces) {
