@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <filesystem>
+#include <functional>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -68,12 +69,8 @@ inline constexpr const char* kRecord = "record.mcap";
     return is_file(one / kSummary) || is_file(one / kJournal);
   };
   if (is_of_robot(folder)) return {folder};
-  std::vector<std::filesystem::path> found;
-  std::error_code error;
-  for (std::filesystem::directory_iterator entry(folder, error), end; !error && entry != end;
-       entry.increment(error))
-    if (is_of_robot(entry->path())) found.push_back(entry->path());
-  std::ranges::sort(found);
+  std::vector<std::filesystem::path> found = entries_of(folder);
+  std::erase_if(found, std::not_fn(is_of_robot));
   return found;
 }
 

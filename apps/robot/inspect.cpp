@@ -123,14 +123,9 @@ std::string text_of(const std::vector<TopicSummary>& topics) {
 
 // Topics of a EuRoC folder: folders with a data.csv whose rows begin with a stamp.
 std::vector<TopicSummary> euroc_topics(const fs::path& folder) {
-  std::vector<fs::path> places;
-  std::error_code error;
-  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
-       entry.increment(error))
-    if (is_file(entry->path() / "data.csv")) places.push_back(entry->path());
-  std::sort(places.begin(), places.end());
   std::vector<TopicSummary> topics;
-  for (const fs::path& place : places) {
+  for (const fs::path& place : entries_of(folder)) {
+    if (!is_file(place / "data.csv")) continue;
     TopicSummary topic{.topic = place.filename().string(),
                        .type = "data.csv",
                        .has_sensor_stamps = true,

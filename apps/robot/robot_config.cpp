@@ -1,7 +1,5 @@
 #include "apps/robot/robot_config.hpp"
 
-#include <set>
-#include <system_error>
 #include <type_traits>
 #include <vector>
 
@@ -69,10 +67,8 @@ fs::path find_named_file(const std::string& folder, const std::string& name) {
   std::vector<fs::path> named;
   std::string known;
   for (const fs::path& root : config_folders()) {
-    std::error_code ignored;
-    std::set<fs::path> files;
-    for (const auto& entry : fs::directory_iterator(root / folder, ignored))
-      if (entry.path().extension() == ".yaml") files.insert(entry.path());
+    std::vector<fs::path> files = entries_of(root / folder);
+    std::erase_if(files, [](const fs::path& file) { return file.extension() != ".yaml"; });
     for (const fs::path& file : files) {
       const std::string stem = file.stem();
       if (stem == name) return file;

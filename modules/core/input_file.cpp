@@ -77,6 +77,16 @@ bool is_absent(const fs::path& path) noexcept {
   return fs::status(path, ignored).type() == fs::file_type::not_found;
 }
 
+std::vector<fs::path> entries_of(const fs::path& folder) {
+  std::vector<fs::path> entries;
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error))
+    entries.push_back(entry->path());
+  std::sort(entries.begin(), entries.end());
+  return entries;
+}
+
 std::string read_input_file(const fs::path& file, std::uintmax_t max_bytes) {
   return open_input_file(file, max_bytes).bytes;
 }

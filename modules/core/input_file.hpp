@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 namespace km {
 
@@ -28,6 +29,9 @@ inline constexpr std::uintmax_t kMaxInputFile_bytes = std::uintmax_t{8} << 30U;
 
 /// True if `path` does not exist: an optional file was omitted. False for an unreadable file.
 [[nodiscard]] bool is_absent(const std::filesystem::path& path) noexcept;
+
+/// Paths of the entries of a folder, ascending, up to an error; none if it cannot be read.
+[[nodiscard]] std::vector<std::filesystem::path> entries_of(const std::filesystem::path& folder);
 
 /// The bytes of `file`, at most `max_bytes`. Throws InputFileError, also if nothing arrives in a
 /// pipe for ten seconds.

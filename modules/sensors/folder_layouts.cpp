@@ -190,12 +190,9 @@ std::optional<int> frame_number(const fs::path& file, std::string_view kind) {
 }
 
 bool has_numbered_frames(const fs::path& folder) {
-  std::error_code error;
-  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
-       entry.increment(error))
-    if (frame_number(entry->path(), ".color.") || frame_number(entry->path(), ".depth."))
-      return true;
-  return false;
+  return std::ranges::any_of(entries_of(folder), [](const fs::path& file) {
+    return frame_number(file, ".color.") || frame_number(file, ".depth.");
+  });
 }
 
 Camera read_seven_scenes_camera(const fs::path& file) {
@@ -297,11 +294,8 @@ ImuStream read_imu(const fs::path& file, ReaderReport& report) {
 // Recordings in `folder`, for the message if the user named a folder of recordings.
 std::string recordings_below(const fs::path& folder) {
   std::vector<std::string> names;
-  std::error_code error;
-  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
-       entry.increment(error))
-    if (is_folder(entry->path() / "mav0")) names.push_back(entry->path().filename().string());
-  std::ranges::sort(names);
+  for (const fs::path& entry : entries_of(folder))
+    if (is_folder(entry / "mav0")) names.push_back(entry.filename());
   constexpr std::size_t kMost = 5;
   std::string text;
   for (std::size_t k = 0; k < std::min(names.size(), kMost); ++k)
@@ -510,14 +504,12 @@ ImageFolder read_seven_scenes_folder(const fs::path& folder) {
   result.name = result.list = folder;
   DepthCamera camera{.camera = read_seven_scenes_camera(folder / "camera-intrinsics.txt"),
                      .range = {0.0, kStructuredLightRange_m}};
-  std::error_code error;
-  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
-       entry.increment(error)) {
-    const auto number = frame_number(entry->path(), ".color.");
+  for (const fs::path& entry : entries_of(folder)) {
+    const auto number = frame_number(entry, ".color.");
     if (!number) continue;
     const std::string stem = "frame-" + six_digits(*number);
     result.frames.push_back({.stamp = nanoseconds(*number / kSevenScenesRate_hz),
-                             .left = entry->path(),
+                             .left = entry,
                              .right = {},
                              .line = *number,
                              .depth = folder / (stem + ".depth.png"),
