@@ -1,8 +1,7 @@
 #include "apps/robot/status.hpp"
 
 #include <algorithm>
-#include <map>
-#include <utility>
+#include <array>
 
 #include "modules/core/text_table.hpp"
 #include "runtime/clock.hpp"
@@ -11,17 +10,8 @@ namespace km {
 namespace {
 
 const char* to_word(PeerState state) {
-  switch (state) {
-    case PeerState::kAlive:
-      return "alive";
-    case PeerState::kLost:
-      return "lost";
-    case PeerState::kLeft:
-      return "left";
-    case PeerState::kReported:
-      return "out of reach";
-  }
-  return "";
+  constexpr std::array kWords = {"alive", "lost", "left", "out of reach"};  // as the enumerators
+  return kWords.at(static_cast<std::size_t>(state));
 }
 
 std::string peers_text(const std::vector<Peer>& peers) {

@@ -193,17 +193,9 @@ std::vector<LandmarkPair> pairs_of(std::span<const Landmark> a, std::span<const 
 }  // namespace
 
 const char* to_string(ConstellationStatus status) {
-  switch (status) {
-    case ConstellationStatus::kMatched:
-      return "matched";
-    case ConstellationStatus::kTooFew:
-      return "too few";
-    case ConstellationStatus::kAmbiguous:
-      return "ambiguous";
-    case ConstellationStatus::kUndecided:
-      return "undecided";
-  }
-  return "";
+  constexpr std::array kNames = {"matched", "too few", "ambiguous",
+                                 "undecided"};  // in the order of ConstellationStatus
+  return kNames.at(static_cast<std::size_t>(status));
 }
 
 std::size_t min_pairs(const ConstellationOptions& options) {

@@ -263,17 +263,9 @@ double plane_radius(double xi, double bearing) {
 }  // namespace
 
 std::string to_string(LensModel model) {
-  switch (model) {
-    case LensModel::kRadialTangential:
-      return "radial-tangential";
-    case LensModel::kEquidistant:
-      return "equidistant";
-    case LensModel::kOmnidirectional:
-      return "omnidirectional";
-    case LensModel::kDoubleSphere:
-      return "double sphere";
-  }
-  return {};
+  constexpr std::array kNames = {"radial-tangential", "equidistant", "omnidirectional",
+                                 "double sphere"};  // in the order of LensModel
+  return kNames.at(static_cast<std::size_t>(model));
 }
 
 Lens::Lens(LensModel model, const std::vector<double>& coefficients)

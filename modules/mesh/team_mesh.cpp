@@ -1,5 +1,6 @@
 #include "modules/mesh/team_mesh.hpp"
 
+#include <array>
 #include <utility>
 
 #include "modules/mesh/mesh_chunks.hpp"
@@ -7,15 +8,8 @@
 namespace km {
 
 const char* to_string(ChunkVerdict verdict) {
-  switch (verdict) {
-    case ChunkVerdict::kTaken:
-      return "taken";
-    case ChunkVerdict::kEarlierBoot:
-      return "of an earlier boot";
-    case ChunkVerdict::kNoRoom:
-      break;
-  }
-  return "no room";
+  constexpr std::array kNames = {"taken", "of an earlier boot", "no room"};  // as the enumerators
+  return kNames.at(static_cast<std::size_t>(verdict));
 }
 
 TeamMesh::Robot* TeamMesh::robot_of(RobotId id, std::uint64_t boot) {

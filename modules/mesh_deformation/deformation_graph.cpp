@@ -367,15 +367,8 @@ std::vector<KeyframeEdge> choose_keyframe_edges(std::span<const MeshNode> nodes,
 }
 
 const char* to_string(DeformationStatus status) {
-  switch (status) {
-    case DeformationStatus::kConverged:
-      return "converged";
-    case DeformationStatus::kIterationLimit:
-      return "iteration limit";
-    case DeformationStatus::kFailed:
-      return "failed";
-  }
-  return "unknown";
+  constexpr std::array kNames = {"converged", "iteration limit", "failed"};  // as the enumerators
+  return kNames.at(static_cast<std::size_t>(status));
 }
 
 DeformationPoses initial_poses(const DeformationGraph& graph, std::span<const SE3> T_world_kf) {

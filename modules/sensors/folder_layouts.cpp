@@ -398,17 +398,11 @@ FolderLayout layout_of(const fs::path& folder) {
 }
 
 std::string to_string(FolderLayout layout) {
-  switch (layout) {
-    case FolderLayout::kEuroc:
-      return "a folder in EuRoC's layout";
-    case FolderLayout::kKitti:
-      return "a folder in KITTI's layout";
-    case FolderLayout::kTum:
-      return "a folder in the layout of TUM RGB-D";
-    case FolderLayout::kSevenScenes:
-      return "a folder in the layout of 7-Scenes";
-  }
-  return "a folder";
+  constexpr std::array kNames = {
+      "a folder in EuRoC's layout", "a folder in KITTI's layout",
+      "a folder in the layout of TUM RGB-D",
+      "a folder in the layout of 7-Scenes"};  // in the order of FolderLayout
+  return kNames.at(static_cast<std::size_t>(layout));
 }
 
 // Counts the images from `number` on, which follow the last row of the times.

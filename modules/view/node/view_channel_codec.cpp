@@ -23,15 +23,8 @@ constexpr int kKept = 10000;
 constexpr int kMostUntaken = 20000;
 
 const char* name_of(ViewChannel channel) {
-  switch (channel) {
-    case ViewChannel::kView:
-      return "view";
-    case ViewChannel::kMesh:
-      return "view_mesh";
-    case ViewChannel::kImages:
-      break;
-  }
-  return "view_images";
+  constexpr std::array kNames = {"view", "view_mesh", "view_images"};  // as the enumerators
+  return kNames.at(static_cast<std::size_t>(channel));
 }
 
 // A volatile update would be lost if it overtook the discovery of its writer. So the writer keeps

@@ -1,5 +1,6 @@
 #include "modules/vio/node/vio_node.hpp"
 
+#include <array>
 #include <optional>
 #include <string>
 #include <utility>
@@ -46,23 +47,15 @@ const char* text(VioProblem problem) {
 }
 
 const char* text(StartStatus status) {
-  switch (status) {
-    case StartStatus::kAtRest:
-      return "started at rest";
-    case StartStatus::kInMotion:
-      return "started in motion";
-    case StartStatus::kContinues:
-      return "continues from the last keyframe";
-    case StartStatus::kByImages:
-      return "started without gravity, so that z of odom is not the vertical,";
-    case StartStatus::kTooFewImages:
-      return "too few images to start";
-    case StartStatus::kTooFewFeatures:
-      return "too few features to start";
-    case StartStatus::kInconsistent:
-      return "stereo and inertial data disagree, no start";
-  }
-  return "unknown start";
+  constexpr std::array kTexts = {
+      "started at rest",
+      "started in motion",
+      "continues from the last keyframe",
+      "started without gravity, so that z of odom is not the vertical,",
+      "too few images to start",
+      "too few features to start",
+      "stereo and inertial data disagree, no start"};  // in the order of StartStatus
+  return kTexts.at(static_cast<std::size_t>(status));
 }
 
 // Share of the features of the previous image that are still tracked.
