@@ -62,7 +62,7 @@ Plot plot_from_above(std::span<const TrajectoryInput> inputs, const TeamError& t
     series.colour = r;
     series.width_px = 1.2;
     for (const StampedPose& pose : inputs[r].estimate)
-      series.points.push_back(from_above(team.alignment.apply(pose.T)));
+      series.points.push_back(from_above(team.T_truth_estimate * pose.T));
   }
   return plot;
 }

@@ -126,9 +126,9 @@ class Trajectories {
   std::map<fs::path, std::vector<StampedPose>> read_;
 };
 
-std::vector<StampedPose> moved(std::span<const StampedPose> poses, const Alignment& alignment) {
+std::vector<StampedPose> moved(std::span<const StampedPose> poses, const SE3& T_truth_estimate) {
   std::vector<StampedPose> result(poses.begin(), poses.end());
-  for (StampedPose& pose : result) pose.T = alignment.apply(pose.T);
+  for (StampedPose& pose : result) pose.T = T_truth_estimate * pose.T;
   return result;
 }
 
@@ -146,7 +146,7 @@ std::vector<StampedPose> beside(std::span<const StampedPose> truth,
 void judge_odometry(const TrajectoryInput& input, RobotResult& robot) {
   const TeamError error = trajectory_error({&input, 1});
   robot.odometry = error.joint;
-  robot.paths.odometry = moved(input.estimate, error.alignment);
+  robot.paths.odometry = moved(input.estimate, error.T_truth_estimate);
   robot.paths.truth = beside(input.truth, input.estimate);
 }
 
@@ -175,13 +175,13 @@ void judge_in_team_frame(const TeamPlan& plan, TeamResult& team, Trajectories& t
   }
   team.optimized = joint_error(joined, trajectories, "optimized.tum");
   team.live = joint_error(live, trajectories, "live.tum");
-  const Alignment alignment = team.optimized ? team.optimized->alignment : Alignment{};
+  const SE3 T_truth_estimate = team.optimized ? team.optimized->T_truth_estimate : SE3::Identity();
   for (RobotResult& robot : team.robots) {
     if (!robot.in_team_frame || robot.left_nothing()) continue;
     std::vector<std::string>
         known;  // not reported: the comparison has noted the reason, or there is no truth
     const auto poses = attempt(known, [&] { return trajectories.optimized(robot.plan); });
-    if (poses) robot.paths.optimized = moved(*poses, alignment);
+    if (poses) robot.paths.optimized = moved(*poses, T_truth_estimate);
   }
 }
 
@@ -312,7 +312,7 @@ TeamResult collect_results(const TeamPlan& plan, std::vector<RobotRun> runs) {
   judge_in_team_frame(plan, result, trajectories);
   if (plan.truth_mesh.empty() || result.optimized)
     result.meshes = collect_meshes(
-        joined, result.optimized ? result.optimized->alignment.T_truth_estimate : SE3::Identity(),
+        joined, result.optimized ? result.optimized->T_truth_estimate : SE3::Identity(),
         result.notes);
   read_all_closures(plan, result.robots, result.notes);
   result.closures = judge_closures(plan, result.robots, trajectories, result.notes);

@@ -117,10 +117,10 @@ TimeWindow window_of(const TrajectoryInput& input) {
   return input.window.value_or(TimeWindow{input.truth.front().stamp, input.truth.back().stamp});
 }
 
-void add_absolute_errors(std::span<const PosePair> pairs, const Alignment& alignment,
+void add_absolute_errors(std::span<const PosePair> pairs, const SE3& T_truth_estimate,
                          Errors& errors) {
   for (const PosePair& pair : pairs) {
-    const SE3 T_truth_body = alignment.apply(pair.T_estimate_body);
+    const SE3 T_truth_body = T_truth_estimate * pair.T_estimate_body;
     errors.position_m.push_back(
         (T_truth_body.translation() - pair.T_truth_body.translation()).norm());
     errors.rotation_deg.push_back(
@@ -159,13 +159,7 @@ std::vector<PosePair> associate(const TrajectoryInput& input, std::size_t least)
 
 }  // namespace
 
-SE3 Alignment::apply(const SE3& T_estimate_body) const {
-  SE3 T = T_estimate_body;
-  T.translation() *= scale;
-  return T_truth_estimate * T;
-}
-
-Alignment align(std::span<const PosePair> pairs, bool with_scale) {
+SE3 align(std::span<const PosePair> pairs) {
   const auto n = static_cast<Eigen::Index>(pairs.size());
   Eigen::Matrix3Xd estimate(3, n);
   Eigen::Matrix3Xd truth(3, n);
@@ -173,19 +167,12 @@ Alignment align(std::span<const PosePair> pairs, bool with_scale) {
     estimate.col(i) = pairs[static_cast<std::size_t>(i)].T_estimate_body.translation();
     truth.col(i) = pairs[static_cast<std::size_t>(i)].T_truth_body.translation();
   }
-  const Eigen::Matrix4d S = Eigen::umeyama(estimate, truth, with_scale);
-  Alignment alignment;
-  if (with_scale) alignment.scale = S.col(0).head<3>().norm();
-  if (!S.allFinite() || !(alignment.scale > 0.0))
-    throw std::invalid_argument("align: the positions do not vary, their scale is arbitrary");
-  alignment.T_truth_estimate =
-      make_pose(S.topLeftCorner<3, 3>() / alignment.scale, S.topRightCorner<3, 1>());
-  return alignment;
+  return SE3(Eigen::umeyama(estimate, truth, false));
 }
 
 std::vector<double> aligned_errors_m(std::span<const PosePair> pairs) {
   Errors errors;
-  add_absolute_errors(pairs, align(pairs, false), errors);
+  add_absolute_errors(pairs, align(pairs), errors);
   return errors.position_m;
 }
 
@@ -199,11 +186,11 @@ TeamError trajectory_error(std::span<const TrajectoryInput> inputs) {
   }
 
   TeamError team;
-  team.alignment = align(all, false);
+  team.T_truth_estimate = align(all);
   Errors joint;
   for (std::size_t r = 0; r < inputs.size(); ++r) {
     Errors errors;
-    add_absolute_errors(pairs[r], team.alignment, errors);
+    add_absolute_errors(pairs[r], team.T_truth_estimate, errors);
     add_relative_errors(pairs[r], errors);
     errors.segments = segment_errors(pairs[r]);
     const TimeWindow window = window_of(inputs[r]);
@@ -292,7 +279,7 @@ SE3 align_surroundings(std::span<const TrajectoryInput> inputs) {
         }
   }
   if (around.empty()) throw std::invalid_argument("align_surroundings: no trajectory");
-  return align(around, false).T_truth_estimate;
+  return align(around);
 }
 
 std::string to_table(const TeamError& team) {
@@ -333,7 +320,7 @@ void to_json(Json& json, const TrajectoryError& error) {
 }
 
 void to_json(Json& json, const TeamError& team) {
-  json = {{"alignment", pose_json(team.alignment.T_truth_estimate)},
+  json = {{"alignment", pose_json(team.T_truth_estimate)},
           {"robots", team.robots},
           {"joint", team.joint}};
 }

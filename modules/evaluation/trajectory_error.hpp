@@ -33,23 +33,13 @@ struct SegmentErrors {
 /// length. O(n) per length.
 [[nodiscard]] SegmentErrors segment_errors(std::span<const PosePair> pairs);
 
-/// p_truth = scale * T_truth_estimate.linear() * p_estimate + T_truth_estimate.translation().
-struct Alignment {
-  double scale = 1.0;
-  SE3 T_truth_estimate = SE3::Identity();
+/// The rigid transform T_truth_estimate with the smallest squared distance between the positions of
+/// the pairs, by Umeyama, "Least-Squares Estimation of Transformation Parameters Between Two Point
+/// Patterns", PAMI 1991, Eq. (40)-(43), without scale. Precondition: at least one pair. With less
+/// than three positions, or positions on one line, part of the rotation is arbitrary.
+[[nodiscard]] SE3 align(std::span<const PosePair> pairs);
 
-  /// A pose of the estimate in the truth's world, with scaled position.
-  [[nodiscard]] SE3 apply(const SE3& T_estimate_body) const;
-};
-
-/// The alignment with the smallest squared distance between the positions of the pairs, by Umeyama,
-/// "Least-Squares Estimation of Transformation Parameters Between Two Point Patterns", PAMI 1991,
-/// Eq. (40)-(43). Without `with_scale` the scale is 1. Precondition: at least one pair. With less
-/// than three positions, or positions on one line, part of the rotation is arbitrary. Throws
-/// std::invalid_argument if `with_scale` and either side does not move.
-[[nodiscard]] Alignment align(std::span<const PosePair> pairs, bool with_scale);
-
-/// Distances between the positions of pairs after align() without scale [m].
+/// Distances between the positions of pairs after align() [m].
 [[nodiscard]] std::vector<double> aligned_errors_m(std::span<const PosePair> pairs);
 
 /// One estimate with its truth; both ascending and outliving the call.
@@ -76,7 +66,7 @@ struct TrajectoryError {
 
 /// Errors of a team with one common alignment.
 struct TeamError {
-  Alignment alignment;
+  SE3 T_truth_estimate = SE3::Identity();
   TrajectoryError joint;                ///< All pairs together.
   std::vector<TrajectoryError> robots;  ///< In the order of the inputs.
 };

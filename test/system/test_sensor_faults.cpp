@@ -112,23 +112,23 @@ struct FaultyRun {
   std::optional<double> back_s;  // after the fault
 };
 
-double error_m(const PosePair& pair, const Alignment& alignment) {
-  return (alignment.apply(pair.T_estimate_body).translation() - pair.T_truth_body.translation())
+double error_m(const PosePair& pair, const SE3& T_truth_estimate) {
+  return ((T_truth_estimate * pair.T_estimate_body).translation() - pair.T_truth_body.translation())
       .norm();
 }
 
 template <typename Accepts>
-double rms_m(const std::vector<PosePair>& pairs, const Alignment& alignment, Accepts accepts) {
+double rms_m(const std::vector<PosePair>& pairs, const SE3& T_truth_estimate, Accepts accepts) {
   double sum = 0.0, count = 0.0;
   for (const PosePair& pair : pairs)
-    if (accepts(pair.stamp)) sum += std::pow(error_m(pair, alignment), 2), count += 1.0;
+    if (accepts(pair.stamp)) sum += std::pow(error_m(pair, T_truth_estimate), 2), count += 1.0;
   return std::sqrt(sum / count);
 }
 
 // From then on the pose is right: over no second the motion error exceeds this value, beyond
 // corrections of the position. New images show the smoother the true speed during the blind time,
 // and it moves the body accordingly.
-std::optional<double> back_after_s(const std::vector<PosePair>& pairs, const Alignment& alignment,
+std::optional<double> back_after_s(const std::vector<PosePair>& pairs, const SE3& T_truth_estimate,
                                    Stamp end) {
   constexpr double kRight_m = 0.03, kOver_s = 1.0;
   std::optional<Stamp> back;
@@ -138,7 +138,8 @@ std::optional<double> back_after_s(const std::vector<PosePair>& pairs, const Ali
     if (j == pairs.size()) break;
     const SE3 truth = pairs[i].T_truth_body.inverse() * pairs[j].T_truth_body;
     const SE3 estimate = pairs[i].T_estimate_body.inverse() * pairs[j].T_estimate_body;
-    const double corrected_m = error_m(pairs[i], alignment) - error_m(pairs[j], alignment);
+    const double corrected_m =
+        error_m(pairs[i], T_truth_estimate) - error_m(pairs[j], T_truth_estimate);
     if ((truth.inverse() * estimate).translation().norm() - std::max(corrected_m, 0.0) > kRight_m)
       back.reset();
     else if (!back)
@@ -167,13 +168,13 @@ FaultyRun meet(const fs::path& recording, const SensorFault& fault) {
   std::vector<PosePair> fitted;
   for (const PosePair& pair : pairs)
     if (pair.stamp < begin) fitted.push_back(pair);
-  const Alignment alignment = align(fitted, false);
+  const SE3 T_truth_estimate = align(fitted);
   for (const PosePair& pair : pairs)
     if (pair.stamp >= begin && pair.stamp < end + nanoseconds(1.0))
-      outcome.worst_m = std::max(outcome.worst_m, error_m(pair, alignment));
+      outcome.worst_m = std::max(outcome.worst_m, error_m(pair, T_truth_estimate));
   const Stamp last = pairs.back().stamp - nanoseconds(3.0);
-  outcome.last_m = rms_m(pairs, alignment, [last](Stamp stamp) { return stamp >= last; });
-  outcome.back_s = back_after_s(pairs, alignment, end);
+  outcome.last_m = rms_m(pairs, T_truth_estimate, [last](Stamp stamp) { return stamp >= last; });
+  outcome.back_s = back_after_s(pairs, T_truth_estimate, end);
   return outcome;
 }
 
