@@ -24,13 +24,6 @@ constexpr float kOnPlane_m = 0.3F;        // distance up to which a face belongs
 constexpr float kPlaneCell_m = 0.5F;      // side of the cells in which planes are fitted
 constexpr std::size_t kLeastInCell = 10;  // samples of a plane
 
-Eigen::Vector3f normal_of(const LabelledMesh& mesh, std::size_t face) {
-  const auto [a, b, c] = mesh.faces[face];
-  return (mesh.vertices[b] - mesh.vertices[a])
-      .cross(mesh.vertices[c] - mesh.vertices[a])
-      .normalized();
-}
-
 std::array<bool, 256> labels_named(const LabelPalette& palette,
                                    std::initializer_list<const char*> names) {
   std::array<bool, 256> found = {};
@@ -120,8 +113,8 @@ void judge_map(const LabelledMesh& truth, const LabelledMesh& map, const Surface
     if (!near || near->surface_m > kOnPlane_m) continue;
     const LabelId label = truth.face_label(near->face);
     if (!is_wall[label] && !is_floor[label]) continue;
-    const Eigen::Vector3f normal = normal_of(truth, near->face);
-    const float cosine = std::abs(normal.dot(normal_of(map, samples.faces[i])));
+    const Eigen::Vector3f normal = truth.face_normal(near->face).normalized();
+    const float cosine = std::abs(normal.dot(map.face_normal(samples.faces[i]).normalized()));
     (is_wall[label] ? wall_deg : floor_deg)
         .push_back(static_cast<float>(kDegrees) * std::acos(std::min(cosine, 1.0F)));
     if (is_wall[label])

@@ -9,6 +9,11 @@ LabelId LabelledMesh::face_label(std::size_t face) const {
   return labels[b] == labels[c] ? labels[b] : labels[a];
 }
 
+Eigen::Vector3f LabelledMesh::face_normal(std::size_t face) const {
+  const auto [a, b, c] = faces[face];
+  return (vertices[b] - vertices[a]).cross(vertices[c] - vertices[a]);
+}
+
 void LabelledMesh::append(const LabelledMesh& other) {
   const std::size_t count = vertices.size();
   append_elements(labels, count, other.labels, other.vertices.size());
@@ -36,10 +41,8 @@ void LabelledMesh::transform(const SE3& T_a_b) {
 
 std::vector<Eigen::Vector3f> LabelledMesh::normals() const {
   std::vector<Eigen::Vector3f> result(vertices.size(), Eigen::Vector3f::Zero());
-  for (const auto& [a, b, c] : faces) {
-    const Eigen::Vector3f across = (vertices[b] - vertices[a]).cross(vertices[c] - vertices[a]);
-    for (const std::uint32_t v : {a, b, c}) result[v] += across;
-  }
+  for (std::size_t face = 0; face < faces.size(); ++face)
+    for (const std::uint32_t v : faces[face]) result[v] += face_normal(face);
   for (Eigen::Vector3f& normal : result) normal.normalize();
   return result;
 }

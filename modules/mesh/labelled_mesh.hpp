@@ -27,6 +27,9 @@ struct LabelledMesh {
   /// The label that two vertices of the face have, or else that of its first; 0 without labels.
   [[nodiscard]] LabelId face_label(std::size_t face) const;
 
+  /// Normal of a face, with twice its area as length.
+  [[nodiscard]] Eigen::Vector3f face_normal(std::size_t face) const;
+
   /// Appends `other`. An array that only one of the two meshes has is filled with zeros.
   void append(const LabelledMesh& other);
 

@@ -159,11 +159,13 @@ class ReplacementSearch {
         // edge.
         reach_(std::hypot(distance_, kMaxBesideShare * distance_ +
                                          static_cast<float>(same.longest_edge_m) * 2.0F / 3.0F)),
+        normals_(mesh.normals()),
         certainty_(certainty_around(mesh, views.certainty)),
         replacements_(mesh.vertices.size(), kNoIndex),
         is_judged_(mesh.vertices.size(), 0) {
-    compute_normals();
     for (const LabelledMesh::Face& face : mesh.faces) add_rank(face);
+    for (std::size_t face = 0; face < mesh.faces.size(); ++face)
+      face_normals_.push_back(mesh.face_normal(face).normalized());  // zero stays zero
   }
 
   std::vector<std::uint32_t> run() {
@@ -188,17 +190,6 @@ class ReplacementSearch {
     Eigen::Vector3f centroid;
     std::uint32_t face;
   };
-
-  void compute_normals() {
-    normals_.assign(mesh_.vertices.size(), Eigen::Vector3f::Zero());
-    for (const auto& [a, b, c] : mesh_.faces) {
-      const Eigen::Vector3f& p = mesh_.vertices[a];
-      const Eigen::Vector3f area = (mesh_.vertices[b] - p).cross(mesh_.vertices[c] - p);
-      face_normals_.push_back(area.normalized());  // zero stays zero
-      for (const std::uint32_t v : {a, b, c}) normals_[v] += area;
-    }
-    for (Eigen::Vector3f& normal : normals_) normal.normalize();
-  }
 
   // By certainty, then by time. The rank of a face is at most that of each of its corners.
   static std::uint64_t rank(std::uint32_t certainty, KeyframeIndex keyframe) {

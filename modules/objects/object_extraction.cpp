@@ -111,17 +111,12 @@ std::uint32_t keyframes_in(std::vector<std::array<KeyframeIndex, 2>> intervals) 
   return static_cast<std::uint32_t>(count);
 }
 
-double area_of(const LabelledMesh& mesh, const LabelledMesh::Face& face) {
-  const Eigen::Vector3f& p = mesh.vertices[face[0]];
-  return 0.5 * (mesh.vertices[face[1]] - p).cross(mesh.vertices[face[2]] - p).norm();
-}
-
 MapObject object_of(const LabelledMesh& mesh, std::span<const std::array<KeyframeIndex, 2>> seen_by,
                     const std::vector<std::uint32_t>& faces, LabelId label, RobotId robot) {
   MapObject object{.label = label, .box = {}, .keyframe = {robot, 0}, .robots = {robot}};
   std::vector<std::uint32_t> vertices;
   for (const std::uint32_t f : faces) {
-    object.surface_m2 += area_of(mesh, mesh.faces[f]);
+    object.surface_m2 += 0.5 * static_cast<double>(mesh.face_normal(f).norm());
     vertices.insert(vertices.end(), mesh.faces[f].begin(), mesh.faces[f].end());
   }
   std::ranges::sort(vertices);

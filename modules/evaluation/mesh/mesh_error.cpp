@@ -63,11 +63,6 @@ void check_comparable(const LabelledMesh& mesh, const std::string& name) {
 
 constexpr std::size_t kChunk = 1U << 18;  // points between two reports of progress
 
-Eigen::Vector3f normal_of(const LabelledMesh& mesh, std::uint32_t face) {
-  const auto [a, b, c] = mesh.faces[face];
-  return (mesh.vertices[b] - mesh.vertices[a]).cross(mesh.vertices[c] - mesh.vertices[a]);
-}
-
 // A mesh with points on it; both outlive this.
 struct SampledMesh {
   const LabelledMesh& mesh;
@@ -124,9 +119,9 @@ PointMatches match_points(const SampledMesh& from, const SampledMesh& to,
   const auto match = [&](std::size_t i) {
     const auto near = nearest_to.find(from.samples.points[i], reach_m);
     if (!near) return;
-    const Eigen::Vector3f normal = normal_of(from.mesh, from.samples.faces[i]);
+    const Eigen::Vector3f normal = from.mesh.face_normal(from.samples.faces[i]);
     matches[i] = {near->distance_m, near->surface_m, to.mesh.face_label(near->face),
-                  !near->past_boundary && normal.dot(normal_of(to.mesh, near->face)) > 0.0F};
+                  !near->past_boundary && normal.dot(to.mesh.face_normal(near->face)) > 0.0F};
   };
   for (std::size_t start = 0; start < count; start += kChunk) {
     if (progress) progress(stage, static_cast<double>(start) / static_cast<double>(count));

@@ -148,12 +148,10 @@ double rms_of(const std::vector<Pair>& pairs) {
 
 void OrientedPoints::add(const LabelledMesh& mesh, const SurfaceSamples& samples) {
   for (std::size_t i = 0; i < samples.points.size(); ++i) {
-    const auto& [a, b, c] = mesh.faces[samples.faces[i]];
-    const Eigen::Vector3f& corner = mesh.vertices[a];
-    const Eigen::Vector3f area = (mesh.vertices[b] - corner).cross(mesh.vertices[c] - corner);
-    if (!(area.norm() > 0.0F)) continue;
+    const Eigen::Vector3f normal = mesh.face_normal(samples.faces[i]);
+    if (!(normal.norm() > 0.0F)) continue;
     points.push_back(samples.points[i]);
-    normals.push_back(area.normalized());
+    normals.push_back(normal.normalized());
   }
 }
 
