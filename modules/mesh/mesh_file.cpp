@@ -29,13 +29,53 @@ constexpr double kMaxCoordinate_m = 1e9;  // squares of floats stay finite
 constexpr std::size_t kMostElements = 50'000'000;
 
 enum class PlyFormat { kAscii, kLittleEndian, kBigEndian };
-enum class PlyType { kInt8, kUint8, kInt16, kUint16, kInt32, kUint32, kFloat, kDouble };
+
+// Values of the body one by one, in any encoding.
+class Body {
+ public:
+  Body(std::istream& stream, PlyFormat format) : stream_(stream), format_(format) {}
+
+  // The next value, which has this type in binary files.
+  template <typename T>
+  double next() {
+    return format_ == PlyFormat::kAscii ? ascii() : static_cast<double>(binary<T>());
+  }
+
+ private:
+  double ascii() {
+    std::string word;  // operator>> of a double refuses "nan"
+    if (!(stream_ >> std::setw(kMaxWord) >> word))
+      throw std::runtime_error("ends before its last element");
+    char* end = nullptr;
+    const double value = std::strtod(word.c_str(), &end);
+    if (*end != '\0') throw std::runtime_error("'" + word.substr(0, 20) + "' is not a number");
+    return value;
+  }
+
+  template <typename T>
+  T binary() {
+    std::array<char, sizeof(T)> bytes;
+    if (!stream_.read(bytes.data(), sizeof(T)))
+      throw std::runtime_error("ends before its last element");
+    const bool little = format_ == PlyFormat::kLittleEndian;
+    if (little != (std::endian::native == std::endian::little))
+      std::reverse(bytes.begin(), bytes.end());
+    return std::bit_cast<T>(bytes);
+  }
+
+  static constexpr int kMaxWord = 400;  // length of a number
+
+  std::istream& stream_;
+  PlyFormat format_;
+};
+
+using PlyType = double (Body::*)();  // reads a value of the type
 
 struct PlyProperty {
   std::string name;
-  PlyType type = PlyType::kFloat;
+  PlyType type = nullptr;
   bool is_list = false;
-  PlyType count_type = PlyType::kUint8;  // type of the length of a list
+  PlyType count_type = nullptr;  // type of the length of a list
 };
 
 struct PlyElement {
@@ -51,12 +91,14 @@ struct PlyHeader {
 
 PlyType type_of(const std::string& name) {
   static const std::map<std::string, PlyType> types = {
-      {"char", PlyType::kInt8},     {"int8", PlyType::kInt8},     {"uchar", PlyType::kUint8},
-      {"uint8", PlyType::kUint8},   {"short", PlyType::kInt16},   {"int16", PlyType::kInt16},
-      {"ushort", PlyType::kUint16}, {"uint16", PlyType::kUint16}, {"int", PlyType::kInt32},
-      {"int32", PlyType::kInt32},   {"uint", PlyType::kUint32},   {"uint32", PlyType::kUint32},
-      {"float", PlyType::kFloat},   {"float32", PlyType::kFloat}, {"double", PlyType::kDouble},
-      {"float64", PlyType::kDouble}};
+      {"char", &Body::next<std::int8_t>},     {"int8", &Body::next<std::int8_t>},
+      {"uchar", &Body::next<std::uint8_t>},   {"uint8", &Body::next<std::uint8_t>},
+      {"short", &Body::next<std::int16_t>},   {"int16", &Body::next<std::int16_t>},
+      {"ushort", &Body::next<std::uint16_t>}, {"uint16", &Body::next<std::uint16_t>},
+      {"int", &Body::next<std::int32_t>},     {"int32", &Body::next<std::int32_t>},
+      {"uint", &Body::next<std::uint32_t>},   {"uint32", &Body::next<std::uint32_t>},
+      {"float", &Body::next<float>},          {"float32", &Body::next<float>},
+      {"double", &Body::next<double>},        {"float64", &Body::next<double>}};
   const auto found = types.find(name);
   if (found == types.end()) throw std::runtime_error("unknown type '" + name + "'");
   return found->second;
@@ -134,60 +176,6 @@ PlyHeader read_ply_header(std::istream& stream) {
   throw std::runtime_error("header without end_header");
 }
 
-// Values of the body one by one, in any encoding.
-class Body {
- public:
-  Body(std::istream& stream, PlyFormat format) : stream_(stream), format_(format) {}
-
-  double next(PlyType type) {
-    if (format_ == PlyFormat::kAscii) {
-      std::string word;  // operator>> of a double refuses "nan"
-      if (!(stream_ >> std::setw(kMaxWord) >> word))
-        throw std::runtime_error("ends before its last element");
-      char* end = nullptr;
-      const double value = std::strtod(word.c_str(), &end);
-      if (*end != '\0') throw std::runtime_error("'" + word.substr(0, 20) + "' is not a number");
-      return value;
-    }
-    switch (type) {
-      case PlyType::kInt8:
-        return binary<std::int8_t>();
-      case PlyType::kUint8:
-        return binary<std::uint8_t>();
-      case PlyType::kInt16:
-        return binary<std::int16_t>();
-      case PlyType::kUint16:
-        return binary<std::uint16_t>();
-      case PlyType::kInt32:
-        return binary<std::int32_t>();
-      case PlyType::kUint32:
-        return binary<std::uint32_t>();
-      case PlyType::kFloat:
-        return static_cast<double>(binary<float>());
-      case PlyType::kDouble:
-        return binary<double>();
-    }
-    throw std::logic_error("PlyType");
-  }
-
- private:
-  template <typename T>
-  T binary() {
-    std::array<char, sizeof(T)> bytes;
-    if (!stream_.read(bytes.data(), sizeof(T)))
-      throw std::runtime_error("ends before its last element");
-    const bool little = format_ == PlyFormat::kLittleEndian;
-    if (little != (std::endian::native == std::endian::little))
-      std::reverse(bytes.begin(), bytes.end());
-    return std::bit_cast<T>(bytes);
-  }
-
-  static constexpr int kMaxWord = 400;  // length of a number
-
-  std::istream& stream_;
-  PlyFormat format_;
-};
-
 // One instance of an element. scalars: values of its properties by position, 0 for a list. list:
 // its vertex indices; other lists are skipped.
 struct Row {
@@ -199,16 +187,16 @@ void read_row(const PlyElement& element, Body& body, Row& row) {
   row.scalars.clear();
   for (const PlyProperty& property : element.properties) {
     if (!property.is_list) {
-      row.scalars.push_back(body.next(property.type));
+      row.scalars.push_back((body.*property.type)());
       continue;
     }
-    const double count = body.next(property.count_type);
+    const double count = (body.*property.count_type)();
     if (!(count >= 0 && count <= 1e6))
       throw std::runtime_error(element.name + " with a list of " + std::to_string(count));
     const bool wanted = property.name == "vertex_indices" || property.name == "vertex_index";
     if (wanted) row.list.clear();
     for (int i = 0; i < static_cast<int>(count); ++i) {
-      const double value = body.next(property.type);
+      const double value = (body.*property.type)();
       if (wanted) row.list.push_back(value);
     }
     row.scalars.push_back(0.0);
