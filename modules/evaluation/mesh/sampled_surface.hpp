@@ -2,7 +2,6 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -12,6 +11,7 @@
 #include <unordered_set>
 #include <vector>
 
+#include "modules/mesh/grid_cell.hpp"
 #include "modules/mesh/labelled_mesh.hpp"
 
 namespace km {
@@ -32,13 +32,11 @@ class NearbyCells {
   [[nodiscard]] bool may_touch(const Eigen::AlignedBox3f& box) const;
 
  private:
-  using Cell = std::array<std::int64_t, 3>;
+  [[nodiscard]] GridCell cell_of(const Eigen::Vector3f& point) const;
 
-  [[nodiscard]] Cell cell_of(const Eigen::Vector3f& point) const;
-
-  double per_m_;
+  double reach_m_;
   Eigen::AlignedBox3f bounds_;  // box of the points, enlarged by the reach
-  std::unordered_set<std::uint64_t> cells_;
+  std::unordered_set<GridCell, GridCellHash> cells_;
 };
 
 /// Points on a mesh, uniform by area.
