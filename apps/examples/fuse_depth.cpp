@@ -41,7 +41,7 @@ int run(int argc, char** argv) {
 
     const DepthResult depth =
         load_depth_image(folder / name, camera.width, camera.height, 1e-3, DepthRange());
-    if (depth.status != ImageStatus::kOk) throw std::runtime_error(depth.problem);
+    if (depth.fault) throw std::runtime_error(depth.problem);
     // A written matrix is a rotation up to rounding only; a quaternion makes it exact.
     const Eigen::Quaterniond q(Eigen::Matrix3d(T.leftCols<3>()));
     const SE3 T_world_cam = make_pose(q.normalized().toRotationMatrix(), T.col(3));

@@ -80,7 +80,7 @@ void read_bag(const RobotPlan& plan, const Wanted& wanted, const Take& take) {
     if (at == wanted.end()) continue;
     const ImageResult image =
         gray_of_message(channel, *message, plan.dataset.string(), {camera.width, camera.height});
-    if (image.status == ImageStatus::kOk) take(at->second, view(image.image));
+    if (!image.fault) take(at->second, view(image.image));
   }
 }
 

@@ -47,19 +47,11 @@ double usable_count(ReaderFault fault, const SensorSample& sample) {
   const auto frames = static_cast<double>(sample.frames.size());
   const auto samples = static_cast<double>(sample.imu.size());
   const double images = sample.right_size.width > 0 ? 2.0 * frames : frames;
-  switch (fault) {
-    case ReaderFault::kNotFinite:
-    case ReaderFault::kImplausible:
-    case ReaderFault::kNoAcceleration:
-    case ReaderFault::kImuGap:
-      return samples;
-    case ReaderFault::kMissingBetween:
-      return images;
-    case ReaderFault::kLostMessage:
-      return images + samples;
-    default:
-      return frames;
-  }
+  using enum ReaderFault;
+  if (fault == kNotFinite || fault == kImplausible || fault == kNoAcceleration || fault == kImuGap)
+    return samples;
+  if (fault == kMissingBetween) return images;
+  return fault == kLostMessage ? images + samples : frames;
 }
 
 void examine_rate(const char* sensor, const std::string& id, const std::vector<Stamp>& stamps,

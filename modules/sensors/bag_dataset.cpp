@@ -42,14 +42,8 @@ std::string names_of(const std::vector<BagChannel>& channels, const SensorKind& 
 }
 
 ReaderFault fault_of(StampVerdict verdict) {
-  switch (verdict) {
-    case StampVerdict::kRepeated:
-      return ReaderFault::kRepeatedStamp;
-    case StampVerdict::kJump:
-      return ReaderFault::kJumpingStamp;
-    default:
-      return ReaderFault::kUnorderedStamp;
-  }
+  if (verdict == StampVerdict::kRepeated) return ReaderFault::kRepeatedStamp;
+  return verdict == StampVerdict::kJump ? ReaderFault::kJumpingStamp : ReaderFault::kUnorderedStamp;
 }
 
 cv::Size size_of(const StereoRig& rig, std::size_t camera) {
@@ -335,9 +329,9 @@ std::optional<StereoFrame> BagDataset::decode(const JoinedFrame& joined, FrameUs
   const auto gray = [&](const BagMessage& message, std::size_t camera, GrayImage& image) {
     ImageResult result = gray_of_message(bag_->channels()[message.channel], message,
                                          place_of(message), size_of(rig_.sensors.stereo, camera));
-    if (result.status != ImageStatus::kOk) report_.add(fault_of(result.status), result.problem);
+    if (result.fault) report_.add(*result.fault, result.problem);
     image = std::move(result.image);
-    return result.status == ImageStatus::kOk;
+    return !result.fault;
   };
   if (!gray(joined.left, 0, frame.left)) return std::nullopt;
   if (use == FrameUse::kAll)
@@ -351,10 +345,10 @@ std::optional<StereoFrame> BagDataset::decode(const JoinedFrame& joined, FrameUs
   DepthResult depth = depth_of_message(bag_->channels()[joined.depth->channel], *joined.depth,
                                        place_of(*joined.depth), size_of(rig_.sensors.stereo, 0),
                                        rig_.depth_scale_m, *rig_.sensors.depth);
-  if (depth.status == ImageStatus::kOk)
+  if (!depth.fault)
     frame.depth = std::make_shared<const DepthImage>(std::move(depth.image));
   else
-    report_.add(fault_of(depth.status), depth.problem);
+    report_.add(*depth.fault, depth.problem);
   return frame;
 }
 

@@ -314,7 +314,7 @@ LoadedImage<StereoFrame> load_stereo_pair(const StereoPairFile& files, const Ste
   for (std::size_t i = 0; i < count; ++i) {
     const Camera& camera = rig.cameras[i];
     ImageResult loaded = load_gray_image(images[i].first, camera.width, camera.height);
-    if (loaded.status != ImageStatus::kOk) return {loaded.status, std::move(loaded.problem), {}};
+    if (loaded.fault) return {loaded.fault, std::move(loaded.problem), {}};
     images[i].second = std::move(loaded.image);
   }
   result.image.decode_color = [file = files.left,
@@ -350,10 +350,10 @@ std::vector<ImuSample> FolderReader::imu_until(Stamp stamp) {
 void FolderReader::load_depth(const fs::path& file, StereoFrame& frame) {
   DepthResult loaded = load_depth_image(file, frame.left.width, frame.left.height,
                                         folder_.depth_scale_m, *folder_.rig.depth);
-  if (loaded.status == ImageStatus::kOk)
+  if (!loaded.fault)
     frame.depth = std::make_shared<const DepthImage>(std::move(loaded.image));
   else
-    folder_.report.add(fault_of(loaded.status), loaded.problem);
+    folder_.report.add(*loaded.fault, loaded.problem);
 }
 
 void FolderReader::load_labels(const fs::path& file, StereoFrame& frame) {
@@ -361,10 +361,10 @@ void FolderReader::load_labels(const fs::path& file, StereoFrame& frame) {
   if (loaded.unknown_pixels > 0)
     folder_.report.add(ReaderFault::kUnknownColor,
                        file.string() + ": " + std::to_string(loaded.unknown_pixels) + " pixels");
-  if (loaded.status == ImageStatus::kOk)
+  if (!loaded.fault)
     frame.labels = std::make_shared<const LabelImage>(std::move(loaded.image));
   else
-    folder_.report.add(fault_of(loaded.status), loaded.problem);
+    folder_.report.add(*loaded.fault, loaded.problem);
 }
 
 std::optional<SensorPacket> FolderReader::next(const ChooseUse& choose) {
@@ -374,9 +374,8 @@ std::optional<SensorPacket> FolderReader::next(const ChooseUse& choose) {
     const FrameUse use = choose(files.stamp, 0);
     if (use == FrameUse::kNone) continue;
     LoadedImage<StereoFrame> loaded = load_stereo_pair(files, folder_.rig.stereo);
-    if (loaded.status != ImageStatus::kOk) {
-      folder_.report.add(fault_of(loaded.status),
-                         at_line(folder_.list, files.line) + ": " + loaded.problem);
+    if (loaded.fault) {
+      folder_.report.add(*loaded.fault, at_line(folder_.list, files.line) + ": " + loaded.problem);
       continue;
     }
     const bool has_all = use == FrameUse::kAll || folder_.is_rgbd();

@@ -60,24 +60,11 @@ void map_colors(const cv::Mat& image, const LabelPalette& palette, LabelResult& 
 
 }  // namespace
 
-ReaderFault fault_of(ImageStatus status) {
-  switch (status) {
-    case ImageStatus::kMissing:
-      return ReaderFault::kMissingImage;
-    case ImageStatus::kWrongSize:
-      return ReaderFault::kWrongImageSize;
-    case ImageStatus::kWrongFormat:
-      return ReaderFault::kWrongImageFormat;
-    default:
-      return ReaderFault::kUnreadableImage;
-  }
-}
-
 ImageResult load_gray_image(const std::filesystem::path& file, int width, int height) {
   LoadedImage<cv::Mat> loaded = decode_image(file, DecodedPixels::kGray, {width, height});
-  if (loaded.status != ImageStatus::kOk) return failure_of<GrayImage>(loaded);
+  if (loaded.fault) return failure_of<GrayImage>(loaded);
   const cv::Mat& decoded = loaded.image;
-  return {ImageStatus::kOk, {}, {width, height, {decoded.datastart, decoded.dataend}}};
+  return {std::nullopt, {}, {width, height, {decoded.datastart, decoded.dataend}}};
 }
 
 ColorImage color_image_of(const LoadedImage<cv::Mat>& decoded) {
@@ -93,33 +80,33 @@ ColorImage color_image_of(const LoadedImage<cv::Mat>& decoded) {
   return color;
 }
 
-LoadedImage<cv::Mat> image_failure(ImageStatus status, const std::string& place,
+LoadedImage<cv::Mat> image_failure(ReaderFault fault, const std::string& place,
                                    const std::string& why) {
-  return {status, place + ": " + why, {}};
+  return {fault, place + ": " + why, {}};
 }
 
 LoadedImage<cv::Mat> wrong_size(const std::string& place, const cv::Size& found,
                                 const cv::Size& size) {
-  return image_failure(ImageStatus::kWrongSize, place,
+  return image_failure(ReaderFault::kWrongImageSize, place,
                        text(found) + " px, the calibration states " + text(size));
 }
 
 LoadedImage<cv::Mat> decode_image(const std::filesystem::path& file, DecodedPixels pixels,
                                   const cv::Size& size) {
   if (!is_file(file))
-    return image_failure(ImageStatus::kMissing, file.string(),
+    return image_failure(ReaderFault::kMissingImage, file.string(),
                          "no such image" + (is_absent(file) ? "" : ": " + problem_of_file(file)));
   try {
     return decode_image(read_input_file(file, kMaxEncoded_bytes), file.string(), pixels, size);
   } catch (const InputFileError& error) {
-    return {ImageStatus::kUnreadable, error.what(), {}};
+    return {ReaderFault::kUnreadableImage, error.what(), {}};
   }
 }
 
 LoadedImage<cv::Mat> decode_image(std::string_view bytes, const std::string& place,
                                   DecodedPixels pixels, const cv::Size& size) {
   const auto unreadable = [&place](const std::string& why) {
-    return image_failure(ImageStatus::kUnreadable, place, why);
+    return image_failure(ReaderFault::kUnreadableImage, place, why);
   };
   if (bytes.empty()) return unreadable("empty file");
   if (is_truncated(bytes)) return unreadable("truncated image");
@@ -129,7 +116,7 @@ LoadedImage<cv::Mat> decode_image(std::string_view bytes, const std::string& pla
   try {
     cv::Mat decoded = decode_pixels(bytes, pixels);
     if (decoded.size() != size) return wrong_size(place, decoded.size(), size);
-    return {ImageStatus::kOk, {}, std::move(decoded)};
+    return {std::nullopt, {}, std::move(decoded)};
   } catch (const ImageCodecError& error) {
     return unreadable(std::string("cannot be decoded: ") + error.what());
   }
@@ -143,7 +130,7 @@ DepthResult load_depth_image(const std::filesystem::path& file, int width, int h
 
 DepthResult depth_image_of(const LoadedImage<cv::Mat>& decoded, const std::string& place,
                            double scale_m, const DepthRange& range) {
-  if (decoded.status != ImageStatus::kOk) return failure_of<DepthImage>(decoded);
+  if (decoded.fault) return failure_of<DepthImage>(decoded);
   const cv::Mat& image = decoded.image;
   const double min_mm = 1e3 * range.min_m;
   const double max_mm = std::min(1e3 * range.max_m, kMaxStored_mm);
@@ -164,7 +151,7 @@ DepthResult depth_image_of(const LoadedImage<cv::Mat>& decoded, const std::strin
     std::transform(image.begin<float>(), image.end<float>(), values,
                    [&](float depth_m) { return stored(1e3 * static_cast<double>(depth_m)); });
   } else {
-    return {ImageStatus::kWrongFormat,
+    return {ReaderFault::kWrongImageFormat,
             place + ": " + std::to_string(8 * image.elemSize1()) + " bits and " +
                 std::to_string(image.channels()) +
                 " channels, depth is an image of 16 bits and one channel, or of metres",
@@ -176,7 +163,7 @@ DepthResult depth_image_of(const LoadedImage<cv::Mat>& decoded, const std::strin
 LabelResult load_label_image(const std::filesystem::path& file, int width, int height,
                              const LabelPalette& palette) {
   LoadedImage<cv::Mat> loaded = decode_image(file, DecodedPixels::kStored, {width, height});
-  if (loaded.status != ImageStatus::kOk) return {failure_of<LabelImage>(loaded), 0};
+  if (loaded.fault) return {failure_of<LabelImage>(loaded), 0};
   const cv::Mat& decoded = loaded.image;
   LabelResult result;
   result.image = {width, height, {}};
@@ -189,7 +176,8 @@ LabelResult load_label_image(const std::filesystem::path& file, int width, int h
                               : palette.classes().empty()
                                   ? "labels as colours, but no label_palette.csv to map them"
                                   : "";
-  if (!problem.empty()) return {{ImageStatus::kWrongFormat, file.string() + ": " + problem, {}}, 0};
+  if (!problem.empty())
+    return {{ReaderFault::kWrongImageFormat, file.string() + ": " + problem, {}}, 0};
   result.image.ids.reserve(decoded.total());
   map_colors(decoded, palette, result);
   return result;

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -15,17 +16,12 @@
 
 namespace km {
 
-enum class ImageStatus { kOk, kMissing, kUnreadable, kWrongSize, kWrongFormat };
-
-/// Fault as which a failure is counted. Precondition: not kOk.
-[[nodiscard]] ReaderFault fault_of(ImageStatus status);
-
 /// An image from disk, or the reason why it cannot be used.
 template <typename Image>
 struct LoadedImage {
-  ImageStatus status = ImageStatus::kOk;
-  std::string problem;  ///< Names the file; empty if kOk.
-  Image image;          ///< Empty unless kOk.
+  std::optional<ReaderFault> fault;  ///< Present if the image cannot be used.
+  std::string problem;               ///< Names the file; empty without a fault.
+  Image image;                       ///< Empty with a fault.
 };
 using ImageResult = LoadedImage<GrayImage>;
 
@@ -37,7 +33,7 @@ using ImageResult = LoadedImage<GrayImage>;
 /// The colours of a BGR image; 0 x 0 for an image that failed or has no colours.
 [[nodiscard]] ColorImage color_image_of(const LoadedImage<cv::Mat>& decoded);
 
-/// A PNG or JPEG file. Never kWrongFormat.
+/// A PNG or JPEG file. Never kWrongImageFormat.
 [[nodiscard]] LoadedImage<cv::Mat> decode_image(const std::filesystem::path& file,
                                                 DecodedPixels pixels, const cv::Size& size);
 
@@ -46,7 +42,7 @@ using ImageResult = LoadedImage<GrayImage>;
                                                 DecodedPixels pixels, const cv::Size& size);
 
 /// Result for an image that cannot be used; its problem is "PLACE: WHY".
-[[nodiscard]] LoadedImage<cv::Mat> image_failure(ImageStatus status, const std::string& place,
+[[nodiscard]] LoadedImage<cv::Mat> image_failure(ReaderFault fault, const std::string& place,
                                                  const std::string& why);
 
 /// Failure of an image that has another size.
@@ -56,7 +52,7 @@ using ImageResult = LoadedImage<GrayImage>;
 /// The failure of decode_image(), as a result for another type of image.
 template <typename Image>
 [[nodiscard]] LoadedImage<Image> failure_of(const LoadedImage<cv::Mat>& decoded) {
-  return {decoded.status, decoded.problem, {}};
+  return {decoded.fault, decoded.problem, {}};
 }
 
 using DepthResult = LoadedImage<DepthImage>;

@@ -72,7 +72,7 @@ LoadedImage<cv::Mat> pixels_of(const RosImage& image, const Encoding& encoding,
     return wrong_size(place, found, size);
   const std::size_t row_bytes = image.width * static_cast<std::size_t>(CV_ELEM_SIZE(encoding.type));
   if (image.step < row_bytes)
-    return image_failure(ImageStatus::kUnreadable, place,
+    return image_failure(ReaderFault::kUnreadableImage, place,
                          "rows of " + std::to_string(image.step) + " bytes, " +
                              std::to_string(row_bytes) + " are needed for " + image.encoding);
   cv::Mat pixels(found, encoding.type);
@@ -82,7 +82,7 @@ LoadedImage<cv::Mat> pixels_of(const RosImage& image, const Encoding& encoding,
   const bool is_native = (image.is_bigendian != 0) == (std::endian::native == std::endian::big);
   if (!is_native && encoding.type == CV_16UC1) reverse_bytes<std::uint16_t>(pixels);
   if (!is_native && encoding.type == CV_32FC1) reverse_bytes<float>(pixels);
-  return {ImageStatus::kOk, {}, std::move(pixels)};
+  return {std::nullopt, {}, std::move(pixels)};
 }
 
 struct RawImage {
@@ -94,10 +94,10 @@ struct RawImage {
 RawImage raw_image(const BagChannel& channel, const BagMessage& message, const std::string& place,
                    const cv::Size& size) {
   const auto image = decode_ros<RosImage>(channel.encoding, message.bytes);
-  if (!image.value) return {image_failure(ImageStatus::kUnreadable, place, image.refusal)};
+  if (!image.value) return {image_failure(ReaderFault::kUnreadableImage, place, image.refusal)};
   const Encoding* const encoding = find_encoding(image.value->encoding);
   if (encoding == nullptr)
-    return {image_failure(ImageStatus::kWrongFormat, place,
+    return {image_failure(ReaderFault::kWrongImageFormat, place,
                           "the encoding " + readable(image.value->encoding, 40) +
                               " is none of mono, rgb, bgr, bayer of 8 bits, yuv422, 16UC1, 32FC1")};
   return {pixels_of(*image.value, *encoding, place, size), encoding->to_gray, encoding->to_bgr};
@@ -152,13 +152,13 @@ LoadedImage<cv::Mat> rvl_image(std::string_view bytes, const std::string& place,
                                const cv::Size& size) {
   std::array<std::uint32_t, 2> sides{};
   if (bytes.size() < sizeof(sides))
-    return image_failure(ImageStatus::kUnreadable, place, "truncated RVL");
+    return image_failure(ReaderFault::kUnreadableImage, place, "truncated RVL");
   std::memcpy(sides.data(), bytes.data(), sizeof(sides));
   if (std::cmp_not_equal(sides[0], size.width) || std::cmp_not_equal(sides[1], size.height))
     return wrong_size(place, {static_cast<int>(sides[0]), static_cast<int>(sides[1])}, size);
   auto image = decode_rvl(bytes.substr(sizeof(sides)), size);
-  if (!image) return image_failure(ImageStatus::kUnreadable, place, "damaged RVL");
-  return {ImageStatus::kOk, {}, *std::move(image)};
+  if (!image) return image_failure(ReaderFault::kUnreadableImage, place, "damaged RVL");
+  return {std::nullopt, {}, *std::move(image)};
 }
 
 // Names the format of an image that is neither PNG nor JPEG nor RVL.
@@ -172,7 +172,7 @@ LoadedImage<cv::Mat> compressed_image(const BagChannel& channel, const BagMessag
                                       const std::string& place, DecodedPixels pixels,
                                       const cv::Size& size) {
   const auto image = decode_ros<RosCompressedImage>(channel.encoding, message.bytes);
-  if (!image.value) return image_failure(ImageStatus::kUnreadable, place, image.refusal);
+  if (!image.value) return image_failure(ReaderFault::kUnreadableImage, place, image.refusal);
   const auto& data = image.value->data;
   std::string_view bytes(reinterpret_cast<const char*>(data.data()), data.size());
   const std::string& format = image.value->format;
@@ -187,19 +187,18 @@ LoadedImage<cv::Mat> compressed_image(const BagChannel& channel, const BagMessag
   LoadedImage<cv::Mat> loaded = has_header && names("rvl")
                                     ? rvl_image(bytes, place, size)
                                     : decode_image(bytes, place, pixels, size);
-  if (loaded.status == ImageStatus::kUnreadable && !stated_image_size(bytes))
+  if (loaded.fault == ReaderFault::kUnreadableImage && !stated_image_size(bytes))
     loaded.problem += format_text(format);
-  if (loaded.status != ImageStatus::kOk || !has_header || !format.starts_with("32FC1"))
-    return loaded;
+  if (loaded.fault || !has_header || !format.starts_with("32FC1")) return loaded;
   if (!(header.A > 0.0F) || !std::isfinite(header.B) || loaded.image.type() != CV_16UC1)
-    return image_failure(ImageStatus::kWrongFormat, place,
+    return image_failure(ReaderFault::kWrongImageFormat, place,
                          "32FC1; compressedDepth without its two numbers of quantisation");
   cv::Mat metres(loaded.image.size(), CV_32FC1);
   std::transform(loaded.image.begin<std::uint16_t>(), loaded.image.end<std::uint16_t>(),
                  metres.begin<float>(), [&header](std::uint16_t stored) {
                    return stored == 0 ? 0.0F : header.A / (static_cast<float>(stored) - header.B);
                  });
-  return {ImageStatus::kOk, {}, std::move(metres)};
+  return {std::nullopt, {}, std::move(metres)};
 }
 
 bool is_raw(const BagChannel& channel) {
@@ -223,7 +222,7 @@ ImageResult gray_of_message(const BagChannel& channel, const BagMessage& message
       is_raw(channel)
           ? raw_image(channel, message, place, size)
           : RawImage{compressed_image(channel, message, place, DecodedPixels::kGray, size)};
-  if (raw.loaded.status != ImageStatus::kOk) return failure_of<GrayImage>(raw.loaded);
+  if (raw.loaded.fault) return failure_of<GrayImage>(raw.loaded);
   cv::Mat gray = raw.loaded.image;
   if (raw.to_gray != kAsItIs) {
     gray = cv::Mat();  // a Bayer pattern cannot be converted in place
@@ -231,8 +230,8 @@ ImageResult gray_of_message(const BagChannel& channel, const BagMessage& message
   }
   if (gray.type() == CV_16UC1) gray = upper_bits(gray);
   if (gray.type() != CV_8UC1)
-    return {ImageStatus::kWrongFormat, place + ": metres are no grey values", {}};
-  return {ImageStatus::kOk, {}, {gray.cols, gray.rows, {gray.datastart, gray.dataend}}};
+    return {ReaderFault::kWrongImageFormat, place + ": metres are no grey values", {}};
+  return {std::nullopt, {}, {gray.cols, gray.rows, {gray.datastart, gray.dataend}}};
 }
 
 ColorImage color_of_message(const BagChannel& channel, const BagMessage& message,
@@ -241,7 +240,7 @@ ColorImage color_of_message(const BagChannel& channel, const BagMessage& message
       is_raw(channel)
           ? raw_image(channel, message, {}, size)
           : RawImage{compressed_image(channel, message, {}, DecodedPixels::kEightBits, size)};
-  if (raw.loaded.status == ImageStatus::kOk && raw.to_bgr != kAsItIs) {
+  if (!raw.loaded.fault && raw.to_bgr != kAsItIs) {
     cv::Mat bgr;
     cv::cvtColor(raw.loaded.image, bgr, raw.to_bgr);
     raw.loaded.image = bgr;

@@ -207,7 +207,7 @@ void check(const std::vector<StereoPairFile>& pairs, const StereoRig& rig, std::
   DepthDifferences differences;
   for (std::size_t i = 0; i < pairs.size(); i += every) {
     const auto pair = load_stereo_pair(pairs[i], rig);
-    REQUIRE(pair.status == ImageStatus::kOk);
+    REQUIRE(!pair.fault);
     add_differences(stereo.compute(pair.image.left, pair.image.right), stereo, rig,
                     triangulated_corners(pair.image, rig), differences);
   }

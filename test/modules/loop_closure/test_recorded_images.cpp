@@ -34,7 +34,7 @@ std::vector<RecordedKeyframe> load_v1_01(const fs::path& sequence) {
   std::vector<RecordedKeyframe> keyframes;
   for (std::size_t i = 0; i < files.size(); i += 2) {
     const auto pair = load_stereo_pair(files[i], rig.stereo);
-    if (pair.status != ImageStatus::kOk) throw std::runtime_error(pair.problem);
+    if (pair.fault) throw std::runtime_error(pair.problem);
     keyframes.push_back({files[i].stamp, pose_at(truth, files[i].stamp, 0.1, 0.0).value(),
                          extractor.extract(pair.image)});
   }

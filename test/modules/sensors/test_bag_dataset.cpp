@@ -345,7 +345,7 @@ TEST_CASE("Images of every common encoding become the same grey") {
   const ImageResult gray =
       gray_of_message(channel, {0, kFirst, encode_ros(message)}, "here", {kWidth, kHeight});
   CAPTURE(gray.problem);
-  REQUIRE(gray.status == ImageStatus::kOk);
+  REQUIRE(!gray.fault);
   CHECK(gray.image.pixels == std::vector<std::uint8_t>(kWidth * kHeight, 90));
 
   const cv::Mat pixels(kHeight, kWidth, CV_8UC1, cv::Scalar(90));
@@ -448,7 +448,7 @@ TEST_CASE("Compressed depth is decoded by the format that its message states") {
                             {0, kFirst, encode_ros(image)}, "here", {4, 1}, 1e-3, {0.0, 60.0});
   };
   CHECK(depth_of(0, c.format).image.millimetres == c.expected_mm);
-  CHECK(depth_of(8, c.format).status == ImageStatus::kUnreadable);
+  CHECK(depth_of(8, c.format).fault == ReaderFault::kUnreadableImage);
   CHECK_THAT(depth_of(c.bytes.size(), "h264").problem, Contains("states the format 'h264'"));
 }
 
