@@ -70,15 +70,15 @@ void Absentees::update(double now_s, const std::map<RobotId, Known>& known,
   now_s_ = now_s;
   std::map<RobotId, Missed> missed;
   for (const auto& [robot, peer] : known) {
-    if (peer.contact == Contact::kReceived)
+    if (peer.state == PeerState::kAlive)
       received_s_[robot] = now_s;
-    else if (peer.contact != Contact::kSilent)
+    else if (peer.state != PeerState::kLost)
       received_s_.erase(robot);
-    if (peer.contact == Contact::kLeft || std::ranges::find(members, robot) != members.end())
+    if (peer.state == PeerState::kLeft || std::ranges::find(members, robot) != members.end())
       continue;
-    const bool second_hand = peer.contact == Contact::kReported;
+    const bool second_hand = peer.state == PeerState::kReported;
     if (second_hand && !ever_members_.contains(robot)) continue;
-    const Absence why = peer.contact == Contact::kReceived ? Absence::kApart : Absence::kSilent;
+    const Absence why = peer.state == PeerState::kAlive ? Absence::kApart : Absence::kSilent;
     miss(robot, {.name = peer.name, .why = why, .second_hand = second_hand}, missed);
   }
   for (const RobotId robot : ever_members_)

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "modules/core/ids.hpp"
+#include "runtime/dds/peer_table.hpp"
 #include "runtime/dds/robot_status.hpp"
 #include "runtime/supervisor.hpp"
 
@@ -70,11 +71,9 @@ struct MissedPeer {
 /// argument [s], with any origin.
 class Absentees {
  public:
-  /// kLeft: the robot has sent its leave message. kReported: only other robots receive it.
-  enum class Contact { kReceived, kSilent, kLeft, kReported };
   struct Known {
     std::string name;
-    Contact contact = Contact::kReceived;
+    PeerState state = PeerState::kAlive;
   };
 
   /// `members`: all robots in one frame with this one, itself included, received directly or only

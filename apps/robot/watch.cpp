@@ -25,21 +25,6 @@ std::vector<std::string> other_hosts(const RobotConfig& config, const NetworkInt
   return hosts;
 }
 
-Absentees::Contact contact_of(PeerState state) {
-  using enum Absentees::Contact;
-  switch (state) {
-    case PeerState::kAlive:
-      return kReceived;
-    case PeerState::kLost:
-      return kSilent;
-    case PeerState::kReported:
-      return kReported;
-    case PeerState::kLeft:
-      break;
-  }
-  return kLeft;
-}
-
 }  // namespace
 
 Watch::Watch(const RobotOptions& options, const RobotConfig& config, bool continues,
@@ -166,15 +151,14 @@ void Watch::show_status(const RunRecord& record, const TrafficSnapshot& traffic)
 
 // A peer whose last status announced that it leaves, and that is silent now, has left.
 std::map<RobotId, Absentees::Known> Watch::known_peers() const {
-  using enum Absentees::Contact;
   std::map<RobotId, Absentees::Known> known;
   for (const Peer& peer : robot_.bridge().peers().list())
-    known[peer.identity.robot] = {peer.identity.name, contact_of(peer.state)};
+    known[peer.identity.robot] = {peer.identity.name, peer.state};
   for (const RobotStatus& status : robot_.status_node().peers()) {
     const auto peer = known.find(status.robot);
     if (status.phase == RobotPhase::kLeaving && peer != known.end() &&
-        peer->second.contact == kSilent)
-      peer->second.contact = kLeft;
+        peer->second.state == PeerState::kLost)
+      peer->second.state = PeerState::kLeft;
   }
   return known;
 }

@@ -194,7 +194,7 @@ TEST_CASE("A run is judged by the gravest that happened to it") {
   }
 }
 
-using enum Absentees::Contact;
+using enum PeerState;
 
 // "bob silent 10 carol apart 7 "
 std::string text_of(const Absentees& absentees, double second_hand_s = 0.0) {
@@ -209,33 +209,33 @@ TEST_CASE("A robot is missed for as long as it has been silent or in another fra
   const std::vector<RobotId> alone{1}, with_bob{1, 2};
   Absentees absentees;
   CHECK(text_of(absentees).empty());
-  absentees.update(99.0, {{2, {"bob", kReceived}}, {7, {"carol", kReceived}}}, with_bob);
+  absentees.update(99.0, {{2, {"bob", kAlive}}, {7, {"carol", kAlive}}}, with_bob);
   CHECK(text_of(absentees) == "carol apart 0 ");
-  absentees.update(100.0, {{2, {"bob", kSilent}}, {7, {"carol", kReceived}}}, alone);
-  absentees.update(103.0, {{2, {"bob", kSilent}}, {7, {"carol", kSilent}}}, alone);
-  absentees.update(110.0, {{2, {"bob", kSilent}}, {7, {"carol", kSilent}}}, alone);
+  absentees.update(100.0, {{2, {"bob", kLost}}, {7, {"carol", kAlive}}}, alone);
+  absentees.update(103.0, {{2, {"bob", kLost}}, {7, {"carol", kLost}}}, alone);
+  absentees.update(110.0, {{2, {"bob", kLost}}, {7, {"carol", kLost}}}, alone);
   CHECK(text_of(absentees) == "bob silent 10 carol silent 7 ");
   CHECK(absentees.is_present(2, 11.1));
   CHECK_FALSE(absentees.is_present(2, 11.0));
-  absentees.update(110.0, {{2, {"bob", kSilent}}, {7, {"carol", kSilent}}}, with_bob);
+  absentees.update(110.0, {{2, {"bob", kLost}}, {7, {"carol", kLost}}}, with_bob);
   CHECK(text_of(absentees) == "carol silent 7 ");  // others receive bob
-  absentees.update(111.0, {{2, {"bob", kReceived}}, {7, {"carol", kSilent}}}, alone);
-  absentees.update(112.0, {{2, {"bob", kReceived}}, {7, {"carol", kLeft}}}, alone);
+  absentees.update(111.0, {{2, {"bob", kAlive}}, {7, {"carol", kLost}}}, alone);
+  absentees.update(112.0, {{2, {"bob", kAlive}}, {7, {"carol", kLeft}}}, alone);
   CHECK(text_of(absentees) == "bob apart 1 ");
   CHECK_FALSE(absentees.is_present(7, 60.0));  // it has left
 }
 
 TEST_CASE("A member that only others received is missed once it cannot have left in order") {
   Absentees absentees;
-  absentees.update(5.0, {{2, {"bob", kReceived}}}, std::vector<RobotId>{1, 2, 7});
-  absentees.update(6.0, {{2, {"bob", kReceived}}}, std::vector<RobotId>{1, 2});
-  absentees.update(8.0, {{2, {"bob", kReceived}}}, std::vector<RobotId>{1, 2});
+  absentees.update(5.0, {{2, {"bob", kAlive}}}, std::vector<RobotId>{1, 2, 7});
+  absentees.update(6.0, {{2, {"bob", kAlive}}}, std::vector<RobotId>{1, 2});
+  absentees.update(8.0, {{2, {"bob", kAlive}}}, std::vector<RobotId>{1, 2});
   CHECK(text_of(absentees, 3.0).empty());
-  absentees.update(9.0, {{2, {"bob", kReceived}}}, std::vector<RobotId>{1, 2});
+  absentees.update(9.0, {{2, {"bob", kAlive}}}, std::vector<RobotId>{1, 2});
   CHECK(text_of(absentees, 3.0) == "robot 7 silent 3 ");
   // Robots of which only others know have a name, also if they have never been members.
   absentees.update(10.0,
-                   {{2, {"bob", kReceived}}, {7, {"carol", kReported}}, {9, {"dave", kReported}}},
+                   {{2, {"bob", kAlive}}, {7, {"carol", kReported}}, {9, {"dave", kReported}}},
                    std::vector<RobotId>{1, 2});
   CHECK(text_of(absentees, 3.0) == "carol silent 4 ");
   CHECK(text_of(absentees, 5.0).empty());
