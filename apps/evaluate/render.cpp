@@ -10,6 +10,7 @@
 #include "apps/evaluate/inputs.hpp"
 #include "apps/evaluate/mesh_picture.hpp"
 #include "apps/output_file.hpp"
+#include "apps/result_files.hpp"
 #include "modules/evaluation/mesh/mesh_error.hpp"
 #include "modules/mesh/mesh_file.hpp"
 
@@ -37,13 +38,6 @@ PictureLine line_of(const fs::path& file, const SE3& T_picture_mesh) {
   for (const StampedPose& pose : read_estimate(file))
     line.points.emplace_back(T_picture_mesh * pose.T.translation());
   return line;
-}
-
-// NAME.png, NAME_2.png, ...
-fs::path numbered(const fs::path& file, std::size_t view) {
-  if (view == 0) return file;
-  return file.parent_path() /
-         (file.stem().string() + '_' + std::to_string(view + 1) + file.extension().string());
 }
 
 struct RenderCommand {
@@ -106,8 +100,9 @@ struct RenderCommand {
         extent.extend(point);
     for (std::size_t i = 0; i < views.size(); ++i) {
       const PictureView view = parse_view(views[i], extent, size.first, size.second);
-      write_png(numbered(output, i), draw_meshes(scene, view, color_of(color, placed)));
-      std::cout << numbered(output, i).string() << '\n';
+      const fs::path file = i == 0 ? output : numbered(output, static_cast<int>(i) + 1);
+      write_png(file, draw_meshes(scene, view, color_of(color, placed)));
+      std::cout << file.string() << '\n';
     }
   }
 };

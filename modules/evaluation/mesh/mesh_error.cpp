@@ -504,14 +504,13 @@ MeshReport mesh_error(const LabelledMesh& truth, std::span<const MeshInput> esti
 }
 
 MeshChange mesh_change(const LabelledMesh& truth, std::span<const MeshInput> before,
-                       std::span<const MeshInput> after, const MeshErrorOptions& options,
-                       const MeshProgress& progress) {
+                       std::span<const MeshInput> after, const MeshErrorOptions& options) {
   if (before.size() != after.size())
     throw std::invalid_argument(std::to_string(before.size()) + " meshes before and " +
                                 std::to_string(after.size()) + " after: one each for a robot");
   std::vector<MeshInput> all(before.begin(), before.end());
   for (const MeshInput& input : after) all.push_back(input);
-  std::vector<MeshReport> reports = Evaluation(truth, all, before.size(), options, progress).run();
+  std::vector<MeshReport> reports = Evaluation(truth, all, before.size(), options, {}).run();
   return {std::move(reports[0]), std::move(reports[1])};
 }
 

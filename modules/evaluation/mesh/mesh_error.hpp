@@ -155,8 +155,7 @@ struct MeshChange {
 /// surface. `before` and `after` have one mesh for each robot, in the same order. Throws as
 /// mesh_error().
 MeshChange mesh_change(const LabelledMesh& truth, std::span<const MeshInput> before,
-                       std::span<const MeshInput> after, const MeshErrorOptions& options = {},
-                       const MeshProgress& progress = {});
+                       std::span<const MeshInput> after, const MeshErrorOptions& options = {});
 
 /// Throws std::invalid_argument, beginning with `name`, for a label that the palette `palette_name`
 /// lacks. The palette may lack the unknown label (0).
