@@ -6,7 +6,6 @@
 #include <filesystem>
 #include <sstream>
 #include <stdexcept>
-#include <string>
 #include <system_error>
 
 #include "modules/core/json.hpp"

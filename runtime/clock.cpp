@@ -1,6 +1,5 @@
 #include "runtime/clock.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <string>

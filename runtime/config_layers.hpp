@@ -4,7 +4,6 @@
 #include <map>
 #include <set>
 #include <string>
-#include <vector>
 
 #include "runtime/config_text.hpp"
 #include "runtime/yaml_config.hpp"

@@ -7,10 +7,8 @@
 #include <optional>
 #include <thread>
 #include <variant>
-#include <vector>
 
 #include "apps/result_files.hpp"
-#include "apps/robot/robot_config.hpp"
 #include "apps/robot/robot_input.hpp"
 #include "apps/robot/run_findings.hpp"
 #include "modules/core/input_file.hpp"
@@ -20,7 +18,6 @@
 #include "modules/evaluation/closure_truth.hpp"
 #include "modules/place_recognition/vocabulary_file.hpp"
 #include "modules/recordings/ros_messages.hpp"
-#include "modules/sensors/node/rig_file.hpp"
 #include "runtime/clock.hpp"
 #include "runtime/dds/ros_subscription.hpp"
 

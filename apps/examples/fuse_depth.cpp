@@ -3,7 +3,6 @@
 // FOLDER, a sequence of 7-Scenes, has frame-NNNNNN.depth.png (640 x 480, 16 bits, mm). Each row of
 // its poses.txt is the number of a frame and the first three rows of the matrix T_world_cam.
 #include <cstdio>
-#include <cstdlib>
 #include <exception>
 #include <filesystem>
 #include <fstream>

@@ -1,6 +1,5 @@
 // Runs the odometry of a robot on a EuRoC/ASL folder and writes its trajectory.
 //   run_odometry FOLDER POSES.tum [SECONDS]
-#include <cstdlib>
 #include <exception>
 #include <fstream>
 #include <iostream>

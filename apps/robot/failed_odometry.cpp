@@ -7,7 +7,6 @@
 #include "apps/robot/robot_input.hpp"
 #include "modules/diagnosis/examine_sensors.hpp"
 #include "modules/diagnosis/sensor_sample.hpp"
-#include "modules/sensors/node/rig_file.hpp"
 
 namespace km {
 

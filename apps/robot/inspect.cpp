@@ -8,17 +8,14 @@
 #include <memory>
 #include <sstream>
 #include <stdexcept>
-#include <string>
 #include <string_view>
 #include <utility>
-#include <vector>
 
 #include "modules/absolute_fixes/fix_reader.hpp"
 #include "modules/core/input_file.hpp"
 #include "modules/core/text_rows.hpp"
 #include "modules/core/text_table.hpp"
 #include "modules/core/write_file.hpp"
-#include "modules/recordings/bag_summary.hpp"
 #include "modules/recordings/open_bag.hpp"
 #include "modules/recordings/ros_messages.hpp"
 #include "modules/ros_dds/node/live_topics.hpp"

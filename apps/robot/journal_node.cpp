@@ -1,10 +1,8 @@
 #include "apps/robot/journal_node.hpp"
 
 #include <algorithm>
-#include <cstddef>
 #include <limits>
 #include <stdexcept>
-#include <utility>
 
 #include "modules/core/input_file.hpp"
 #include "runtime/clock.hpp"

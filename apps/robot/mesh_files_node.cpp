@@ -13,7 +13,6 @@
 #include "modules/mesh/mesh_file.hpp"
 #include "modules/objects/object_file.hpp"
 #include "runtime/log.hpp"
-#include "runtime/thread.hpp"
 
 namespace km {
 namespace {

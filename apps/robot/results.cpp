@@ -13,7 +13,6 @@
 #include "modules/core/covariance.hpp"
 #include "modules/core/lie.hpp"
 #include "modules/core/text_table.hpp"
-#include "modules/core/write_file.hpp"
 #include "modules/recorded_graph/g2o_io.hpp"
 
 namespace km {

@@ -1,7 +1,6 @@
 #include "apps/robot/robot_config.hpp"
 
 #include <type_traits>
-#include <vector>
 
 #include "apps/program_version.hpp"
 #include "modules/core/input_file.hpp"

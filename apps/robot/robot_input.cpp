@@ -2,10 +2,8 @@
 
 #include <algorithm>
 #include <atomic>
-#include <cmath>
 #include <limits>
 #include <stdexcept>
-#include <string>
 #include <thread>
 #include <utility>
 
@@ -16,7 +14,6 @@
 #include "modules/recordings/open_bag.hpp"
 #include "modules/recordings/ros_messages.hpp"
 #include "modules/ros_dds/node/live_topics.hpp"
-#include "modules/sensors/bag_dataset.hpp"
 #include "modules/sensors/folder_layouts.hpp"
 #include "modules/sensors/node/open_folder.hpp"
 #include "modules/sensors/node/rig_file.hpp"

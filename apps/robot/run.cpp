@@ -18,7 +18,6 @@
 #include "apps/result_writer.hpp"
 #include "apps/robot/conclusion.hpp"
 #include "apps/robot/final_room.hpp"
-#include "apps/robot/results.hpp"
 #include "apps/robot/watch.hpp"
 #include "apps/robot/wiring.hpp"
 #include "modules/core/write_file.hpp"

@@ -7,7 +7,6 @@
 
 #include "modules/core/geometry.hpp"
 #include "modules/core/text_table.hpp"
-#include "modules/diagnosis/finding.hpp"
 
 namespace km {
 namespace {

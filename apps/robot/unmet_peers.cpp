@@ -1,7 +1,6 @@
 #include "apps/robot/unmet_peers.hpp"
 
 #include <algorithm>
-#include <utility>
 
 #include "runtime/log.hpp"
 

@@ -1,13 +1,11 @@
 #include "apps/robot/wiring.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <utility>
 
 #include "apps/result_files.hpp"
 #include "apps/robot/growing_files.hpp"
 #include "apps/robot/results.hpp"
-#include "apps/robot/status.hpp"
 #include "apps/robot/team_keys_node.hpp"
 #include "modules/core/text_table.hpp"
 #include "modules/loop_closure/node/keyframe_features_node.hpp"
@@ -16,7 +14,6 @@
 #include "modules/mesh/node/mesh_codec.hpp"
 #include "modules/objects/node/objects_codec.hpp"
 #include "modules/outlier_rejection/node/outlier_rejection_codec.hpp"
-#include "modules/outlier_rejection/node/pcm_node.hpp"
 #include "modules/place_recognition/node/place_recognition_codec.hpp"
 #include "modules/place_recognition/node/place_recognition_node.hpp"
 #include "modules/place_recognition/vocabulary_file.hpp"
@@ -25,8 +22,6 @@
 #include "modules/ros_dds/ros_sink.hpp"
 #include "modules/session/node/team_codec.hpp"
 #include "modules/session/node/team_node.hpp"
-#include "modules/vio/node/vio_node.hpp"
-#include "runtime/dds/robot_status.hpp"
 
 namespace km {
 namespace {

@@ -20,7 +20,6 @@
 #include <cstring>
 #include <fstream>
 #include <stdexcept>
-#include <string_view>
 #include <system_error>
 #include <utility>
 

@@ -2,9 +2,7 @@
 
 #include <atomic>
 #include <cstddef>
-#include <memory>
 #include <mutex>
-#include <string>
 #include <vector>
 
 #include "modules/core/descriptor.hpp"

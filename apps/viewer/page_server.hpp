@@ -7,7 +7,6 @@
 #include <set>
 #include <span>
 #include <string>
-#include <string_view>
 
 #include "apps/viewer/view_store.hpp"
 #include "modules/charts/html_page.hpp"

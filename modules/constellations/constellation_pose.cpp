@@ -2,8 +2,6 @@
 
 #include <cmath>
 
-#include "modules/core/lie.hpp"
-
 namespace km {
 namespace {
 

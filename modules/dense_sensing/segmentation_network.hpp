@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <memory>
-#include <vector>
 
 #include "modules/core/frame.hpp"
 #include "modules/core/label_palette.hpp"

@@ -11,7 +11,6 @@
 #include "modules/core/text_table.hpp"
 #include "modules/diagnosis/acceleration_fit.hpp"
 #include "modules/diagnosis/doubt_finding.hpp"
-#include "modules/diagnosis/finding.hpp"
 #include "modules/diagnosis/focal_fit.hpp"
 #include "modules/diagnosis/image_rotation.hpp"
 #include "modules/diagnosis/inertial_fit.hpp"

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <limits>
 #include <random>
-#include <vector>
 
 #include "modules/core/lie.hpp"
 #include "modules/diagnosis/stereo_fit.hpp"

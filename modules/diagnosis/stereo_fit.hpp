@@ -3,7 +3,6 @@
 #include <cstddef>
 #include <optional>
 #include <span>
-#include <vector>
 
 #include "modules/core/camera.hpp"
 #include "modules/diagnosis/sensor_sample.hpp"

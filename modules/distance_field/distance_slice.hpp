@@ -1,7 +1,5 @@
 #pragma once
 
-#include <vector>
-
 #include "modules/core/stamp.hpp"
 #include "modules/mesh/labelled_mesh.hpp"
 

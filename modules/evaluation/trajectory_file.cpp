@@ -5,9 +5,7 @@
 #include <charconv>
 #include <cmath>
 #include <limits>
-#include <optional>
 #include <string>
-#include <vector>
 
 #include "modules/core/calibration_limits.hpp"
 #include "modules/core/covariance.hpp"

@@ -1,7 +1,6 @@
 #include "modules/loop_closure/keyframe_features.hpp"
 
 #include <Eigen/Geometry>
-#include <optional>
 #include <stdexcept>
 #include <utility>
 

@@ -1,7 +1,6 @@
 #include "modules/loop_closure/matching.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstring>
 #include <limits>

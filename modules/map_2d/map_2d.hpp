@@ -1,8 +1,6 @@
 #pragma once
 
-#include <cstddef>
 #include <span>
-#include <string>
 
 #include "modules/core/geometry.hpp"
 #include "modules/core/label_palette.hpp"

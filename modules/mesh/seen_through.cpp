@@ -1,7 +1,6 @@
 #include "modules/mesh/seen_through.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <unordered_map>
 

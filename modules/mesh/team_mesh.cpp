@@ -3,8 +3,6 @@
 #include <array>
 #include <utility>
 
-#include "modules/mesh/mesh_chunks.hpp"
-
 namespace km {
 
 const char* to_string(ChunkVerdict verdict) {

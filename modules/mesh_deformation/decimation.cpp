@@ -4,7 +4,6 @@
 #include <OpenMesh/Tools/Decimater/DecimaterT.hh>
 #include <OpenMesh/Tools/Decimater/ModQuadricT.hh>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -12,7 +11,6 @@
 #include <utility>
 
 #include "modules/mesh/grid_cell.hpp"
-#include "modules/mesh_deformation/mesh_node.hpp"
 
 namespace km {
 namespace {

@@ -6,11 +6,9 @@
 #include <ceres/solver.h>
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <deque>
 #include <memory>
 #include <utility>
-#include <vector>
 
 #include "modules/core/lie.hpp"
 

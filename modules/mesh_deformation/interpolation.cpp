@@ -1,17 +1,9 @@
 #include "modules/mesh_deformation/interpolation.hpp"
 
-#include <Eigen/Core>
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstddef>
-#include <cstdint>
 #include <limits>
 #include <nanoflann.hpp>
-#include <span>
-#include <vector>
-
-#include "modules/mesh_deformation/mesh_node.hpp"
 
 namespace km {
 namespace {

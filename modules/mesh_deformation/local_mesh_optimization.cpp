@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <stdexcept>
 #include <string>
-#include <vector>
 
 #include "modules/mesh_deformation/decimation.hpp"
 #include "modules/mesh_deformation/interpolation.hpp"

@@ -4,9 +4,7 @@
 #include <iterator>
 #include <utility>
 
-#include "modules/core/lie.hpp"
 #include "modules/mesh/seen_through.hpp"
-#include "modules/mesh_deformation/local_mesh_optimization.hpp"
 #include "modules/mesh_deformation/superseded_surface.hpp"
 
 namespace km {

@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "modules/mesh/grid_cell.hpp"
-#include "modules/mesh_deformation/mesh_node.hpp"
 
 namespace km {
 namespace {

@@ -4,8 +4,6 @@
 #include <cmath>
 #include <utility>
 
-#include "modules/core/lie.hpp"
-
 namespace km {
 namespace {
 

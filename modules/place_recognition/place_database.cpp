@@ -1,7 +1,6 @@
 #include "modules/place_recognition/place_database.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <stdexcept>
 #include <string>
 #include <utility>

@@ -4,8 +4,6 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <cstddef>
-#include <span>
 #include <stdexcept>
 #include <utility>
 

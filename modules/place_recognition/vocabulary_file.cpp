@@ -6,7 +6,6 @@
 #include <cstring>
 #include <fstream>
 #include <stdexcept>
-#include <string>
 
 #include "modules/core/input_file.hpp"
 

@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "modules/place_recognition/hamming.hpp"
-#include "modules/place_recognition/vocabulary.hpp"
 
 namespace km {
 namespace {

@@ -1,6 +1,5 @@
 #include "modules/rbcd/truncated_newton.hpp"
 
-#include <algorithm>
 #include <cmath>
 
 namespace km {

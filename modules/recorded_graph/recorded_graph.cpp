@@ -1,10 +1,8 @@
 #include "modules/recorded_graph/recorded_graph.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <limits>
-#include <optional>
 #include <set>
 #include <stdexcept>
 

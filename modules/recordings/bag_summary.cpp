@@ -5,11 +5,9 @@
 #include <cmath>
 #include <cstdlib>
 #include <limits>
-#include <optional>
 #include <string_view>
 
 #include "modules/core/quantile.hpp"
-#include "modules/recordings/bag_reader.hpp"
 #include "modules/recordings/ros_messages.hpp"
 
 namespace km {

@@ -10,7 +10,6 @@
 #include <cerrno>
 #include <system_error>
 #include <tuple>
-#include <utility>
 
 #include "modules/core/input_file.hpp"
 

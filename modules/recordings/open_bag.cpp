@@ -1,13 +1,10 @@
 #include "modules/recordings/open_bag.hpp"
 
 #include <algorithm>
-#include <string>
 #include <string_view>
 #include <utility>
-#include <vector>
 
 #include "modules/core/input_file.hpp"
-#include "modules/recordings/bag_reader.hpp"
 #include "modules/recordings/chunked_file.hpp"
 #include "modules/recordings/mcap_records.hpp"
 

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "modules/security/authenticated_encryption.hpp"
-#include "modules/security/signing.hpp"
 
 namespace km {
 namespace {

@@ -4,13 +4,11 @@
 #include <cmath>
 #include <sstream>
 #include <utility>
-#include <vector>
 
 #include "modules/core/imu_limits.hpp"
 #include "modules/core/text_rows.hpp"
 #include "modules/core/text_table.hpp"
 #include "modules/recordings/ros_messages.hpp"
-#include "modules/sensors/sensor_messages.hpp"
 
 namespace km {
 namespace {

@@ -7,10 +7,8 @@
 #include <iterator>
 #include <memory>
 #include <sstream>
-#include <string>
 #include <utility>
 #include <variant>
-#include <vector>
 
 #include "modules/core/calibration_limits.hpp"
 #include "modules/core/image_size.hpp"
@@ -55,8 +53,6 @@ void check_depth_images(const std::string& recording, const std::vector<StereoPa
                      (first != nullptr ? ", first: " + first->depth.string() + ": no such image"
                                        : ": the stamps of depth images are too far away"));
 }
-
-namespace fs = std::filesystem;
 
 using Projection = Eigen::Matrix<double, 3, 4, Eigen::RowMajor>;
 
@@ -209,8 +205,6 @@ Camera read_seven_scenes_camera(const fs::path& file) {
   if (const auto problem = intrinsics_problem(camera)) refuse(file, rows[0].line, *problem);
   return camera;
 }
-
-namespace fs = std::filesystem;
 
 struct ListedImage {
   Stamp stamp = 0;

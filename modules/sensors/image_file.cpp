@@ -4,8 +4,6 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <optional>
-#include <string_view>
 #include <utility>
 
 #include "modules/core/image_size.hpp"

@@ -5,7 +5,6 @@
 #include <deque>
 #include <sstream>
 #include <stdexcept>
-#include <utility>
 
 #include "modules/core/calibration_limits.hpp"
 #include "modules/core/lie.hpp"

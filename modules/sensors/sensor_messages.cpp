@@ -1,19 +1,16 @@
 #include "modules/sensors/sensor_messages.hpp"
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <opencv2/imgproc.hpp>
 #include <optional>
-#include <string_view>
 #include <utility>
 
 #include "modules/core/image_size.hpp"
 #include "modules/core/text_rows.hpp"
-#include "modules/recordings/ros_messages.hpp"
 
 namespace km {
 namespace {

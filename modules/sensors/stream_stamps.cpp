@@ -2,12 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
 #include <cstdint>
 #include <iterator>
-#include <optional>
 #include <utility>
-#include <vector>
 
 #include "modules/core/quantile.hpp"
 #include "modules/core/text_table.hpp"

@@ -4,7 +4,6 @@
 #include <sstream>
 
 #include "modules/core/input_file.hpp"
-#include "modules/sensors/dataset_reader.hpp"
 #include "modules/sensors/stream_stamps.hpp"
 
 namespace km {

@@ -1,14 +1,11 @@
 #include "modules/team_map/team_map.hpp"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <map>
 #include <optional>
 #include <utility>
-#include <vector>
 
 #include "modules/team_map/surface_fusion.hpp"
 

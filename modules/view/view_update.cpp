@@ -1,7 +1,6 @@
 #include "modules/view/view_update.hpp"
 
 #include <stdexcept>
-#include <string>
 #include <utility>
 
 #include "modules/core/byte_archive.hpp"

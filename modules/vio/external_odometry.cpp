@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "modules/core/covariance.hpp"
-#include "modules/core/lie.hpp"
 #include "modules/vio/keyframe_rule.hpp"
 
 namespace km {

@@ -1,6 +1,5 @@
 #include "modules/vio/feature_detector.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <opencv2/features2d.hpp>
 

@@ -8,9 +8,6 @@
 #include <utility>
 
 #include "modules/core/depth_lookup.hpp"
-#include "modules/vio/feature_detector.hpp"
-#include "modules/vio/patches.hpp"
-#include "modules/vio/track_motion.hpp"
 
 namespace km {
 namespace {

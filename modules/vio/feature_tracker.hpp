@@ -4,7 +4,6 @@
 #include <memory>
 #include <optional>
 #include <random>
-#include <span>
 #include <vector>
 
 #include "modules/core/camera.hpp"

@@ -2,14 +2,10 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
-#include <cmath>
 #include <iterator>
 #include <utility>
 
 #include "modules/core/lie.hpp"
-#include "modules/vio/motion_prior.hpp"
-#include "modules/vio/window.hpp"
-#include "modules/vio/window_optimizer.hpp"
 
 namespace km {
 namespace {

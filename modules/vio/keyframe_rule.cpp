@@ -5,7 +5,6 @@
 #include <numbers>
 
 #include "modules/core/covariance.hpp"
-#include "modules/core/lie.hpp"
 #include "modules/core/measurement_limits.hpp"
 
 namespace km {

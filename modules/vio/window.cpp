@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <optional>
-#include <span>
 #include <utility>
 
 #include "modules/core/lie.hpp"

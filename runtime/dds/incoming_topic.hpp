@@ -8,10 +8,8 @@
 #include <map>
 #include <memory>
 #include <mutex>
-#include <optional>
 #include <span>
 #include <string>
-#include <vector>
 
 #include "modules/core/pending_messages.hpp"
 #include "runtime/dds/fair_queue.hpp"

@@ -1,11 +1,9 @@
 #include "runtime/dds/outgoing_topic.hpp"
 
 #include <algorithm>
-#include <utility>
 
 #include "runtime/clock.hpp"
 #include "runtime/dds/envelope.hpp"
-#include "runtime/dds/qos.hpp"
 #include "runtime/log.hpp"
 
 namespace km {

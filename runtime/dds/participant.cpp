@@ -16,7 +16,6 @@
 #include <cmath>
 #include <cstring>
 #include <future>
-#include <memory>
 #include <sstream>
 #include <string_view>
 #include <system_error>

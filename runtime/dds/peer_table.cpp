@@ -1,7 +1,6 @@
 #include "runtime/dds/peer_table.hpp"
 
 #include <algorithm>
-#include <functional>
 #include <tuple>
 
 namespace km {

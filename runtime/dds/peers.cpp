@@ -2,9 +2,7 @@
 
 #include <algorithm>
 #include <array>
-#include <memory>
 #include <string>
-#include <string_view>
 #include <utility>
 
 #include "runtime/clock.hpp"

@@ -1,6 +1,5 @@
 #include "runtime/dds/robot_status.hpp"
 
-#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cmath>

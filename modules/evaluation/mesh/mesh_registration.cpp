@@ -5,7 +5,6 @@
 #include <cmath>
 #include <opencv2/core/utility.hpp>
 #include <optional>
-#include <vector>
 
 #include "modules/core/lie.hpp"
 #include "modules/core/symmetric_eigen.hpp"

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "runtime/dds/codec.hpp"
 #include "runtime/dds/wire_pose.hpp"
 
 namespace km {

@@ -2,15 +2,11 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <cstdint>
 #include <utility>
-#include <vector>
 
-#include "modules/core/keyframe.hpp"
 #include "modules/loop_closure/keyframe_features.hpp"
 #include "modules/loop_closure/keyframe_reply.hpp"
 #include "modules/loop_closure/matching.hpp"
-#include "modules/place_recognition/vocabulary.hpp"
 #include "runtime/clock.hpp"
 #include "runtime/log.hpp"
 

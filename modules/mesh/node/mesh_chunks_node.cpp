@@ -3,7 +3,6 @@
 #include <utility>
 
 #include "modules/mesh/chunk_packing.hpp"
-#include "modules/mesh/mesh_chunks.hpp"
 #include "runtime/clock.hpp"
 #include "runtime/log.hpp"
 

@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "modules/mesh/chunk_packing.hpp"
-#include "runtime/dds/codec.hpp"
 
 namespace km {
 namespace {

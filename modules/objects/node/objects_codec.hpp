@@ -2,7 +2,6 @@
 
 #include <objects.h>
 
-#include <cstdint>
 #include <vector>
 
 #include "modules/objects/map_object.hpp"

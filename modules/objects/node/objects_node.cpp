@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "modules/objects/object_merging.hpp"
-#include "runtime/clock.hpp"
 #include "runtime/log.hpp"
 
 namespace km {

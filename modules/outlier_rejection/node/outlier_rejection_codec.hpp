@@ -3,7 +3,6 @@
 #include <outlier_rejection.h>
 
 #include <cstddef>
-#include <cstdint>
 #include <vector>
 
 #include "modules/core/pose_graph.hpp"

@@ -2,8 +2,6 @@
 
 #include <utility>
 
-#include "runtime/dds/codec.hpp"
-
 namespace km {
 namespace {
 

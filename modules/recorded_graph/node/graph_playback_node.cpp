@@ -1,6 +1,5 @@
 #include "modules/recorded_graph/node/graph_playback_node.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <condition_variable>
 #include <mutex>

@@ -4,7 +4,6 @@
 #include <chrono>
 #include <cstddef>
 #include <functional>
-#include <stop_token>
 #include <vector>
 
 #include "modules/core/covariance.hpp"

@@ -1,13 +1,10 @@
 #include "modules/ros_dds/node/ros_output_node.hpp"
 
 #include <algorithm>
-#include <utility>
 
 #include "modules/core/text_table.hpp"
 #include "modules/images/image_codec.hpp"
 #include "modules/images/image_view.hpp"
-#include "modules/recordings/ros_messages.hpp"
-#include "modules/ros_dds/drawings.hpp"
 #include "runtime/clock.hpp"
 #include "runtime/thread.hpp"
 

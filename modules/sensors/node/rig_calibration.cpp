@@ -9,7 +9,6 @@
 #include "modules/core/input_file.hpp"
 #include "modules/recordings/ros_camera.hpp"
 #include "modules/sensors/dataset_reader.hpp"
-#include "modules/sensors/node/calibration_map.hpp"
 #include "modules/sensors/node/open_folder.hpp"
 
 namespace km {

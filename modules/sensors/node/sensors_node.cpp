@@ -2,7 +2,6 @@
 
 #include <optional>
 #include <sstream>
-#include <string>
 #include <utility>
 
 #include "modules/core/text_table.hpp"
