@@ -1,4 +1,5 @@
 #include "modules/mesh/surface_filter.hpp"
+#include "test/support/grid_mesh.hpp"
 #include "test/support/test.hpp"
 
 namespace km {
@@ -11,24 +12,13 @@ constexpr float kCell_m = 0.05F;
 LabelledMesh noisy_corner(float noise_m) {
   std::mt19937 random(1);
   std::normal_distribution<float> noise(0.0F, noise_m);
-  LabelledMesh mesh;
-  for (int i = 0; i <= kCells; ++i)
-    for (int j = 0; j <= kCells; ++j) {
-      const float along = kCell_m * static_cast<float>(i);
-      const float x = std::min(along, 1.5F), z = std::max(along - 1.5F, 0.0F);
-      const float e = noise_m > 0.0F ? noise(random) : 0.0F;
-      mesh.vertices.emplace_back(x + (z > 0.0F ? e : 0.0F), kCell_m * static_cast<float>(j),
-                                 z + (z > 0.0F ? 0.0F : e));
-    }
-  for (int i = 0; i < kCells; ++i)
-    for (int j = 0; j < kCells; ++j) {
-      const auto at = [&](int a, int b) {
-        return static_cast<std::uint32_t>(a * (kCells + 1) + b);
-      };
-      mesh.faces.push_back({at(i, j), at(i + 1, j), at(i + 1, j + 1)});
-      mesh.faces.push_back({at(i, j), at(i + 1, j + 1), at(i, j + 1)});
-    }
-  return mesh;
+  return grid_mesh(kCells, kCells, [&](std::size_t i, std::size_t j) {
+    const float along = kCell_m * static_cast<float>(i);
+    const float x = std::min(along, 1.5F), z = std::max(along - 1.5F, 0.0F);
+    const float e = noise_m > 0.0F ? noise(random) : 0.0F;
+    return Eigen::Vector3f(x + (z > 0.0F ? e : 0.0F), kCell_m * static_cast<float>(j),
+                           z + (z > 0.0F ? 0.0F : e));
+  });
 }
 
 // Rms distance to the two planes.

@@ -8,6 +8,7 @@
 
 #include "modules/core/geometry.hpp"
 #include "modules/mesh/map_mesh.hpp"
+#include "test/support/grid_mesh.hpp"
 
 namespace km {
 
@@ -31,25 +32,20 @@ inline std::size_t keyframe_count(const SheetSize& size) {
 
 inline MapMesh sheet(const SheetSize& size) {
   MapMesh map;
-  const auto width = static_cast<std::uint32_t>(size.rows + 1);
+  map.mesh = grid_mesh(size.columns, size.rows, [&](std::size_t i, std::size_t j) {
+    const double x = static_cast<double>(i) * size.step_m;
+    const double y = static_cast<double>(j) * size.step_m;
+    return Eigen::Vector3f(Eigen::Vector3d(x, y, 0.0).cast<float>());
+  });
   const auto last = static_cast<KeyframeIndex>(keyframe_count(size) - 1);
-  for (std::size_t i = 0; i <= size.columns; ++i)
-    for (std::size_t j = 0; j <= size.rows; ++j) {
-      const double x = static_cast<double>(i) * size.step_m;
-      const double y = static_cast<double>(j) * size.step_m;
-      const auto near = static_cast<KeyframeIndex>(x / size.keyframe_step_m);
-      map.mesh.vertices.push_back(Eigen::Vector3d(x, y, 0.0).cast<float>());
-      map.mesh.labels.push_back(static_cast<LabelId>(i % 7));
-      map.seen_by.push_back({near < 2 ? 0 : near - 2, std::min(near + 2, last)});
-      map.ids.push_back(map.ids.size());
-    }
-  for (std::uint32_t i = 0; i < size.columns; ++i)
-    for (std::uint32_t j = 0; j < size.rows; ++j) {
-      const std::uint32_t a = i * width + j;
-      const std::uint32_t b = a + width;
-      map.mesh.faces.push_back({a, b, b + 1});
-      map.mesh.faces.push_back({a, b + 1, a + 1});
-    }
+  for (std::size_t v = 0; v < map.mesh.vertices.size(); ++v) {
+    const std::size_t i = v / (size.rows + 1);
+    const double x = static_cast<double>(i) * size.step_m;
+    const auto near = static_cast<KeyframeIndex>(x / size.keyframe_step_m);
+    map.mesh.labels.push_back(static_cast<LabelId>(i % 7));
+    map.seen_by.push_back({near < 2 ? 0 : near - 2, std::min(near + 2, last)});
+    map.ids.push_back(v);
+  }
   return map;
 }
 

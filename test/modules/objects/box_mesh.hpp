@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "modules/mesh/labelled_mesh.hpp"
+#include "test/support/grid_mesh.hpp"
 
 namespace km {
 
@@ -18,21 +18,16 @@ struct TestMap {
   /// Adds a sheet of squares of 0.1 m from `origin` along `u` and `v` [m].
   void add_sheet(const Eigen::Vector3d& origin, const Eigen::Vector3d& u, const Eigen::Vector3d& v,
                  LabelId label, std::array<KeyframeIndex, 2> seen) {
-    const auto columns = static_cast<std::uint32_t>(std::lround(u.norm() / 0.1));
-    const auto rows = static_cast<std::uint32_t>(std::lround(v.norm() / 0.1));
-    const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
-    for (std::uint32_t r = 0; r <= rows; ++r)
-      for (std::uint32_t c = 0; c <= columns; ++c) {
-        mesh.vertices.emplace_back((origin + u * c / columns + v * r / rows).cast<float>());
-        mesh.labels.push_back(label);
-        seen_by.push_back(seen);
-      }
-    for (std::uint32_t r = 0; r < rows; ++r)
-      for (std::uint32_t c = 0; c < columns; ++c) {
-        const std::uint32_t a = first + r * (columns + 1) + c, b = a + columns + 1;
-        mesh.faces.push_back({a, a + 1, b});
-        mesh.faces.push_back({a + 1, b + 1, b});
-      }
+    const double columns = std::round(u.norm() / 0.1), rows = std::round(v.norm() / 0.1);
+    LabelledMesh sheet = grid_mesh(
+        static_cast<std::size_t>(columns), static_cast<std::size_t>(rows),
+        [&](std::size_t c, std::size_t r) -> Eigen::Vector3f {
+          return (origin + u * static_cast<double>(c) / columns + v * static_cast<double>(r) / rows)
+              .cast<float>();
+        });
+    sheet.labels.assign(sheet.vertices.size(), label);
+    seen_by.insert(seen_by.end(), sheet.vertices.size(), seen);
+    mesh.append(sheet);
   }
 
   /// Adds the four walls and the top of a box.

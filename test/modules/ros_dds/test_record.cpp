@@ -5,6 +5,7 @@
 #include "modules/ros_dds/ros_sink.hpp"
 #include "runtime/log.hpp"
 #include "test/modules/recordings/bag_contents.hpp"
+#include "test/support/grid_mesh.hpp"
 #include "test/support/temporary_folder.hpp"
 #include "test/support/test.hpp"
 
@@ -284,21 +285,14 @@ TEST_CASE("A large mesh is published as a bounded number of vertices from all it
   }
 }
 
-// A square of `n` by `n` cells, two faces each, of 5 cm.
-LabelledMesh square(std::uint32_t n) {
-  LabelledMesh mesh;
-  for (std::uint32_t y = 0; y <= n; ++y)
-    for (std::uint32_t x = 0; x <= n; ++x) {
-      mesh.vertices.emplace_back(0.05F * static_cast<float>(x), 0.05F * static_cast<float>(y),
-                                 1.0F);
-      mesh.colors.push_back({static_cast<std::uint8_t>(x), static_cast<std::uint8_t>(y), 0});
-    }
-  for (std::uint32_t y = 0; y < n; ++y)
-    for (std::uint32_t x = 0; x < n; ++x) {
-      const std::uint32_t corner = y * (n + 1) + x;
-      mesh.faces.push_back({corner, corner + 1, corner + n + 2});
-      mesh.faces.push_back({corner, corner + n + 2, corner + n + 1});
-    }
+// A square of `n` by `n` cells of 5 cm.
+LabelledMesh square(std::size_t n) {
+  LabelledMesh mesh = grid_mesh(n, n, [](std::size_t x, std::size_t y) {
+    return Eigen::Vector3f(0.05F * static_cast<float>(x), 0.05F * static_cast<float>(y), 1.0F);
+  });
+  for (std::size_t v = 0; v < mesh.vertices.size(); ++v)
+    mesh.colors.push_back(
+        {static_cast<std::uint8_t>(v / (n + 1)), static_cast<std::uint8_t>(v % (n + 1)), 0});
   return mesh;
 }
 

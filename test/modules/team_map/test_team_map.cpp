@@ -1,5 +1,6 @@
 #include "modules/mesh/team_mesh.hpp"
 #include "modules/team_map/team_map.hpp"
+#include "test/support/grid_mesh.hpp"
 #include "test/support/test.hpp"
 
 namespace km {
@@ -9,20 +10,11 @@ constexpr float kMapVoxel_m = 0.05F;
 
 // Waves over a floor of 4 m x 3 m, from x = `from_m` on, lifted by `lift_m`.
 LabelledMesh floor_from(float from_m, float lift_m, LabelId label = 1) {
-  constexpr int kCells = 80;
-  LabelledMesh mesh;
-  for (int y = 0; y <= kCells; ++y)
-    for (int x = 0; x <= kCells; ++x) {
-      const float px = from_m + 0.05F * static_cast<float>(x), py = 0.0375F * static_cast<float>(y);
-      mesh.vertices.emplace_back(px, py, lift_m + 0.2F * std::sin(px) * std::cos(py));
-      mesh.labels.push_back(label);
-    }
-  for (std::uint32_t y = 0; y < kCells; ++y)
-    for (std::uint32_t x = 0; x < kCells; ++x) {
-      const std::uint32_t a = x + (kCells + 1) * y, b = a + kCells + 1;
-      mesh.faces.push_back({a, a + 1, b + 1});
-      mesh.faces.push_back({a, b + 1, b});
-    }
+  LabelledMesh mesh = grid_mesh(80, 80, [&](std::size_t i, std::size_t j) {
+    const float x = from_m + 0.05F * static_cast<float>(i), y = 0.0375F * static_cast<float>(j);
+    return Eigen::Vector3f(x, y, lift_m + 0.2F * std::sin(x) * std::cos(y));
+  });
+  mesh.labels.assign(mesh.vertices.size(), label);
   return mesh;
 }
 
