@@ -176,10 +176,6 @@ TEST_CASE("The journal stops after all nodes that find closures and before those
   CHECK(place_of("journal") < place_of("recorder"));
 }
 
-KeyframeId keyframe_of(RobotId robot, KeyframeIndex index) {
-  return {.robot = robot, .index = index};
-}
-
 Closure closure_of(KeyframeId from, KeyframeId to) {
   Closure closure;
   closure.from.id = from;
@@ -193,13 +189,11 @@ TEST_CASE("A restored closure follows the last keyframe on which it ends") {
   RestoredRun run;
   run.robot = kSelf;
   for (KeyframeIndex i = 0; i < 4; ++i) {
-    run.odometry.push_back({.id = keyframe_of(kSelf, i)});
-    run.keyframes.emplace_back().odometry.id = keyframe_of(kSelf, i);
+    run.odometry.push_back({.id = {kSelf, i}});
+    run.keyframes.emplace_back().odometry.id = {kSelf, i};
   }
-  run.closures = {closure_of(keyframe_of(kSelf, 3), keyframe_of(kSelf, 1)),
-                  closure_of(keyframe_of(kSelf, 0), keyframe_of(kSelf, 2)),
-                  closure_of(keyframe_of(2, 70), keyframe_of(kSelf, 1)),
-                  closure_of(keyframe_of(0, 5), keyframe_of(2, 9))};
+  run.closures = {closure_of({kSelf, 3}, {kSelf, 1}), closure_of({kSelf, 0}, {kSelf, 2}),
+                  closure_of({2, 70}, {kSelf, 1}), closure_of({0, 5}, {2, 9})};
 
   Topic<OdometryState> states;
   Topic<KeyframeOdometry> odometry;
