@@ -35,8 +35,9 @@ inline constexpr double kUnknownStep_m = 1e4;
 /// of its standard deviations are the most that it agrees with. Fixes 900 km away make a team
 /// reject true closures between other robots.
 inline constexpr Bounds<double> kFix_m{-4.0 * kUnknownStep_m, 4.0 * kUnknownStep_m};
-/// Standard deviation of the rotation of such a step: about that of a uniform rotation.
-inline constexpr double kUnknownTurn_rad = 2.0;
+/// Standard deviation of the rotation of such a step. A turn by pi then costs 0.01 in the cost of
+/// the pose graph. That of a uniform rotation would pull the two runs towards one attitude.
+inline constexpr double kUnknownTurn_rad = 20.0;
 
 /// Standard deviation of the tilt of a vertical [rad].
 inline constexpr Bounds<double> kTiltSigma_rad{1e-4, 1.6};

@@ -43,7 +43,7 @@ class PlacedRun {
   }
   /// Adds a keyframe after an unknown step.
   void jump(const SE3& T_frame_kf, const SE3& T_previous_kf) {
-    add(T_frame_kf, T_previous_kf, isotropic(2.0, kUnknownStep_m));
+    add(T_frame_kf, T_previous_kf, isotropic(kUnknownTurn_rad, kUnknownStep_m));
   }
   /// Adds the remaining keyframes, with noise.
   void walk(const SE3& step) {
