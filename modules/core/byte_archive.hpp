@@ -16,6 +16,7 @@
 #include "modules/core/bytes.hpp"
 #include "modules/core/geometry.hpp"
 #include "modules/core/ids.hpp"
+#include "modules/core/measurement_limits.hpp"
 #include "modules/core/stamp.hpp"
 
 namespace km {
@@ -136,8 +137,8 @@ class ArchiveWriter {
 };
 
 /// Reads the bytes of an ArchiveWriter without trusting them. After the first impossible value it
-/// has failed and assigns zeros and empty lists. Numbers that are not finite are impossible. The
-/// bytes must outlive the archive.
+/// has failed and assigns zeros and empty lists. Numbers that are not finite, and transforms that
+/// are not rigid, are impossible. The bytes must outlive the archive.
 class ArchiveReader {
  public:
   static constexpr bool kReads = true;
@@ -229,6 +230,10 @@ class ArchiveReader {
     T = SE3::Identity();
     for (int column = 0; column < 4; ++column)
       for (int row = 0; row < 3; ++row) get(T.matrix()(row, column));
+    const Eigen::Matrix3d R = T.linear();
+    require((R.transpose() * R - Eigen::Matrix3d::Identity()).norm() <= kUnitTolerance &&
+            R.determinant() > 0.0 && kPosition_m.contains(T.translation().minCoeff()) &&
+            kPosition_m.contains(T.translation().maxCoeff()));
   }
   template <typename Scalar, int kRows>
   void get(Eigen::Matrix<Scalar, kRows, 1>& vector) {

@@ -174,6 +174,12 @@ TEST_CASE("Bytes that are no journal entry are refused") {
   OdometryState nowhere;
   nowhere.v_odom.x() = std::numeric_limits<double>::quiet_NaN();
   CHECK_FALSE(decode_journal_entry(encode_journal_entry(nowhere)).value);
+  OdometryState bent, mirrored, far;
+  bent.T_odom_body.linear() *= 1.01;
+  mirrored.T_odom_body.linear().col(0) *= -1.0;
+  far.T_odom_body.translation().z() = 1e9;
+  for (const OdometryState& state : {bent, mirrored, far})
+    CHECK_FALSE(decode_journal_entry(encode_journal_entry(state)).value);
   CHECK_FALSE(decode_journal_entry(std::vector<std::uint8_t>{200}).value);
   KeyframeOdometry keyframe{.id = {}, .state_covariance = 1e-4 * StateCovariance::Identity()};
   CHECK(decode_journal_entry(encode_journal_entry(keyframe)).value);
