@@ -190,18 +190,14 @@ void write_internal(std::ostream& xml, const DdsConfig& config) {
   if (config.max_init_transmit_percent >= 0)
     xml << "<MaxInitTransmit>" << config.max_init_transmit_percent << "</MaxInitTransmit>";
   xml << "</BurstSize><MaxSampleSize>" << kMaxSampleBytes << "B</MaxSampleSize><NackDelay>"
-      << milliseconds(config.nack_delay_ms * 1e-3)
-      << "</NackDelay>"
-      // Several receive threads end only when they receive a packet, which a robot cannot send to
-      // itself once its address has gone.
-      << "<MultipleReceiveThreads>false</MultipleReceiveThreads>"
+      << milliseconds(config.nack_delay_ms * 1e-3) << "</NackDelay>" << kOneReceiveThread
       << "<Watermarks><WhcHigh>64MB</WhcHigh><WhcHighInit>64MB</WhcHighInit>"
          "<WhcAdaptive>false</WhcAdaptive></Watermarks></Internal>";
 }
 
 // DDS reports trouble with the network here, from its own threads.
 void log_line(void* /*argument*/, const dds_log_data_t* data) {
-  std::string_view text(data->message + data->hdrsize);
+  std::string_view text(data->message);
   while (!text.empty() && text.back() == '\n') text.remove_suffix(1);
   const bool severe = (data->priority & (DDS_LC_FATAL | DDS_LC_ERROR)) != 0;
   const auto level = severe ? log::Level::kError : log::Level::kWarn;
@@ -383,6 +379,8 @@ std::optional<NetworkInterface> DdsParticipant::new_interface(double now_s) {
 
 void DdsParticipant::move_to(const NetworkInterface& interface) {
   const DdsConfig config = domain_->config();
+  const NetworkInterface former = this->interface();
+  const bool is_same = former.name == interface.name && former.address == interface.address;
   ++moves_;
   participant_ = {};
   domain_.reset();
@@ -394,7 +392,8 @@ void DdsParticipant::move_to(const NetworkInterface& interface) {
   try {
     domain_ = std::make_shared<const DdsDomain>(config, interface);
     join();
-    log::info("dds") << "moved to interface " << interface.name << " (" << interface.address << ')';
+    log::info("dds") << (is_same ? "new participant on" : "moved to") << " interface "
+                     << interface.name << " (" << interface.address << ')';
   } catch (const DdsError& error) {
     log::warn("dds") << error.what() << ": trying again";
     domain_.reset();

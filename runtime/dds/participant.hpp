@@ -14,6 +14,11 @@
 
 namespace km {
 
+/// Part of the configuration of a domain. Several receive threads end only when they receive a
+/// packet, which a program cannot send to itself behind a firewall or once its address has gone.
+inline constexpr const char* kOneReceiveThread =
+    "<MultipleReceiveThreads>false</MultipleReceiveThreads>";
+
 /// IPv4 interfaces of this host that are up, in the kernel's order. Their routes are those to the
 /// IPv4 addresses (with or without ":port") in `hosts`; names are ignored. If there is none, it is
 /// the route of multicast, which is the default route on most hosts.
@@ -79,8 +84,10 @@ class DdsParticipant {
   /// of the former participant are gone then. Precondition: the caller has use_alone(). Throws
   /// DdsError.
   void move_to(const NetworkInterface& interface);
-  /// False while it waits for its interface, or if it shares its domain.
-  [[nodiscard]] bool can_move() const { return choice_ && !choice_->waits(); }
+  /// False while its interface has gone, or if it shares its domain.
+  [[nodiscard]] bool can_move() const {
+    return choice_ && (!choice_->waits() || interface().loopback);
+  }
   /// Number of calls of move_to(). Call with use().
   [[nodiscard]] std::uint64_t moves() const { return moves_; }
 

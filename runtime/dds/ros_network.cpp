@@ -57,7 +57,8 @@ std::string cyclone_xml(const RosConfig& config, const NetworkInterface& interfa
          "/></Interfaces></General><Discovery><ExternalDomainId>" + std::to_string(config.domain) +
          "</ExternalDomainId><ParticipantIndex>" + (peers.empty() ? "none" : "auto") +
          "</ParticipantIndex>" + peers + "</Discovery><Internal><SocketReceiveBufferSize max='" +
-         std::to_string(kReceiveBuffer_bytes) + "B'/></Internal></Domain></CycloneDDS>";
+         std::to_string(kReceiveBuffer_bytes) + "B'/>" + kOneReceiveThread +
+         "</Internal></Domain></CycloneDDS>";
 }
 
 }  // namespace

@@ -169,6 +169,21 @@ TEST_CASE("The doctor finds that multicast does not pass") {
   CHECK(look.ids() == "network.multicast ");
 }
 
+TEST_CASE("The doctor ends behind a firewall that drops what nobody has asked for") {
+  if (!VirtualNetwork::available()) return;
+  const VirtualNetwork network(1);
+  for (const char* const rule :
+       {"table ip f", "chain ip f i {type filter hook input priority 0; policy drop;}",
+        "rule ip f i iifname lo accept", "rule ip f i ct state established,related accept"})
+    if (Process(words_of("nft add " + std::string(rule)), network.host(1)).wait() != 0) {
+      WARN("nft cannot make a firewall here");
+      return;
+    }
+  const Look look(network, {});
+  CHECK(look.exit_code() == 2);
+  CHECK(look.ids() == "network.multicast ");
+}
+
 TEST_CASE("The doctor finds that a peer is out of reach, or that no robot runs there") {
   if (!VirtualNetwork::available()) return;
   VirtualNetwork network(2);
