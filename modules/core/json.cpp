@@ -14,7 +14,14 @@ std::string json_text(const Json& json) {
 }
 
 Json read_json(const std::filesystem::path& file) try {
-  return Json::parse(read_input_file(file));
+  constexpr int kMostLevels = 64;  // millions of brackets would take all memory
+  return Json::parse(read_input_file(file), [](int level, Json::parse_event_t, const Json&) {
+    if (level > kMostLevels)
+      throw std::length_error("nested deeper than " + std::to_string(kMostLevels) + " levels");
+    return true;
+  });
+} catch (const std::length_error& error) {
+  throw std::runtime_error(file.string() + ": " + error.what());
 } catch (const Json::exception& error) {
   throw std::runtime_error(file.string() + ": " + readable(error.what()));
 }

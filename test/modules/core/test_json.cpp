@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "test/support/temporary_folder.hpp"
 #include "test/support/test.hpp"
 
 namespace km {
@@ -19,6 +20,16 @@ TEST_CASE("JSON text keeps keys in order and numbers exact and is always valid")
   const Json again = Json::parse(text);
   CHECK(again["a \"q\"\n"] == third);
   CHECK(again["torn"] == "\xEF\xBF\xBD!");
+}
+
+TEST_CASE("A JSON file of brackets is refused at the level that is too deep") {
+  const TemporaryFolder folder;
+  for (const std::size_t levels : {60U, 1'000'000U}) {
+    const auto file = folder.write("deep.json", std::string(levels, '['));
+    CHECK_THROWS_WITH(read_json(file), Contains("deep.json: ") &&
+                                           Contains(levels > 64 ? "nested deeper than 64 levels"
+                                                                : "unexpected end"));
+  }
 }
 
 }  // namespace km
