@@ -217,7 +217,10 @@ int PageServer::serve(mg_connection* connection) {
 // binary message has a frame of its own. An empty frame shows whether the page is still there.
 int PageServer::send_messages(mg_connection* connection) {
   const std::string id = parameter(connection, "page");
-  if (!open(id, mg_get_request_info(connection)->remote_addr)) return refuse(connection);
+  if (!open(id, mg_get_request_info(connection)->remote_addr)) {
+    mg_send_http_error(connection, 503, "%s", "Too many pages are open: close one.");
+    return 503;
+  }
   begin_answer(connection, "application/octet-stream", {});
   bool there = send(connection, false, '[' + options_.hello + ']');
   ViewStore::Cursor cursor;

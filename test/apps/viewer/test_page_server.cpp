@@ -139,7 +139,7 @@ TEST_CASE("Pages beyond the limit are refused, and files are served still") {
     pages.push_back(std::make_unique<PageListener>(port, "/updates?page=" + std::to_string(i)));
     REQUIRE(pages.back()->receives("hello"));
   }
-  CHECK(post(port, "/updates?page=48").status == 404);
+  CHECK(post(port, "/updates?page=48").status == 503);
   CHECK(get(port, "/").status == 200);
 }
 
