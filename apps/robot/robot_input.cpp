@@ -143,8 +143,11 @@ std::optional<ResumedMap> restore_map(const fs::path& folder, const RestoredRun&
 }
 
 // A finished run, which has a keyframe.
-RestoredRun open_finished(const fs::path& folder) {
+RestoredRun open_finished(const fs::path& folder, const fs::path& output) {
   const fs::path file = folder / kJournal;
+  std::error_code none;
+  if (fs::equivalent(folder, output, none))
+    throw std::invalid_argument(file.string() + ": is in the folder of --output: give another one");
   RestoredRun run = restore_run(file);
   report_damage(file, run);
   if (run.keyframes.empty())
@@ -154,7 +157,7 @@ RestoredRun open_finished(const fs::path& folder) {
 
 // Keyframes without an optimised pose follow the last one with such a pose by odometry.
 FinishedMap open_finished_map(const RobotOptions& options) {
-  RestoredRun run = open_finished(options.localize);
+  RestoredRun run = open_finished(options.localize, options.output);
   FinishedMap map{std::move(run.keyframes), std::move(run.solution.trajectory.T_world_kf)};
   map.T_map_kf.resize(std::min(map.T_map_kf.size(), map.keyframes.size()));
   while (map.T_map_kf.size() < map.keyframes.size()) {
@@ -171,10 +174,7 @@ FinishedMap open_finished_map(const RobotOptions& options) {
 // time.
 RestoredRun open_run_to_extend(const RobotOptions& options) {
   const fs::path file = options.extend / kJournal;
-  std::error_code none;
-  if (fs::equivalent(options.extend, options.output, none))
-    throw std::invalid_argument(file.string() + ": is in the folder of --output: give another one");
-  RestoredRun run = open_finished(options.extend);
+  RestoredRun run = open_finished(options.extend, options.output);
   if (run.robot != options.robot)
     throw std::invalid_argument(file.string() + ": is of robot " + std::to_string(run.robot) +
                                 ": give --robot " + std::to_string(run.robot));
@@ -488,7 +488,8 @@ std::optional<RobotInput> open_robot_input(const RobotOptions& options, const Ro
                                            const std::optional<MappingPlan>& mapping,
                                            const RigInput& rig, SignalWatch& signals) {
   if (!options.session.empty())
-    return RobotInput{PastRun(), {}, alone_as(options.robot, open_finished(options.session))};
+    return RobotInput{
+        PastRun(), {}, alone_as(options.robot, open_finished(options.session, options.output))};
   const bool is_dataset = options.is_live || !options.dataset.empty();
   const fs::path& path = options.is_live ? options.rig
                          : is_dataset    ? options.dataset

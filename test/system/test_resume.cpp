@@ -340,16 +340,22 @@ TEST_CASE("A journal with flipped bytes is continued or replaced, and a copy is 
   std::string journal = folder.read("run/run.journal");
   journal[journal.size() / 2] ^= 1;
   folder.write("run/run.journal", journal);
+  const auto results = folder.path() / (is_session ? "session" : "run");
+  const std::string session =
+      KM_BIN_DIR "/kimera_multi_robot --robot 0 --serve-limit 0 --session " + output +
+      " --domain " + std::to_string(random_domain()) + " --output ";
+  if (is_session) {  // the results would be lost
+    const CommandResult onto_itself = run_command(session + output);
+    CHECK(onto_itself.exit_code == 1);
+    CHECK_THAT(onto_itself.output, Contains("is in the folder of --output"));
+    CHECK(folder.read("run/run.journal") == journal);
+  }
   const CommandResult again = succeeded(
-      is_session
-          ? run_command(KM_BIN_DIR "/kimera_multi_robot --robot 0 --serve-limit 0 --session " +
-                        output + " --output " + output + " --domain " +
-                        std::to_string(random_domain()))
-          : run_command(command + " --resume " + output));
+      run_command(is_session ? session + results.string() : command + " --resume " + output));
   CHECK_THAT(again.output, Contains("run.journal: ") && Contains(" on are damaged and left out") &&
                                Contains("run.journal.damaged"));
   CHECK(folder.read("run/run.journal.damaged") == journal);
-  CHECK(read_summary(fs::path(output) / "summary.json").keyframes == kLap);
+  CHECK(read_summary(results / "summary.json").keyframes == kLap);
 }
 
 TEST_CASE("A finished run is joined by another robot, and continued by its own robot only",
