@@ -19,18 +19,18 @@ namespace {
 constexpr const char* kFooter = R"(
 Examples
   One robot on a whole recording, in real time:
-    kimera_multi_robot --config config/datasets/euroc.yaml --robot 0 --dataset MH_01_easy --output results/a
+    kimera_multi_robot --config euroc --robot 0 --dataset MH_01_easy --output results/a
   Cameras without an inertial sensor: a sequence of KITTI odometry, and one of TUM RGB-D:
     kimera_multi_robot --robot 0 --dataset dataset/sequences/07 --rate max --output results/a
     kimera_multi_robot --robot 0 --dataset rgbd_dataset_freiburg1_desk --rate max --output results/b
   Two robots on two hosts of one network (any ids, they find each other):
-    hostA$ kimera_multi_robot --config config/datasets/euroc.yaml --robot 7  --name alice --dataset A --output results/a
-    hostB$ kimera_multi_robot --config config/datasets/euroc.yaml --robot 12 --name bob   --dataset B --output results/b
+    hostA$ kimera_multi_robot --config euroc --robot 7  --name alice --dataset A --output results/a
+    hostB$ kimera_multi_robot --config euroc --robot 12 --name bob   --dataset B --output results/b
   Without multicast:   --peers 10.0.0.2,10.0.0.3 --interface wlan0 --link wifi
   After a crash or an empty battery, continue the same run (same command, --resume in place of --output):
-    kimera_multi_robot --config config/datasets/euroc.yaml --robot 0 --dataset MH_01_easy --resume results/a
+    kimera_multi_robot --config euroc --robot 0 --dataset MH_01_easy --resume results/a
   A robot that localises itself in the map of an earlier run, and does not change it:
-    kimera_multi_robot --config config/datasets/euroc.yaml --robot 0 --dataset MH_02_easy --localize results/a --output results/b
+    kimera_multi_robot --config euroc --robot 0 --dataset MH_02_easy --localize results/a --output results/b
   The robot of an earlier run as a member of the team:
     kimera_multi_robot --robot 0 --session results/a --output results/yesterday
   Topics of a recording and the regularity of their stamps; then a robot on the topics that rig.yaml names:
@@ -42,7 +42,7 @@ Examples
   With a record that Foxglove, Lichtblick, Rerun and PlotJuggler open:
     kimera_multi_robot --robot 0 --dataset MH_01_easy --output results/a --record
   The back-end alone, on a recorded pose graph:
-    kimera_multi_robot --config config/datasets/tunnels.yaml --robot 3 --graph robot3.csv --rate max --output results/3
+    kimera_multi_robot --config tunnels --robot 3 --graph robot3.csv --rate max --output results/3
 
 Files written to --output: odometry.tum, live.tum, optimized.tum, optimized_keyframes.tum, pose_graph.g2o,
 loop_closures.csv, summary.json, config.yaml, run.journal (for --resume and --session) and others; with a map also

@@ -244,7 +244,8 @@ class FindingsOfRun {
       add(share < kFew ? kNote : kWarning, "frames.skipped",
           std::to_string(run_.frames_skipped) + " frames skipped, " + percent(share),
           "the processors were too slow: images were left out of odometry at even intervals",
-          "use --rate auto, which waits, a lower tracker.max_features or vio.window_keyframes, or "
+          "for a recording --rate auto, which waits; a lower tracker.max_features or "
+          "vio.window_keyframes, or "
           "a faster computer");
     }
     const bool all_used = run_.frames_skipped == 0;
@@ -410,8 +411,11 @@ class FindingsOfRun {
       add(share < kFew ? kNote : kWarning, "map.dropped_under_load",
           std::to_string(map.dropped_under_load) + " frames were left out of the map, " +
               percent(share),
-          "the processors were too slow, and odometry has priority: the map may have holes",
-          "use --rate auto, which waits, a lower mapping.rate_hz, a higher stereo_depth.downscale, "
+          map.frames == 0
+              ? "the processors were too slow, and odometry has priority: there is no map"
+              : "the processors were too slow, and odometry has priority: the map may have holes",
+          "for a recording --rate auto, which waits; a lower mapping.rate_hz, a higher "
+          "stereo_depth.downscale, "
           "or a faster computer");
     }
     if (map.blocks_refused > 0)
