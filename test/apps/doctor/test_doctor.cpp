@@ -169,7 +169,7 @@ TEST_CASE("The doctor finds that multicast does not pass") {
   CHECK(look.ids() == "network.multicast ");
 }
 
-TEST_CASE("The doctor ends behind a firewall that drops what nobody has asked for") {
+TEST_CASE("The doctor ends behind a firewall that passes answers only") {
   if (!VirtualNetwork::available()) return;
   const VirtualNetwork network(1);
   for (const char* const rule :
