@@ -230,9 +230,7 @@ class ArchiveReader {
     T = SE3::Identity();
     for (int column = 0; column < 4; ++column)
       for (int row = 0; row < 3; ++row) get(T.matrix()(row, column));
-    const Eigen::Matrix3d R = T.linear();
-    require((R.transpose() * R - Eigen::Matrix3d::Identity()).norm() <= kUnitTolerance &&
-            R.determinant() > 0.0 && kPosition_m.contains(T.translation().minCoeff()) &&
+    require(is_rigid(T, kUnitTolerance) && kPosition_m.contains(T.translation().minCoeff()) &&
             kPosition_m.contains(T.translation().maxCoeff()));
   }
   template <typename Scalar, int kRows>

@@ -22,6 +22,14 @@ inline double angle_of(const Eigen::Matrix3d& R) {
   return Eigen::AngleAxisd(R).angle();
 }
 
+/// True if `T` is finite, its rotation R does not mirror, and no entry of R^T R differs from the
+/// identity's by more than `tolerance`.
+inline bool is_rigid(const SE3& T, double tolerance) {
+  const Eigen::Matrix3d R = T.linear();
+  return T.matrix().allFinite() && R.determinant() > 0.0 &&
+         (R.transpose() * R - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() <= tolerance;
+}
+
 /// The transform with rotation `R` and translation `t`.
 inline SE3 make_pose(const Eigen::Matrix3d& R, const Eigen::Vector3d& t) {
   SE3 T = SE3::Identity();

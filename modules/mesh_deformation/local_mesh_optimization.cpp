@@ -25,15 +25,9 @@ void check(const MapMesh& map, std::size_t keyframes) {
              std::to_string(last) + ", of " + std::to_string(keyframes));
 }
 
-bool is_rigid(const SE3& T) {
-  const Eigen::Matrix3d R = T.linear();
-  if (!T.matrix().allFinite() || R.determinant() < 0.0) return false;
-  return (R.transpose() * R - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() < kRigidTolerance;
-}
-
 void check_poses(std::span<const SE3> poses, const char* what) {
   for (std::size_t i = 0; i < poses.size(); ++i)
-    if (!is_rigid(poses[i]))
+    if (!is_rigid(poses[i], kRigidTolerance))
       refuse(std::string(what) + " pose of keyframe " + std::to_string(i) +
              " is not finite or not rigid");
 }

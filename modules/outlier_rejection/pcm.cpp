@@ -7,21 +7,15 @@
 namespace km {
 namespace {
 
-constexpr double kOrthonormal = 1e-6;
-
-bool is_pose(const SE3& T) {
-  const Eigen::Matrix3d R = T.linear();
-  return T.matrix().allFinite() && (R.transpose() * R).isIdentity(kOrthonormal) &&
-         R.determinant() > 0.0;
-}
+constexpr double kOrthonormal = 1e-6;  // entries of R^T R
 
 }  // namespace
 
 bool is_usable(const Closure& closure) {
-  return closure.from.id != closure.to.id && is_pose(closure.from.T_odom_kf) &&
-         is_pose(closure.to.T_odom_kf) && is_pose(closure.T_from_to) &&
-         is_covariance(closure.from.covariance) && is_covariance(closure.to.covariance) &&
-         is_covariance(closure.covariance);
+  return closure.from.id != closure.to.id && is_rigid(closure.from.T_odom_kf, kOrthonormal) &&
+         is_rigid(closure.to.T_odom_kf, kOrthonormal) &&
+         is_rigid(closure.T_from_to, kOrthonormal) && is_covariance(closure.from.covariance) &&
+         is_covariance(closure.to.covariance) && is_covariance(closure.covariance);
 }
 
 void check_usable(const Closure& closure, RobotId a, RobotId b) {

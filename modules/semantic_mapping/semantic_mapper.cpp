@@ -11,6 +11,8 @@
 #include <utility>
 #include <vector>
 
+#include "modules/core/geometry.hpp"
+#include "modules/core/measurement_limits.hpp"
 #include "modules/mesh/coarse_view.hpp"
 #include "modules/semantic_mapping/block_fusion.hpp"
 #include "modules/semantic_mapping/block_map.hpp"
@@ -49,14 +51,6 @@ std::vector<DepthBand> bands_of(const SemanticMappingConfig& config) {
 SemanticMappingConfig complete(const SemanticMappingConfig& config) {
   if (!config.voxel_size_m) throw std::invalid_argument("mapping: no voxel_size_m");
   return checked(config);
-}
-
-bool usable(const SE3& T) {
-  constexpr double kTolerance = 1e-3;
-  const Eigen::Matrix3d R = T.linear();
-  return T.matrix().allFinite() &&
-         (R.transpose() * R - Eigen::Matrix3d::Identity()).norm() < kTolerance &&
-         R.determinant() > 0.0;
 }
 
 template <typename Image, typename Pixels>
@@ -296,7 +290,7 @@ IntegrationReport SemanticMapper::integrate(const DepthImage& depth, const Label
     report.status = IntegrationStatus::kDepthSizeDiffers;
     return report;
   }
-  if (!usable(T_odom_cam)) {
+  if (!is_rigid(T_odom_cam, kUnitTolerance)) {
     report.status = IntegrationStatus::kPoseUnusable;
     return report;
   }
