@@ -89,7 +89,7 @@ SE3 chain_of_next_run(const KeyframeOdometry& last) {
 }
 
 Matrix6 unknown_step_covariance(const std::optional<Eigen::Vector3d>& up_body) {
-  return upright_covariance(kMostHeading, kUnknownStep_m, up_body);
+  return upright_covariance(kUnknownTurn_rad, kUnknownStep_m, up_body);
 }
 
 }  // namespace km

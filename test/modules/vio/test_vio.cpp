@@ -1,4 +1,5 @@
 #include "modules/core/covariance.hpp"
+#include "modules/core/precision.hpp"
 #include "modules/vio/keyframe_rule.hpp"
 #include "modules/vio/vio.hpp"
 #include "synthetic_motion.hpp"
@@ -461,6 +462,13 @@ TEST_CASE("The covariance across a new start grows with the time without images 
   CHECK(is_covariance(anywhere));
   CHECK(anywhere.diagonal().maxCoeff() <= 1e6);
   CHECK(up.dot(anywhere.topLeftCorner<3, 3>() * up) < 4.0);
+}
+
+TEST_CASE("Between two runs no turn costs more than 0.05") {
+  const auto up = GENERATE(std::optional<Eigen::Vector3d>{},
+                           std::optional<Eigen::Vector3d>{Eigen::Vector3d::UnitZ()});
+  // The chordal cost kappa |R - R'|^2 is at most 8 kappa.
+  CHECK(8.0 * precision_of(unknown_step_covariance(up)).kappa < 0.05);
 }
 
 }  // namespace
