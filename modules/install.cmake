@@ -48,6 +48,8 @@ install(FILES ${PROJECT_BINARY_DIR}/kimera_multiConfig.cmake
 
 install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
 
+get_property(programs GLOBAL PROPERTY KM_PROGRAMS)
+add_custom_target(programs DEPENDS ${programs})
 install(TARGETS ${programs} RUNTIME COMPONENT programs)
 install(DIRECTORY config/ DESTINATION ${CMAKE_INSTALL_DATADIR}/kimera_multi COMPONENT programs
   PATTERN docker EXCLUDE PATTERN Doxyfile EXCLUDE PATTERN install_packages EXCLUDE PATTERN packages.txt EXCLUDE)
