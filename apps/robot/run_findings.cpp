@@ -326,8 +326,8 @@ class FindingsOfRun {
                               : ", the longest of " + std::to_string(holes.count) + " holes of " +
                                     fixed(holes.seconds, 1) + " s in all"),
         "the motion in this time is unknown: charts show a gap, and later poses are less certain",
-        run_.frames_skipped > 0 ? "frames were skipped: use --rate auto, which waits, or run fewer "
-                                  "robots on this computer"
+        run_.frames_skipped > 0 ? "frames were skipped: for a recording --rate auto, which waits; "
+                                  "fewer robots on this computer"
                                 : "see sensor_faults in summary.json for missing images, and the "
                                   "log for new starts of odometry");
   }
