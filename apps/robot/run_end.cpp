@@ -18,8 +18,8 @@ constexpr const char* kAllSettled = "all present robots have settled";
 std::string why_no_pose(const ImageCounts& images) {
   const std::size_t given = images.read + images.skipped;
   const std::size_t unusable = images.listed > given ? images.listed - given : 0;
-  return "no pose estimated: of " + std::to_string(images.listed) + " images, " +
-         std::to_string(unusable) + " could not be used, " + std::to_string(images.skipped) +
+  return "of " + std::to_string(images.listed) + " images, " + std::to_string(unusable) +
+         " could not be used, " + std::to_string(images.skipped) +
          " were skipped because processors were short, " + std::to_string(images.read) +
          " were read but odometry did not start on them";
 }
@@ -142,7 +142,9 @@ Verdict verdict_of_run(const RunEnd& end) {
             "no image came: kimera_multi_doctor --live RIG shows which topic is silent, and why"};
   if (end.result.interrupted) return {0, "interrupted"};
   if (end.images && end.images->with_pose == 0)
-    return {kNothingEstimated, why_no_pose(*end.images)};
+    return {kNothingEstimated,
+            "no pose estimated: " +
+                (end.odometry_fault.empty() ? why_no_pose(*end.images) : end.odometry_fault)};
   if (!end.odometry_fault.empty())
     return {kNothingEstimated, "odometry is wrong: " + end.odometry_fault};
   const std::string departure = end.departure != nullptr ? end.departure : "unknown";

@@ -146,6 +146,7 @@ TEST_CASE("A run is judged by the gravest that happened to it") {
                         {"out/b", "out/b: cannot be written: Is a directory"}};
   };
   const auto have_no_pose = [](RunEnd& end) { end.images->with_pose = 0; };
+  const auto have_fault = [](RunEnd& end) { end.odometry_fault = "a baseline of 110 m"; };
   const auto interrupt = [](RunEnd& end) { end.result.interrupted = true; };
   const auto take_id = [](RunEnd& end) { end.id_taken = true; };
   using Changes = std::vector<std::function<void(RunEnd&)>>;
@@ -156,9 +157,8 @@ TEST_CASE("A run is judged by the gravest that happened to it") {
        "no pose estimated: of 100 images, 4 could not be used, 6 were skipped because processors "
        "were short, 90 were read but odometry did not start on them"},
       {{[](RunEnd& end) { end.images.reset(); }}, 0, "all present robots have settled"},
-      {{[](RunEnd& end) { end.odometry_fault = "a baseline of 110 m"; }},
-       1,
-       "odometry is wrong: a baseline of 110 m"},
+      {{have_fault}, 1, "odometry is wrong: a baseline of 110 m"},
+      {{have_fault, have_no_pose}, 1, "no pose estimated: a baseline of 110 m"},
       {{have_no_pose, interrupt}, 0, "interrupted"},
       {{be_silent, interrupt}, 1, "no image came: kimera_multi_doctor --live"},
       {{be_silent, interrupt, [](RunEnd& end) { end.images->read = 1; }}, 0, "interrupted"},
