@@ -234,24 +234,34 @@ constexpr Notation kNotations[] = {
     {"the poses of one are inverse", [](const SE3& T, const auto&) { return T.inverse(); }},
     {kUnits, [](const SE3& T, const auto&) { return with_scale(T, 1e-3); }},
     {kUnits, [](const SE3& T, const auto&) { return with_scale(T, 1e3); }}};
+// Almost still: a trajectory of one point has no alignment.
+constexpr Notation kStill = {"", [](const SE3& T, const auto&) { return with_scale(T, 1e-9); }};
+
+// Error of the estimate with a notation undone.
+TrajectoryError error_if(const TrajectoryInput& input, const Notation& notation) {
+  std::vector<StampedPose> poses(input.estimate.begin(), input.estimate.end());
+  for (StampedPose& pose : poses)
+    pose.T = notation.undone(pose.T, Eigen::Quaterniond(pose.T.linear()));
+  return trajectory_error(std::array{TrajectoryInput{input.name, input.truth, poses, input.window}})
+      .joint;
+}
 
 }  // namespace
 
 std::string difference_of_notation(const TrajectoryInput& input) {
   constexpr double kBetter = 0.1, kWorse = 1.001;
   constexpr double kLeast_m = 0.1, kLeast_deg = 1.0;  // errors of odometry that works
+  constexpr double kOfStill = 0.3;
   const TrajectoryError read = trajectory_error({&input, 1}).joint;
   const double metres = read.rpe_translation_m.rmse, degrees = read.rpe_rotation_deg.rmse;
   if (read.rpe_rotation_deg.count == 0 || (metres < kLeast_m && degrees < kLeast_deg)) return {};
+  const double still_m = error_if(input, kStill).rpe_translation_m.rmse;
   std::string best;
   double least = std::numeric_limits<double>::infinity();
   for (const Notation& notation : kNotations) {
-    std::vector<StampedPose> poses(input.estimate.begin(), input.estimate.end());
-    for (StampedPose& pose : poses)
-      pose.T = notation.undone(pose.T, Eigen::Quaterniond(pose.T.linear()));
-    const TrajectoryError undone =
-        trajectory_error(std::array{TrajectoryInput{input.name, input.truth, poses, input.window}})
-            .joint;
+    const TrajectoryError undone = error_if(input, notation);
+    // Any estimate of a large scale comes nearer to the truth if it hardly moves.
+    if (undone.rpe_translation_m.rmse > kOfStill * still_m) continue;
     const double m = undone.rpe_translation_m.rmse / std::max(metres, kLeast_m);
     const double deg = undone.rpe_rotation_deg.rmse / std::max(degrees, kLeast_deg);
     if (std::max(m, deg) > kWorse || std::min(m, deg) > kBetter || m + deg > least) continue;

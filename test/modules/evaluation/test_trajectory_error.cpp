@@ -193,7 +193,8 @@ TEST_CASE("Poses that are written differently from the truth are named") {
              Contains("poses of one are inverse"));
   CHECK_THAT(difference([](SE3& T, const Q&) { T.translation() *= 1000.0; }),
              Contains("millimetres"));
-  CHECK(difference([](SE3& T, const Q&) { T.translation() *= 1.5; }).empty());
+  for (const double scale : {1.5, 20.0, 100.0})
+    CHECK(difference([&](SE3& T, const Q&) { T.translation() *= scale; }).empty());
 }
 
 TEST_CASE("Drift is measured over multiples of 1, 2 and 5 up to half the path") {
