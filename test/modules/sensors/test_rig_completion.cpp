@@ -270,6 +270,16 @@ TEST_CASE("Poses come from /tf if /tf_static does not have them") {
   CHECK_THAT(rig.notes[0], Contains("that on /tf"));
 }
 
+TEST_CASE("A baseline whose sign is wrong is told so") {
+  ListedBag bag;
+  bag.add("/left_info", camera_info("left_optical", 0.0));
+  bag.add("/right_info", camera_info("right_optical", 43.0));
+  bag.add("/imu", imu("imu"));
+  add_transforms(bag, {kLeftOnBase, kImuOnBase});
+  CHECK_THROWS_WITH(complete_rig("a.bag", bag, nothing_known()),
+                    Contains("/right_info (its P[3] is positive, and must be negative), or"));
+}
+
 TEST_CASE("A calibration that is a text is named with its topic") {
   ListedBag bag;
   add_transforms(bag, {kLeftOnBase});
