@@ -270,7 +270,7 @@ TEST_CASE("Poses come from /tf if /tf_static does not have them") {
   CHECK_THAT(rig.notes[0], Contains("that on /tf"));
 }
 
-TEST_CASE("A baseline whose sign is wrong is told so") {
+TEST_CASE("A baseline whose sign is wrong is named") {
   ListedBag bag;
   bag.add("/left_info", camera_info("left_optical", 0.0));
   bag.add("/right_info", camera_info("right_optical", 43.0));
