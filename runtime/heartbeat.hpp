@@ -5,10 +5,13 @@
 #include <functional>
 #include <utility>
 
+#include "runtime/thread.hpp"
+
 namespace km {
 
 /// Shows a watchdog whether a thread makes progress. A step that waits for its time, or for room in
 /// the queue of another worker, does not count as stuck, because the other worker may be the cause.
+/// Neither does the time for which a busy machine leaves the thread without a processor.
 /// A circular wait is therefore not detected. Thread-safe.
 class Heartbeat {
  public:
@@ -23,6 +26,7 @@ class Heartbeat {
    public:
     explicit Step(Heartbeat& heartbeat)
         : heartbeat_(heartbeat), outer_(std::exchange(current_, &heartbeat)) {
+      heartbeat_.thread_ = this_thread_id();
       ++heartbeat_.beats_;
     }
     ~Step() {
@@ -57,6 +61,9 @@ class Heartbeat {
   [[nodiscard]] std::uint64_t beats() const { return beats_; }
   [[nodiscard]] bool in_step() const { return beats_ % 2 == 1; }
   [[nodiscard]] bool waiting() const { return waiting_; }
+  /// Time for which the thread of the last step has been without a processor that it could use,
+  /// since it started [s].
+  [[nodiscard]] double starved_s() const { return starved_time_s(thread_); }
 
   void give_up() const {
     if (give_up_) give_up_();
@@ -68,6 +75,7 @@ class Heartbeat {
   const std::function<void()> give_up_;
   std::atomic<std::uint64_t> beats_ = 0;
   std::atomic<bool> waiting_ = false;
+  std::atomic<pid_t> thread_ = 0;
 };
 
 }  // namespace km

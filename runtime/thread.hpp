@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <fstream>
 #include <string>
 #include <thread>
 #include <utility>
@@ -37,6 +38,20 @@ inline void name_this_thread(const std::string& name) {
   if (!name.empty()) pthread_setname_np(pthread_self(), name.substr(0, 15).c_str());
 }
 
+/// Number of the calling thread in /proc/self/task.
+inline pid_t this_thread_id() {
+  static thread_local const pid_t id = gettid();
+  return id;
+}
+
+/// Time for which a thread could run, but had no processor, since it started [s]: the second number
+/// of its schedstat (Linux). 0 for a thread that does not exist.
+[[nodiscard]] inline double starved_time_s(pid_t thread) {
+  std::ifstream file("/proc/self/task/" + std::to_string(thread) + "/schedstat");
+  double runs_ns = 0.0, starves_ns = 0.0;
+  return file >> runs_ns >> starves_ns ? 1e-9 * starves_ns : 0.0;
+}
+
 /// False in a process whose input waits for it, as a recording does that is played as fast as
 /// possible. None of its work is urgent, so a lower priority would only let other processes pass.
 /// Set it before the first thread of such work starts.
@@ -49,7 +64,7 @@ inline void work_in_background() {
   static thread_local const int outcome = [] {
     if (!has_urgent_work) return 0;
     constexpr int kNiceness = 10;
-    const auto self = static_cast<id_t>(gettid());
+    const auto self = static_cast<id_t>(this_thread_id());
     return setpriority(PRIO_PROCESS, self, std::max(kNiceness, getpriority(PRIO_PROCESS, self)));
   }();
   static_cast<void>(outcome);  // if not permitted, the thread keeps its priority

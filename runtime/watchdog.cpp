@@ -39,12 +39,16 @@ void Watchdog::look_at(Watched& w, double dt_s) {
     if (w.named)
       log::info("supervisor") << w.node->name() << " continues after " << std::lround(w.stuck_s)
                               << " s";
-    w.stuck_s = 0.0;
+    w.passed_s = w.stuck_s = 0.0;
+    w.starved_s.reset();
     w.named = false;
     if (w.heartbeat != nullptr) w.beats = w.heartbeat->beats();
     return;
   }
-  w.stuck_s += dt_s;
+  const double starved_s = w.heartbeat != nullptr ? w.heartbeat->starved_s() : 0.0;
+  if (!w.starved_s) w.starved_s = starved_s;
+  w.passed_s += dt_s;
+  w.stuck_s = w.passed_s - (starved_s - *w.starved_s);  // Linux counts a wait when it is over
   const bool in_step = w.heartbeat != nullptr && w.heartbeat->in_step();
   if (w.stuck_s >= kNotice_s && !w.named && in_step) {
     w.named = true;

@@ -48,7 +48,9 @@ class Watchdog {
     const Heartbeat* heartbeat = nullptr;
     double limit_s = 0.0;
     std::uint64_t beats = 0;
-    double stuck_s = 0.0;
+    double passed_s = 0.0;                 // since it is stuck
+    std::optional<double> starved_s = {};  // of the thread, when it became stuck
+    double stuck_s = 0.0;                  // part of passed_s in which the thread had a processor
     bool named = false;
     bool ending = false;
     std::string why = {};  // reason if it was given up, otherwise empty

@@ -1,3 +1,11 @@
+#include <sched.h>
+
+#include <atomic>
+#include <chrono>
+#include <thread>
+
+#include "runtime/clock.hpp"
+#include "runtime/thread.hpp"
 #include "runtime/watchdog.hpp"
 #include "test/support/captured_log.hpp"
 #include "test/support/test.hpp"
@@ -58,6 +66,36 @@ TEST_CASE("A long step that ends is no fault, and many steps are none") {
   }
   bench.pass(100.0);  // nothing to do
   CHECK_FALSE(bench.watchdog.given_up().has_value());
+}
+
+TEST_CASE("A step to which a busy machine gives no processor is not given up") {
+  WatchedNode node;
+  Watchdog watchdog({&node}, 0.03);  // a limit of 0.6 s
+  cpu_set_t allowed, one;
+  sched_getaffinity(0, sizeof(allowed), &allowed);
+  CPU_ZERO(&one);
+  for (std::size_t cpu = 0; CPU_COUNT(&one) == 0; ++cpu)
+    if (CPU_ISSET(cpu, &allowed)) CPU_SET(cpu, &one);
+  std::atomic<bool> ends = false, has_begun = false;
+  const auto be_busy = [&] {
+    sched_setaffinity(0, sizeof(one), &one);
+    while (!ends) has_begun = true;
+  };
+  std::jthread busy(be_busy);
+  while (!has_begun) std::this_thread::yield();
+  std::jthread late([&] {
+    work_in_background();
+    const Heartbeat::Step step(node.heartbeat);
+    be_busy();
+  });
+  while (!node.heartbeat.in_step()) std::this_thread::yield();
+  for (double last_s = steady_now_s(), end_s = last_s + 1.5; last_s < end_s;) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    const double now_s = steady_now_s();
+    watchdog.tick(now_s - std::exchange(last_s, now_s));
+  }
+  CHECK_FALSE(watchdog.given_up().has_value());
+  ends = true;
 }
 
 TEST_CASE("A node that waits for another is not blamed until it continues") {
