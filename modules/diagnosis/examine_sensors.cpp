@@ -40,17 +40,18 @@ void examine_fault(ReaderFault fault, const ReaderReport::Entry& entry, double o
              "repair the recording, or record again if there are many");
 }
 
-// Number of usable items of the kind that a fault counts. Images are counted per camera, lost
-// messages per topic.
-double usable_count(ReaderFault fault, const SensorSample& sample) {
+// Number of items of the kind that a fault counts, with the `faulty` ones. Images are counted per
+// camera, lost messages per topic.
+double item_count(ReaderFault fault, double faulty, const SensorSample& sample) {
   const auto frames = static_cast<double>(sample.frames.size());
   const auto samples = static_cast<double>(sample.imu.size());
   const double images = sample.right_size.width > 0 ? 2.0 * frames : frames;
   using enum ReaderFault;
-  if (fault == kNotFinite || fault == kImplausible || fault == kNoAcceleration || fault == kImuGap)
-    return samples;
-  if (fault == kMissingBetween) return images;
-  return fault == kLostMessage ? images + samples : frames;
+  // A frame without its depth or label image remains.
+  if (fault == kWrongImageFormat || fault == kUnknownColor) return std::max(frames, faulty);
+  if (fault >= kNotFinite && fault <= kNoAcceleration) return samples + faulty;
+  if (fault == kMissingBetween) return images + faulty;
+  return (fault == kLostMessage ? images + samples : frames) + faulty;
 }
 
 void examine_rate(const char* sensor, const std::string& id, const std::vector<Stamp>& stamps,
@@ -306,7 +307,7 @@ Examination examine_streams(const SensorSample& sample, const ReaderReport& repo
                "there are no images to estimate motion from",
                "the other findings state the skipped parts");
   for (const auto& [fault, entry] : report.entries())
-    examine_fault(fault, entry, usable_count(fault, sample) + static_cast<double>(entry.count),
+    examine_fault(fault, entry, item_count(fault, static_cast<double>(entry.count), sample),
                   result);
   constexpr double kFrames_hz = 8.0, kFrameGap_s = 0.25, kSamples_hz = 80.0, kSampleGap_s = 0.05;
   if (sample.frames.size() > 1)

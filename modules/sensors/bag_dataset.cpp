@@ -224,10 +224,15 @@ bool BagDataset::read_message() {
 }
 
 void BagDataset::take(SensorRole role, BagMessage message) {
+  const bool is_inertial =
+      role == SensorRole::kImu || role == SensorRole::kGyro || role == SensorRole::kAccel;
+  const auto count = [&](ReaderFault fault, const std::string& why) {
+    report_.add(is_inertial ? fault_of_samples(fault) : fault, place_of(message) + why);
+  };
   const auto header =
       decode_ros<RosHeader>(bag_->channels()[message.channel].encoding, message.bytes);
   if (!header.value) {
-    report_.add(ReaderFault::kMalformedMessage, place_of(message) + ": " + header.refusal);
+    count(ReaderFault::kMalformedMessage, std::string(": ") + header.refusal);
     return;
   }
   const Stamp stated = header.value->stamp;
@@ -238,11 +243,11 @@ void BagDataset::take(SensorRole role, BagMessage message) {
                     std::to_string(stated) + ": later stamps continue the time before");
   const StampVerdict verdict = order_[index_of(role)].judge(stamp);
   if (verdict != StampVerdict::kGood) {
-    report_.add(fault_of(verdict), place_of(message) + ": stamp " + std::to_string(stated));
+    count(fault_of(verdict), ": stamp " + std::to_string(stated));
     return;
   }
   time_.accept(index_of(role), stamp);
-  if (role == SensorRole::kImu || role == SensorRole::kGyro || role == SensorRole::kAccel) {
+  if (is_inertial) {
     take_imu(role, stamp, message);
     return;
   }
@@ -276,7 +281,7 @@ void BagDataset::take_pose(Stamp stamp, const BagMessage& message) {
 void BagDataset::take_imu(SensorRole role, Stamp stamp, const BagMessage& message) {
   const auto imu = decode_ros<RosImu>(bag_->channels()[message.channel].encoding, message.bytes);
   if (!imu.value) {
-    report_.add(ReaderFault::kMalformedMessage, place_of(message) + ": " + imu.refusal);
+    report_.add(ReaderFault::kMalformedSample, place_of(message) + ": " + imu.refusal);
     return;
   }
   ImuSample sample{stamp, imu.value->angular_velocity, imu.value->linear_acceleration};

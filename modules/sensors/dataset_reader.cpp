@@ -14,10 +14,16 @@ void RecordingPart::check(const std::string& recording) const {
 
 const char* to_string(ReaderFault fault) {
   // In the order of ReaderFault.
-  static constexpr std::array<const char*, 25> kNames = {
+  static constexpr std::array<const char*, 29> kNames = {
       "malformed rows",
       "inertial samples with NaN or infinity",
       "inertial samples beyond what sensors measure",
+      "malformed inertial samples",
+      "inertial samples out of order",
+      "repeated inertial samples",
+      "inertial samples with stamps that jump",
+      "gaps between inertial samples",
+      "samples of the gyroscope without an acceleration",
       "stamps out of order",
       "repeated stamps",
       "stamps that jump",
@@ -27,13 +33,11 @@ const char* to_string(ReaderFault fault) {
       "missing images",
       "unreadable images",
       "images of the wrong size",
-      "gaps between inertial samples",
       "frames without inertial samples",
       "images of the wrong format",
       "depth or label images without a frame",
       "label images with colours that are not in the palette",
       "messages that are not of their type",
-      "samples of the gyroscope without an acceleration",
       "damaged pieces of the recording",
       "frames without a pose of the external odometry",
       "messages lost on the way",
@@ -42,6 +46,14 @@ const char* to_string(ReaderFault fault) {
       "clocks set back",
   };
   return kNames.at(static_cast<std::size_t>(fault));
+}
+
+ReaderFault fault_of_samples(ReaderFault fault) {
+  using enum ReaderFault;
+  if (fault == kMalformedRow || fault == kMalformedMessage) return kMalformedSample;
+  if (fault == kUnorderedStamp) return kUnorderedSample;
+  if (fault == kRepeatedStamp) return kRepeatedSample;
+  return fault == kJumpingStamp ? kJumpingSample : fault;
 }
 
 }  // namespace km

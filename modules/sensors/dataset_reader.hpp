@@ -17,11 +17,18 @@ namespace km {
 
 /// Faults in a part of a recording that leave the rest usable. In general the row, sample or frame
 /// is skipped. If a depth or label image is unusable, only this image is omitted. After kImuGap,
-/// kUnknownColor, kMissingBetween, kPause and kClockSetBack nothing is skipped.
+/// kUnknownColor, kMissingBetween, kPause and kClockSetBack nothing is skipped. The kinds from
+/// kNotFinite to kNoAcceleration are of inertial samples.
 enum class ReaderFault {
   kMalformedRow,       ///< Too few fields, or a stamp or value that is not a number.
   kNotFinite,          ///< NaN or infinity in an inertial sample.
   kImplausible,        ///< An inertial sample beyond the range of sensors.
+  kMalformedSample,    ///< A row or message of an inertial sensor that is no sample.
+  kUnorderedSample,    ///< As kUnorderedStamp, of an inertial sample.
+  kRepeatedSample,     ///< As kRepeatedStamp, of an inertial sample.
+  kJumpingSample,      ///< As kJumpingStamp, of an inertial sample.
+  kImuGap,             ///< Inertial samples further apart than 2.5 periods.
+  kNoAcceleration,     ///< A gyroscope sample without accelerometer samples around it.
   kUnorderedStamp,     ///< A stamp before that of previous rows, or after that of following rows.
   kRepeatedStamp,      ///< A stamp equal to that of a previous row.
   kJumpingStamp,       ///< A stamp more than an hour away from most rows.
@@ -31,13 +38,11 @@ enum class ReaderFault {
   kMissingImage,       ///< An image that is listed, but not on disk.
   kUnreadableImage,    ///< A truncated or corrupt image, or one of an unknown format.
   kWrongImageSize,     ///< An image without the resolution of the calibration.
-  kImuGap,             ///< Inertial samples further apart than 2.5 periods.
   kPairWithoutImu,     ///< A frame outside the time that inertial samples cover.
   kWrongImageFormat,   ///< A depth or label image with wrong bits or channels.
   kImageWithoutFrame,  ///< A depth or label image that belongs to no frame.
   kUnknownColor,       ///< A label image with colours that are not in the palette.
   kMalformedMessage,   ///< A message of a bag that is not of its type.
-  kNoAcceleration,     ///< A gyroscope sample without accelerometer samples around it.
   kDamagedBag,         ///< A part of a bag that cannot be read (see BagFault).
   kFrameWithoutPose,   ///< An external odometry has no pose for the frame.
   kLostMessage,        ///< A live message dropped because the reader was too slow.
@@ -48,6 +53,9 @@ enum class ReaderFault {
 
 /// A short plural for tables and log lines: "malformed rows".
 [[nodiscard]] const char* to_string(ReaderFault fault);
+
+/// The kind of a fault in the list or topic of an inertial sensor, whose items are counted apart.
+[[nodiscard]] ReaderFault fault_of_samples(ReaderFault fault);
 
 /// Counts of the faults, with file and line of examples.
 using ReaderReport = FaultReport<ReaderFault>;

@@ -279,9 +279,12 @@ std::variant<ImuSample, RowFault> parse_imu(const TextRow& row) {
 
 ImuStream read_imu(const fs::path& file, ReaderReport& report) {
   ImuStream stream;
+  ReaderReport faults;
   for (const auto& row :
-       read_ordered_rows<ImuSample>(file, 7, "holds no inertial sample", report, parse_imu))
+       read_ordered_rows<ImuSample>(file, 7, "holds no inertial sample", faults, parse_imu))
     stream.add({row.stamp, row.value.gyro, row.value.accel});
+  for (const auto& [fault, entry] : faults.entries())
+    report.add(fault_of_samples(fault), entry.first, entry.count);
   return stream;
 }
 

@@ -111,6 +111,12 @@ TEST_CASE("Faults of a reader become findings by their share") {
   ReaderReport report;
   report.add(ReaderFault::kNotFinite, "imu0/data.csv line 9", 15);
   CHECK_THAT(ids_of(examine_streams(sample, report)), StartsWith("note recording."));
+  ReaderReport of_samples;  // half of 4000 samples, all depth images of half the frames
+  of_samples.add(ReaderFault::kUnorderedSample, "imu0/data.csv line 9", 2000);
+  of_samples.add(ReaderFault::kWrongImageFormat, "depth0/1.png", 100);
+  const Examination found = examine_streams(sample, of_samples);
+  CHECK_THAT(found.findings.at(0).what, StartsWith("2000 inertial samples out of order, 50 %"));
+  CHECK_THAT(found.findings.at(1).what, StartsWith("100 images of the wrong format, 50 %"));
   SensorSample stereo = sample;
   stereo.right_size = {752, 480};
   ReaderReport missing;

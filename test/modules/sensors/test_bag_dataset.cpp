@@ -228,6 +228,12 @@ TEST_CASE("A bad message of a bag affects no other message") {
     corrupted.linear_acceleration.x() = 1e30;
     corrupted.header.stamp += 1;
     bag->add("/imu", corrupted);
+    bag->add("/imu", corrupted);
+    corrupted.header.stamp -= 100'000'000;
+    bag->add("/imu", corrupted);
+    corrupted.header.stamp += 86'400'000'000'000;
+    bag->add("/imu", corrupted, -86'400.0);
+    bag->add_bytes("/imu", RosImu::kType, stamp + kFramePeriod + 3, {0, 1, 0, 0, 7});
   }
   BagDataset dataset("test.bag", std::move(bag), small_rig());
   CHECK(packets_of(dataset).size() == 26);
@@ -235,7 +241,8 @@ TEST_CASE("A bad message of a bag affects no other message") {
   for (const ReaderFault fault :
        {ReaderFault::kWrongImageSize, ReaderFault::kWrongImageFormat, ReaderFault::kUnorderedStamp,
         ReaderFault::kJumpingStamp, ReaderFault::kMalformedMessage, ReaderFault::kNotFinite,
-        ReaderFault::kImplausible}) {
+        ReaderFault::kImplausible, ReaderFault::kMalformedSample, ReaderFault::kUnorderedSample,
+        ReaderFault::kRepeatedSample, ReaderFault::kJumpingSample}) {
     CAPTURE(to_string(fault));
     CHECK(report.count(fault) == 1);
   }
@@ -478,7 +485,7 @@ TEST_CASE("A recording continues after its clock was set back") {
   }
   const ReaderReport report = dataset.report();
   CHECK(report.count(ReaderFault::kClockSetBack) == 1);
-  CHECK(report.count(ReaderFault::kUnorderedStamp) == 2);
+  CHECK(report.count(ReaderFault::kUnorderedSample) == 2);
   CHECK_THAT(to_string(report), Contains("the clock went back 10.0 s"));
 }
 
