@@ -56,16 +56,18 @@ double item_count(ReaderFault fault, double faulty, const SensorSample& sample) 
 
 void examine_rate(const char* sensor, const std::string& id, const std::vector<Stamp>& stamps,
                   double least_hz, double longest_gap_s, Examination& result) {
-  const StampStatistics found = stamp_statistics(stamps);
+  StampStatistics found = stamp_statistics(stamps);
+  const bool is_jump = found.largest_gap_s > kLongestPause_s;
+  if (is_jump) found.rate_hz = 1.0 / found.median_s;
   result.figure(std::string(sensor) + ", rate", fixed(found.rate_hz, 1) + " Hz, largest gap " +
                                                     fixed(found.largest_gap_s, 3) + " s, jitter " +
                                                     milliseconds(found.jitter_s));
-  if (found.largest_gap_s > kLongestPause_s)
-    return result.add(kWarning, id + ".clock",
-                      std::string(sensor) + " whose stamps jump by " +
-                          fixed(found.largest_gap_s, 1) + " s: the clock was set",
-                      "odometry starts again there, and charts show a gap",
-                      "set the clock before the recording, or choose a part by --from and --to");
+  if (is_jump)
+    result.add(kWarning, id + ".clock",
+               std::string(sensor) + " whose stamps jump by " + fixed(found.largest_gap_s, 1) +
+                   " s: the clock was set",
+               "odometry starts again there, and charts show a gap",
+               "set the clock before the recording, or choose a part by --from and --to");
   const UsualNumber rate = id == "imu" ? UsualNumber::kImuRate_hz : UsualNumber::kImageRate_hz;
   if (const auto unusual = rate_doubt(rate, found.rate_hz, found.median_s);
       unusual && found.rate_hz > least_hz)
@@ -75,7 +77,8 @@ void examine_rate(const char* sensor, const std::string& id, const std::vector<S
                std::string(sensor) + " at " + fixed(found.rate_hz, 1) + " Hz, less than " +
                    fixed(least_hz, 0) + " Hz",
                "odometry may lose track in fast motion", "record at a higher rate");
-  if (found.largest_gap_s > longest_gap_s)
+  constexpr double kPeriods = 2.5;  // as for kImuGap
+  if (!is_jump && found.largest_gap_s > std::max(longest_gap_s, kPeriods * found.median_s))
     result.add(kWarning, id + ".gap",
                std::string(sensor) + " with a gap of " + fixed(found.largest_gap_s, 2) + " s",
                "odometry may lose track in the gap and start again",

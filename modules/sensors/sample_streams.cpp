@@ -8,6 +8,7 @@
 
 #include "modules/core/covariance.hpp"
 #include "modules/core/lie.hpp"
+#include "modules/core/quantile.hpp"
 #include "modules/core/text_table.hpp"
 #include "modules/sensors/text_file.hpp"
 
@@ -62,8 +63,15 @@ std::string ImuStream::why_not(Stamp stamp) const {
 }
 
 void ImuStream::add(const ImuSample& sample) {
+  constexpr std::size_t kIntervals = 100;
   if (!first_) first_ = sample.stamp;
+  if (!samples_.empty() && intervals_s_.size() < kIntervals)
+    intervals_s_.push_back(seconds_between(samples_.back().stamp, sample.stamp));
   samples_.push_back(sample);
+}
+
+double ImuStream::rate_hz(double stated_hz) const {
+  return intervals_s_.empty() ? stated_hz : std::min(stated_hz, 1.0 / quantile(intervals_s_, 0.5));
 }
 
 std::vector<ImuSample> ImuStream::until(Stamp stamp) {

@@ -47,9 +47,13 @@ class ImuStream {
   /// Bounds the memory of a stream whose cameras pause.
   void drop_before(Stamp stamp);
 
+  /// The rate [Hz] by the median of the first intervals, at most `stated_hz`.
+  [[nodiscard]] double rate_hz(double stated_hz) const;
+
  private:
   std::deque<ImuSample> samples_;
-  std::optional<Stamp> first_;  // first stamp of the stream
+  std::optional<Stamp> first_;       // first stamp of the stream
+  std::vector<double> intervals_s_;  // the first ones
   bool has_begun_ = false;
 };
 

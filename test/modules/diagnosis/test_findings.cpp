@@ -82,6 +82,10 @@ TEST_CASE("Rates and gaps of a recording are found") {
                     [](auto& sample) {
                       sample.imu.erase(sample.imu.begin() + 500, sample.imu.begin() + 520);
                     }},
+               Case{"warning imu.rate ",  // 20 Hz without a gap
+                    [](auto& sample) {
+                      std::erase_if(sample.imu, [k = 0](auto&) mutable { return k++ % 10 != 0; });
+                    }},
                Case{"error frames.stamps ",  // microseconds as nanoseconds of a second
                     [](auto& sample) {
                       for (Stamp& t : sample.frames) t -= t % 1'000'000'000 / 1000 * 999;

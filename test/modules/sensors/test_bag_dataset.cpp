@@ -41,12 +41,13 @@ struct Plan {
   Stamp right_late = 0;  // after the left stamp
   std::vector<int> rights_lost = {};
   bool has_imu = true;
+  Stamp sample_period = kSamplePeriod;
 };
 
 std::unique_ptr<ListedBag> recording(const Plan& plan) {
   auto bag = std::make_unique<ListedBag>();
   const Stamp end = kFirst + plan.frames * kFramePeriod;
-  for (Stamp stamp = kFirst - 1'500'000'000; stamp <= end; stamp += kSamplePeriod) {
+  for (Stamp stamp = kFirst - 1'500'000'000; stamp <= end; stamp += plan.sample_period) {
     if (plan.has_imu) bag->add("/imu", imu(stamp));
     const auto frame = static_cast<int>((stamp - kFirst) / kFramePeriod);
     if (stamp < kFirst || (stamp - kFirst) % kFramePeriod != 0 || frame == plan.frames) continue;
@@ -75,6 +76,13 @@ TEST_CASE("Messages of a bag become packets without a hole between them") {
   }
   CHECK(dataset.report().empty());
   CHECK(dataset.remarks().empty());
+}
+
+TEST_CASE("Inertial samples at a lower rate than stated have no gaps") {
+  const Stamp period = GENERATE(10'000'000, 25'000'000, 50'000'000);
+  BagDataset dataset("test.bag", recording({.sample_period = period}), small_rig());
+  CHECK(packets_of(dataset).size() == 40);
+  CHECK(dataset.report().empty());
 }
 
 TEST_CASE("Poses of an odometry replace inertial samples") {
