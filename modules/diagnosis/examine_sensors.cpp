@@ -55,17 +55,19 @@ double item_count(ReaderFault fault, double faulty, const SensorSample& sample) 
 }
 
 void examine_rate(const char* sensor, const std::string& id, const std::vector<Stamp>& stamps,
-                  double least_hz, double longest_gap_s, Examination& result) {
+                  Stamp start, double least_hz, double longest_gap_s, Examination& result) {
   StampStatistics found = stamp_statistics(stamps);
   const bool is_jump = found.largest_gap_s > kLongestPause_s;
   if (is_jump) found.rate_hz = 1.0 / found.median_s;
   result.figure(std::string(sensor) + ", rate", fixed(found.rate_hz, 1) + " Hz, largest gap " +
                                                     fixed(found.largest_gap_s, 3) + " s, jitter " +
                                                     milliseconds(found.jitter_s));
+  const std::string place =
+      ", " + fixed(seconds_between(start, found.gap_from), 1) + " s after the first image";
   if (is_jump)
     result.add(kWarning, id + ".clock",
                std::string(sensor) + " whose stamps jump by " + fixed(found.largest_gap_s, 1) +
-                   " s: the clock was set",
+                   " s" + place + ": the clock was set",
                "odometry starts again there, and charts show a gap",
                "set the clock before the recording, or choose a part by --from and --to");
   const UsualNumber rate = id == "imu" ? UsualNumber::kImuRate_hz : UsualNumber::kImageRate_hz;
@@ -79,11 +81,12 @@ void examine_rate(const char* sensor, const std::string& id, const std::vector<S
                "odometry may lose track in fast motion", "record at a higher rate");
   constexpr double kPeriods = 2.5;  // as for kImuGap
   if (!is_jump && found.largest_gap_s > std::max(longest_gap_s, kPeriods * found.median_s))
-    result.add(kWarning, id + ".gap",
-               std::string(sensor) + " with a gap of " + fixed(found.largest_gap_s, 2) + " s",
-               "odometry may lose track in the gap and start again",
-               "find out why the driver or the disk stopped; --from and --to choose a part "
-               "without the gap");
+    result.add(
+        kWarning, id + ".gap",
+        std::string(sensor) + " with a gap of " + fixed(found.largest_gap_s, 2) + " s" + place,
+        "odometry may lose track in the gap and start again",
+        "find out why the driver or the disk stopped; --from and --to choose a part "
+        "without the gap");
 }
 
 std::vector<double> values_of(const std::vector<ImageQuality>& qualities, const auto& value) {
@@ -312,14 +315,15 @@ Examination examine_streams(const SensorSample& sample, const ReaderReport& repo
   for (const auto& [fault, entry] : report.entries())
     examine_fault(fault, entry, item_count(fault, static_cast<double>(entry.count), sample),
                   result);
+  const Stamp start = sample.frames.empty() ? 0 : sample.frames.front();
   constexpr double kFrames_hz = 8.0, kFrameGap_s = 0.25, kSamples_hz = 80.0, kSampleGap_s = 0.05;
   if (sample.frames.size() > 1)
-    examine_rate("images", "frames", sample.frames, kFrames_hz, kFrameGap_s, result);
+    examine_rate("images", "frames", sample.frames, start, kFrames_hz, kFrameGap_s, result);
   std::vector<Stamp> stamps;
   stamps.reserve(sample.imu.size());
   for (const ImuSample& measured : sample.imu) stamps.push_back(measured.stamp);
   if (stamps.size() > 1)
-    examine_rate("inertial samples", "imu", stamps, kSamples_hz, kSampleGap_s, result);
+    examine_rate("inertial samples", "imu", stamps, start, kSamples_hz, kSampleGap_s, result);
   return result;
 }
 

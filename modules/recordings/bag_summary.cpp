@@ -179,7 +179,9 @@ StampStatistics stamp_statistics(std::vector<Stamp> stamps) {
     intervals_s.push_back(seconds_from_to(stamps[i - 1], stamps[i]));
   const double total_s = seconds_from_to(result.first, result.last);
   if (total_s > 0.0) result.rate_hz = static_cast<double>(intervals_s.size()) / total_s;
-  result.largest_gap_s = *std::max_element(intervals_s.begin(), intervals_s.end());
+  const auto largest = std::max_element(intervals_s.begin(), intervals_s.end());
+  result.largest_gap_s = *largest;
+  result.gap_from = stamps[static_cast<std::size_t>(largest - intervals_s.begin())];
   result.median_s = quantile(intervals_s, 0.5);
   for (double& interval_s : intervals_s) interval_s = std::abs(interval_s - result.median_s);
   result.jitter_s = quantile(std::move(intervals_s), 0.95);

@@ -19,6 +19,7 @@ struct StampStatistics {
   Stamp last = 0;        ///< Latest stamp [ns]; 0 without stamps.
   double rate_hz = 0.0;  ///< Number of intervals over their total time.
   double largest_gap_s = 0.0;
+  Stamp gap_from = 0;         ///< Start of the largest gap; 0 without one.
   double median_s = 0.0;      ///< Median of the intervals.
   double jitter_s = 0.0;      ///< 95 % quantile of the intervals' distance from their median.
   std::size_t unordered = 0;  ///< Number of stamps not later than the previous stamp.
