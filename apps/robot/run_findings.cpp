@@ -231,7 +231,7 @@ class FindingsOfRun {
   }
 
   void add_input() {
-    const auto frames = static_cast<double>(run_.frames);
+    const auto complete = static_cast<double>(run_.frames + run_.frames_skipped);
     if (run_.frames + run_.frames_skipped + run_.keyframes == 0)
       add(kError, "frames.none", "0 frames, 0 keyframes",
           "odometry did not start: the results have nothing of this robot",
@@ -239,8 +239,7 @@ class FindingsOfRun {
           "the silent one");
     constexpr double kFew = 0.01;
     if (run_.frames_skipped > 0) {
-      const double skipped = static_cast<double>(run_.frames_skipped),
-                   share = skipped / (skipped + frames);
+      const double share = static_cast<double>(run_.frames_skipped) / complete;
       add(share < kFew ? kNote : kWarning, "frames.skipped",
           std::to_string(run_.frames_skipped) + " frames skipped, " + percent(share),
           "the processors were too slow: images were left out of odometry at even intervals",
@@ -263,14 +262,13 @@ class FindingsOfRun {
     // There are more samples and messages than frames. A share of the frames keeps their faults
     // visible.
     const auto is_frequent = [&](const auto& fault) {
-      return static_cast<double>(fault.second) > kFew * frames;
+      return static_cast<double>(fault.second) > kFew * complete;
     };
     if (run_.frames == 0 || std::ranges::none_of(run_.sensor_faults, is_frequent)) return;
     std::string faults;
     for (const auto& [fault, count] : run_.sensor_faults)
       faults += (faults.empty() ? "" : ", ") + std::to_string(count) + ' ' + fault;
-    add(kWarning, "sensors.faults",
-        faults + "; " + std::to_string(run_.frames) + " complete frames",
+    add(kWarning, "sensors.faults", faults + "; " + fixed(complete, 0) + " complete frames",
         "odometry and map do not use the affected data",
         "kimera_multi_doctor on the recording, or --live on the topics, names the first fault of "
         "each kind");
@@ -463,6 +461,8 @@ std::vector<Finding> findings_of(std::span<const RunFacts> runs) {
   add_apart(runs, names, findings);
   add_tentative(runs, names, findings);
   for (const RunFacts& run : runs) FindingsOfRun(run, findings);
+  std::ranges::stable_partition(  // a network may explain the other findings on a team
+      findings, [](const Finding& one) { return one.id.starts_with("network."); });
   sort_by_severity(findings);
   return findings;
 }

@@ -252,6 +252,16 @@ TEST_CASE("A finding on a run is reported with its severity and its number") {
   }
 }
 
+TEST_CASE("Findings on the network precede others of their severity") {
+  std::vector<RunFacts> team = {run_of(0, false, {}), run_of(2, false, {})};
+  team[0].summary.frames_skipped = 500;
+  team[0].summary.sensor_faults = {{"missing images", 8}};  // 0.8 % of 1000 frames
+  team[1].summary.unmet_peers["alice"] = "it is mute";
+  std::string ids;
+  for (const Finding& finding : findings_of(team)) ids += finding.id + ' ';
+  CHECK(ids == "network.unmet team.not_joined frames.skipped ");
+}
+
 TEST_CASE("The advice on pauses and holes depends on skipped frames") {
   RunFacts run = run_of(0, true, tally_of(40, 30, 10, 10));
   run.summary.paused_s = 3.0;
