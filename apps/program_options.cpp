@@ -29,6 +29,14 @@ std::optional<int> parse_options(CLI::App& app, int argc, const char* const* arg
   return kBadCommandLine;
 }
 
+CLI::Validator named_file(const char* folder) {
+  return {[folder](std::string& text) {
+            text = find_named_file(folder, text).string();
+            return std::string();
+          },
+          "FILE|NAME"};
+}
+
 int run_subcommands(const std::string& program, const std::string& about,
                     std::initializer_list<void (*)(CLI::App&)> adders, int argc, char** argv) try {
   CLI::App app(about, program);

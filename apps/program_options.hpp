@@ -21,16 +21,9 @@ inline constexpr int kBadInput = 1, kBadCommandLine = 2;
 [[nodiscard]] std::optional<int> parse_options(CLI::App& app, int argc, const char* const* argv,
                                                const std::string& hint_for_unknown = {});
 
-/// Replaces the text of an option by the path that `find(folder, text)` returns. Exceptions are
+/// Replaces the text of an option by the path of find_named_file() in this folder. Exceptions are
 /// passed on: a missing file is bad input.
-template <typename Find>
-[[nodiscard]] CLI::Validator named_file(Find find, const char* folder) {
-  return {[find, folder](std::string& text) {
-            text = find(folder, text).string();
-            return std::string();
-          },
-          "FILE|NAME"};
-}
+[[nodiscard]] CLI::Validator named_file(const char* folder);
 
 /// The main() of a program whose first word is a subcommand. Each of `adders` adds one, which runs
 /// as soon as the command line names it. The exit code is 0 if the subcommand succeeded or help was

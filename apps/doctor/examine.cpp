@@ -8,6 +8,7 @@
 #include <thread>
 #include <variant>
 
+#include "apps/program_version.hpp"
 #include "apps/result_files.hpp"
 #include "apps/robot/robot_input.hpp"
 #include "apps/robot/run_findings.hpp"

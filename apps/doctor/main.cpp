@@ -84,10 +84,10 @@ Options options_of(int argc, char** argv) {
   app.footer(kFooter);
   app.add_option("PATH", options.path, "Recording, or results");
   app.add_option("--live", options.live, "Rig file: look at the live topics that it names (ROS 2)")
-      ->transform(named_file(find_named_file, "rigs"));
+      ->transform(named_file("rigs"));
   add_network(app, options);
   app.add_option("--rig", robot.rig, "For a bag: which topics are the sensors, and calibration")
-      ->transform(named_file(find_named_file, "rigs"));
+      ->transform(named_file("rigs"));
   app.add_option("--from", robot.from_s, "Look from here on [s since the first image]");
   app.add_option("--to", robot.to_s, "Look up to here [s]; by default 120 s are looked at");
   app.add_option("--seconds", options.seconds,
@@ -95,7 +95,7 @@ Options options_of(int argc, char** argv) {
                  "10; how long to listen to the network, by default 5")
       ->check(CLI::Range(0.5, 3600.0));
   app.add_option("--config", robot.configs, "Configuration files of the robots")
-      ->transform(named_file(find_named_file, "datasets"));
+      ->transform(named_file("datasets"));
   app.add_option("--set", robot.settings, "One setting over all files: section.key=value");
   app.add_option("--json", options.json, "Also write figures and findings to this file");
   app.callback([&options, &app] { check(options, app); });

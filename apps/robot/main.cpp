@@ -110,7 +110,7 @@ void add_input(CLI::App& app, RobotOptions& options) {
           "config/robot.yaml); runs until Ctrl-C")
       ->expected(0, 1)  // --inspect --live needs none
       ->type_name("RIG")
-      ->transform(named_file(find_named_file, "rigs"));
+      ->transform(named_file("rigs"));
   group.add_option("--graph", options.graph,
                    "Recorded pose graph of one robot (.g2o or .csv), or of a team (.jrl)");
   group.add_option("--session", options.session,
@@ -128,7 +128,7 @@ void add_input(CLI::App& app, RobotOptions& options) {
          "For a bag: file with the topics and the calibration of the sensors; for a EuRoC folder: "
          "corrections of its calibration (rig_estimated.yaml of a run); for a TUM RGB-D folder: "
          "calibration of its camera; or the name of a shipped one, such as d455")
-      ->transform(named_file(find_named_file, "rigs"));
+      ->transform(named_file("rigs"));
   app.add_option("--odometry", options.odometry,
                  "Poses of the body (TUM: t[s] x y z qx qy qz qw) that replace the robot's visual-"
                  "inertial odometry; images still give features and depth");
@@ -212,7 +212,7 @@ RobotOptions options_of(int argc, char** argv) {
   app.add_option("--config", options.configs,
                  "Configuration files, or names of shipped ones, such as euroc; a later file "
                  "overrides earlier ones")
-      ->transform(named_file(find_named_file, "datasets"));
+      ->transform(named_file("datasets"));
   app.add_option("--set", options.settings, "One setting over all files: section.key=value");
   app.add_option("--robot", options.robot, "Id of this robot, any number, unique in the team")
       ->check(CLI::Range(0, 65535))

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <utility>
 
+#include "apps/program_version.hpp"
 #include "apps/result_files.hpp"
 #include "apps/robot/growing_files.hpp"
 #include "apps/robot/results.hpp"

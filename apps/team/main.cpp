@@ -75,7 +75,10 @@ void define(CLI::App& app, TeamOptions& options) {
       "file;\nthe others are of every link, and in pairs of the links named there:\n" +
       km::links_file_keys());
   options.robot_binary = km::program_folder() / "kimera_multi_robot";
-  app.add_option("--config", options.config, "Team file")->required();
+  app.add_option("--config", options.config,
+                 "Team file, or the name of a shipped one, such as euroc_two_robots")
+      ->required()
+      ->transform(km::named_file("teams"));
   app.add_option("--dataset", options.dataset, "Value of ${DATASET} in the team file");
   app.add_option(
          "--rate", options.rate,

@@ -194,6 +194,8 @@ TEST_CASE("An input that is missing or unreadable gives the exit code of bad inp
       CHECK(result.exit_code == (words.starts_with("doctor") ? 2 : kBadInput));
       CHECK_THAT(result.output, Contains(input) && !Contains("Run with --help"));
     }
+  CHECK_THAT(run_command(KM_BIN_DIR "/kimera_multi_team --config no_team").output,
+             Contains("no file no_team") && Contains("euroc_two_robots"));  // shipped names
 }
 
 namespace {

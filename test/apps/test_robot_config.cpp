@@ -1,5 +1,6 @@
 #include <type_traits>
 
+#include "apps/program_version.hpp"
 #include "apps/robot/robot_config.hpp"
 #include "apps/robot/robot_input.hpp"
 #include "runtime/config_text.hpp"

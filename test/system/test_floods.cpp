@@ -1,3 +1,4 @@
+#include "apps/program_version.hpp"
 #include "apps/robot/robot_config.hpp"
 #include "modules/loop_closure/node/loop_closure_codec.hpp"
 #include "modules/mesh/node/mesh_codec.hpp"

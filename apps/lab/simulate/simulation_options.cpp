@@ -1,6 +1,5 @@
 #include "apps/lab/simulate/simulation_options.hpp"
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <memory>
@@ -10,6 +9,7 @@
 #include <thread>
 #include <tuple>
 
+#include "apps/program_options.hpp"
 #include "modules/core/config.hpp"
 #include "runtime/yaml_config.hpp"
 
@@ -159,7 +159,9 @@ void define(CLI::App& app, SimulationOptions& options) {
     OptionFields fields;
   };
   const auto line = std::make_shared<Given>(app);
-  app.add_option("--config", line->file, "File of options, see config/simulation/");
+  app.add_option("--config", line->file,
+                 "File of options, or the name of one in config/simulation/, such as city")
+      ->transform(named_file("simulation"));
   options.visit_fields(line->fields);
   app.callback([line, &options] {
     try {
