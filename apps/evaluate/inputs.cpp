@@ -1,8 +1,8 @@
 #include "apps/evaluate/inputs.hpp"
 
+#include <CLI/Error.hpp>
 #include <algorithm>
 #include <deque>
-#include <stdexcept>
 #include <string_view>
 #include <utility>
 
@@ -126,7 +126,7 @@ std::vector<StampedPose> read_estimate(const fs::path& input) {
 std::vector<std::vector<StampedPose>> read_truths(const std::vector<fs::path>& files,
                                                   std::size_t count, const std::string& option) {
   if (files.size() != 1 && files.size() != count)
-    throw std::invalid_argument("give one --truth, or as many as there are " + option);
+    throw CLI::ValidationError("give one --truth, or as many as there are " + option);
   std::vector<std::vector<StampedPose>> truths;
   for (const fs::path& file : files) truths.push_back(read_trajectory(file));
   return truths;

@@ -1,12 +1,12 @@
 #include "apps/evaluate/picture_view.hpp"
 
+#include <CLI/Error.hpp>
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <numbers>
 #include <optional>
 #include <sstream>
-#include <stdexcept>
 #include <vector>
 
 namespace km {
@@ -120,7 +120,7 @@ PictureView parse_view(const std::string& text, const Eigen::AlignedBox3d& exten
   }
   const auto T_world_cam = pose_in(text);
   if (!T_world_cam)
-    throw std::invalid_argument("no view '" + text + "': top, front, oblique or x,y,z,yaw,pitch");
+    throw CLI::ValidationError("no view '" + text + "': top, front, oblique or x,y,z,yaw,pitch");
   return {.width = width,
           .height = height,
           .T_cam_world = T_world_cam->inverse(),

@@ -41,7 +41,7 @@ struct PictureView {
 ///   oblique   from above, south-west and 40 degrees up
 ///   x,y,z,yaw,pitch       perspective from (x, y, z) [m]; yaw 0 looks along x, 90 along y, pitch
 ///                         below 0 looks down [deg]; 80 degrees wide
-/// The first three fill the picture with `extent`. Throws std::invalid_argument for other text.
+/// The first three fill the picture with `extent`. Throws CLI::ValidationError for other text.
 [[nodiscard]] PictureView parse_view(const std::string& text, const Eigen::AlignedBox3d& extent,
                                      int width, int height);
 

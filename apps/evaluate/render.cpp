@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <filesystem>
 #include <iostream>
-#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -77,8 +76,9 @@ struct RenderCommand {
 
   void run() const {
     check_output_folder(output);
+    for (const std::string& view : views) (void)parse_view(view, {}, 1, 1);
     if (references.size() > trajectories.size())
-      throw std::invalid_argument("more --reference than --trajectory");
+      throw CLI::ValidationError("more --reference than --trajectory");
     const SE3 T_picture_mesh = placement_of(trajectories, references, false);
     std::vector<LabelledMesh> placed;
     PictureScene scene;

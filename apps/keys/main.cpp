@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "apps/program_options.hpp"
+#include "modules/core/config.hpp"
 #include "modules/core/text_table.hpp"
 #include "modules/security/key_file.hpp"
 #include "modules/security/key_folder.hpp"
@@ -55,7 +56,7 @@ std::vector<RobotName> robots_from(const std::vector<std::string>& texts) {
   std::vector<RobotName> robots;
   if (const auto count = robot_id_from(texts.front()); texts.size() == 1 && count) {
     for (RobotId id = 0; id < *count; ++id) robots.push_back({id, "robot" + std::to_string(id)});
-    if (robots.empty()) throw std::runtime_error("--robots 0: a team has at least one robot");
+    if (robots.empty()) throw ConfigError("a team has at least one robot");
     return robots;
   }
   for (const std::string& text : texts) {
@@ -64,8 +65,8 @@ std::vector<RobotName> robots_from(const std::vector<std::string>& texts) {
                         ? std::nullopt
                         : robot_id_from(std::string_view(text).substr(colon + 1));
     if (!id)
-      throw std::runtime_error("--robots: \"" + text +
-                               "\" is not name:id, with an id from 0 to 65535, such as alpha:0");
+      throw ConfigError("\"" + text +
+                        "\" is not name:id, with an id from 0 to 65535, such as alpha:0");
     robots.push_back({*id, text.substr(0, colon)});
   }
   return robots;
@@ -93,7 +94,7 @@ struct IssueCommand {
         ->capture_default_str();
   }
 
-  void run() const {
+  void run() const try {
     const auto robots = robots_from(names);
     const std::int64_t now = now_s(), until = now + days * kDay_s;
     if (kIsNew)
@@ -108,6 +109,8 @@ struct IssueCommand {
   --robot ID --name NAME --security FOLDER
 then delete it here. )"
         << (team / "authority").string() << " stays here: whoever has it can admit anyone.\n";
+  } catch (const ConfigError& error) {
+    throw CLI::ValidationError("--robots", error.what());
   }
 };
 

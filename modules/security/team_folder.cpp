@@ -4,6 +4,7 @@
 #include <stdexcept>
 #include <tuple>
 
+#include "modules/core/config.hpp"
 #include "modules/core/folder_name.hpp"
 #include "modules/security/key_file.hpp"
 #include "modules/security/signing.hpp"
@@ -93,14 +94,13 @@ void TeamFolder::check(const std::vector<RobotName>& robots, std::int64_t now_s)
   for (std::size_t i = 0; i < robots.size(); ++i) {
     const auto& [id, name] = robots[i];
     if (!is_folder_name(name) || name == kAuthorityFolder)
-      throw std::runtime_error("robot name \"" + name +
-                               "\": names a folder, so it is made of letters, digits, _, - and ., "
-                               "and not \"authority\"");
+      throw ConfigError("robot name \"" + name +
+                        "\": names a folder, so it is made of letters, digits, _, - and ., "
+                        "and not \"authority\"");
     for (std::size_t j = 0; j < i; ++j)
       if (robots[j].id == id || robots[j].name == name)
-        throw std::runtime_error(describe(id, name) + " and " +
-                                 describe(robots[j].id, robots[j].name) +
-                                 ": ids and names are unique in a team");
+        throw ConfigError(describe(id, name) + " and " + describe(robots[j].id, robots[j].name) +
+                          ": ids and names are unique in a team");
     for (const Certificate& other : issued_)
       if ((other.robot == id || other.name == name) &&
           why_invalid(other, revocations_, now_s) == nullptr)

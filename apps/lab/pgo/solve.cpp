@@ -335,9 +335,9 @@ struct SolveCommand {
 
   void run() {
     if (solver.trust_all && solver.method != "newton")
-      throw std::runtime_error("--trust-all is for --method newton only");
+      throw CLI::ValidationError("--trust-all is for --method newton only");
     if (over_relaxation && solver.method != "rbcd")
-      throw std::runtime_error("--over-relaxation is for --method rbcd only");
+      throw CLI::ValidationError("--over-relaxation is for --method rbcd only");
     solver.max_rounds = rounds.value_or(solver.rejects() ? 1000 : 100);
     solver.over_relaxation = over_relaxation.value_or(solver.over_relaxation);
     check_output_folder(json);

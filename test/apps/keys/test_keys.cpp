@@ -61,7 +61,7 @@ TEST_CASE("kimera_multi_keys shows what is wrong with a robot's folder") {
   CHECK(keys("show survey/alpha").exit_code == 1);
 }
 
-TEST_CASE("kimera_multi_keys ends with 1 and the reason if it fails") {
+TEST_CASE("kimera_multi_keys ends with the reason if it fails") {
   const Shell keys;
   REQUIRE(keys("make survey --robots alpha:0").exit_code == 0);
   const auto [arguments, reason] = GENERATE(table<std::string, std::string>({
