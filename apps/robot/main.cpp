@@ -2,7 +2,6 @@
 #include <exception>
 #include <iostream>
 #include <opencv2/core.hpp>
-#include <sstream>
 
 #include "apps/program_options.hpp"
 #include "apps/robot/inspect.hpp"
@@ -122,7 +121,8 @@ void add_input(CLI::App& app, RobotOptions& options) {
       "change, and all poses are in its frame");
   app.add_option("--extend", options.extend,
                  "Results of a finished run of this robot: poses of both runs are optimised "
-                 "together, and the results of this run contain both");
+                 "together, and the results of this run contain both")
+      ->excludes("--localize");
   app.add_option(
          "--rig", options.rig,
          "For a bag: file with the topics and the calibration of the sensors; for a EuRoC folder: "
@@ -142,23 +142,17 @@ void add_input(CLI::App& app, RobotOptions& options) {
       ->default_str("auto");
 }
 
-// Runs before the dataset is opened, so that the error names the options.
-void check_window(const RobotOptions& options) {
-  if (!options.from_s || !options.to_s || *options.from_s < *options.to_s) return;
-  std::ostringstream message;
-  message << "--from " << *options.from_s << " s is not before --to " << *options.to_s << " s";
-  throw CLI::ValidationError(message.str());
-}
-
-void check_localize(const RobotOptions& options) {
-  if (options.localize.empty() && options.extend.empty()) return;
-  if (!options.localize.empty() && !options.extend.empty())
-    throw CLI::ValidationError(
-        "--localize leaves the map unchanged, and --extend changes it: give one of them");
-  if (!options.graph.empty() || !options.session.empty())
-    throw CLI::ValidationError(
-        "--localize and --extend compare images: give --dataset or --live, not --graph or "
-        "--session");
+// Refuses options that the input of the run does not use.
+void check_use(const CLI::App& app) {
+  const std::pair<const char*, std::string_view> uses[] = {
+      {"--rate", "--dataset --graph"},    {"--from", "--dataset --live"},
+      {"--to", "--dataset --live"},       {"--rig", "--dataset"},
+      {"--odometry", "--dataset --live"}, {"--localize", "--dataset --live"},
+      {"--extend", "--dataset --live"}};
+  for (const auto& [option, inputs] : uses)
+    for (const char* input : {"--dataset", "--live", "--graph", "--session"})
+      if (app.count(option) > 0 && app.count(input) > 0 && inputs.find(input) == inputs.npos)
+        throw CLI::ValidationError(std::string(option) + " has no effect with " + input);
 }
 
 void add_network(CLI::App& app, RobotOptions& options) {
@@ -200,7 +194,8 @@ void add_output(CLI::App& app, RobotOptions& options) {
       ->expected(0, 1)
       ->type_name("[FILE.mcap]");
   app.add_flag("--record-images", options.record_images,
-               "With --record: also record the left images");
+               "With --record: also record the left images")
+      ->needs("--record");
 }
 
 // Prints --help or the error of a wrong command line, and exits the process in both cases.
@@ -239,9 +234,10 @@ RobotOptions options_of(int argc, char** argv) {
   app.add_option("--log", options.log_level, "error, warn, info or debug")
       ->check(CLI::IsMember({"error", "warn", "info", "debug"}))
       ->capture_default_str();
-  app.callback([&options] {
-    check_window(options);
-    check_localize(options);
+  app.callback([&] {
+    check_use(app);
+    if (options.from_s && options.to_s && !(*options.from_s < *options.to_s))
+      throw CLI::ValidationError("--from is not before --to");
   });
   if (const auto exit_code = parse_options(app, argc, argv)) std::exit(*exit_code);
   if (options.name.empty()) options.name = "robot" + std::to_string(options.robot);

@@ -1,9 +1,12 @@
 #include "apps/robot/robot_config.hpp"
 
+#include <algorithm>
 #include <type_traits>
 
 #include "apps/program_version.hpp"
 #include "runtime/config_layers.hpp"
+#include "runtime/dds/participant.hpp"
+#include "runtime/yaml_config.hpp"
 
 namespace km {
 namespace {
@@ -31,6 +34,12 @@ void apply_options(const RobotOptions& options, ConfigLayers& layers) {
     layers.add_override("dds.interface=" + options.interface_name);
   if (options.view) layers.add_override("view.on=true");
   if (options.peers.empty()) return;
+  try {
+    if (std::ranges::count(network_interfaces({}), false, &NetworkInterface::loopback) > 0)
+      check_hosts(options.peers);
+  } catch (const ConfigError& error) {
+    throw CommandLineError(error.what());
+  }
   std::string list;
   for (const std::string& peer : options.peers) list += (list.empty() ? "" : ", ") + peer;
   layers.add_override("dds.peers=[" + list + "]");

@@ -122,6 +122,12 @@ TEST_CASE("Every program has one exit code for bad command lines") {
   const std::multimap<std::string, std::string> more = {
       {"kimera_multi_robot", "--robot 0 --graph x --output x --set no.key=1"},
       {"kimera_multi_robot", "--robot 0 --graph x --output x --set pcm"},
+      {"kimera_multi_robot", "--robot 0 --graph x --output x --from 3"},
+      {"kimera_multi_robot", "--robot 0 --graph x --output x --record-images"},
+      {"kimera_multi_robot", "--robot 0 --live README.md --output x --rate 2"},
+      {"kimera_multi_keys", "make x --robots beta"},
+      {"kimera_multi_keys", "make x --robots beta:1,gamma:1"},
+      {"kimera_multi_evaluate", "render --mesh x --output x.png --view foo"},
       {"kimera_multi_simulate", "--config config/simulation/city.yaml --robots 0 --output x"},
       {"kimera_multi_simulate", "--world city --names a --output x"}};
   for (const std::string& name : words_of(KM_PROGRAMS)) {
