@@ -29,15 +29,16 @@ namespace fs = std::filesystem;
 
 using enum Severity;
 
-Examination refused(const std::string& why) {
-  return {
-      .figures = {},
-      .findings = {
-          {.id = "recording.refused",
-           .severity = kError,
-           .what = why,
-           .means = "no robot can play this input",
-           .to_do = "correct the stated fault; kimera_multi_robot --inspect lists the contents"}}};
+Examination refused(
+    const std::string& why,
+    const std::string& to_do =
+        "correct the stated fault; kimera_multi_robot --inspect lists the contents") {
+  return {.figures = {},
+          .findings = {{.id = "recording.refused",
+                        .severity = kError,
+                        .what = why,
+                        .means = "no robot can play this input",
+                        .to_do = to_do}}};
 }
 
 // Stops a live reader after some seconds, also while the reader waits for silent sensors.
@@ -169,6 +170,10 @@ Examination examine_packets(DatasetReader& reader, const RobotConfig& config, do
 
 Examination examine_recording(const RobotOptions& options, const RobotConfig& config, double live_s,
                               const ReportProgress& report_progress) try {
+  if (const fs::path& file = options.dataset;
+      is_file(file) && (file.extension() == ".g2o" || file.extension() == ".jrl"))
+    return refused(file.string() + ": a pose graph, not a recording",
+                   "kimera_multi_pgo solve " + file.string());
   const auto input = [&] {
     SignalWatch signals;  // interrupts the wait for a live calibration
     return open_robot_input(options, config, std::nullopt, read_rig_input(options), signals);

@@ -66,6 +66,9 @@ TEST_CASE("The doctor gives the reason why no robot can play a file") {
   };
   folder.write("world.ply", "ply\nformat ascii 1.0\n");
   CHECK_THAT(output_of("world.ply"), Contains("does not begin like a .bag, .mcap or .db3 file"));
+  folder.write("team.jrl", "{}");
+  CHECK_THAT(output_of("team.jrl"), Contains("team.jrl: a pose graph, not a recording") &&
+                                        Contains("to do: kimera_multi_pgo solve "));
   McapSink record(folder.path() / "record.mcap", [](const std::string& why) { FAIL(why); });
   record.put(record.open({"/rosout", RosLog::kType}), Stamp{1}, encode_ros(RosLog{}));
   record.finish();
