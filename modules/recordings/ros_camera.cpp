@@ -68,7 +68,8 @@ Camera camera_of(const RosCameraInfo& info, RosImages images) {
   if (!(raw ? has_K : has_P))
     refuse(info, matrix + " is 0: the camera is not calibrated" +
                      (has_P   ? "; P is not, so its images are rectified (rectified: true)"
-                      : has_K ? "; K is not, so its images are raw (rectified: false)"
+                      : has_K ? "; K is not: state rectified: false if its images are raw, or else "
+                                "name their calibration in the rig file (calibration: ...)"
                               : ""));
   refuse_parts(info);
   if (const auto problem = resolution_problem(info.width, info.height))

@@ -350,10 +350,11 @@ std::string RigCompletion::missing() const {
                      partial_.info_topics[k]);
   }
   if (!partial_.has_cameras && has_infos && has_right() && !T_left_right())
-    append(list,
-           "pose of the right camera: a baseline in P of " + partial_.info_topics[1] +
-               (infos_[1]->p[3] > 0.0 ? " (its P[3] is positive, and must be negative)" : "") +
-               ", or " + missing_chain(*camera_frame(0), *camera_frame(1)));
+    append(list, "pose of the right camera: a baseline in P of " + partial_.info_topics[1] +
+                     (infos_[1]->p[3] > 0.0    ? " (its P[3] is positive, and must be negative)"
+                      : infos_[1]->p[0] == 0.0 ? " (its P is 0)"
+                                               : "") +
+                     ", or " + missing_chain(*camera_frame(0), *camera_frame(1)));
   if (partial_.has_extrinsics) return list;
   const auto body = body_frame(), left = camera_frame(0);
   if (!body)

@@ -420,7 +420,8 @@ TEST_CASE("A rectified camera needs no K, and a raw one no P") {
   info = camera_info("left_optical");
   info.p.fill(0.0);
   CHECK(camera_of(info, RosImages::kRaw).fx == 458.0);
-  CHECK_THROWS_WITH(camera_of(info, RosImages::kRectified), Contains("P is 0"));
+  CHECK_THROWS_WITH(camera_of(info, RosImages::kRectified),
+                    Contains("P is 0") && Contains("name their calibration in the rig file"));
 }
 
 }  // namespace
