@@ -278,12 +278,17 @@ class FindingsOfRun {
     constexpr double kNoisy = 2.0;
     const double rotation = run_.pgo.odometry_rotation_noise,
                  translation = run_.pgo.odometry_translation_noise;
+    // The 99.9999 % quantile of chi-squared with 6 degrees of freedom, as for closures.
+    constexpr double kContradicting = 38.3 / 6.0;
+    const bool is_near = run_.correction && !(run_.correction->normalised_square > kContradicting);
     if (std::max(rotation, translation) >= kNoisy)
-      add(kWarning, "odometry.noisy",
+      add(is_near ? kNote : kWarning, "odometry.noisy",
           "the noise of odometry is " + fixed(rotation, 1) + " times the stated one in rotation, " +
               fixed(translation, 1) + " times in translation",
-          "loop closures of this robot contradict its odometry to this extent: the pose graph uses "
-          "the larger noise",
+          is_near ? "the pose graph uses the larger noise; the optimised trajectory agrees with "
+                    "odometry"
+                  : "loop closures of this robot contradict its odometry to this extent: the pose "
+                    "graph uses the larger noise",
           "check calibration and stamps with kimera_multi_doctor on the recording; "
           "vio.drift_rotation and vio.drift_translation are the stated noise");
     if (run_.pgo.odometry_breaks > 0)
@@ -292,9 +297,7 @@ class FindingsOfRun {
           "loop closures of this robot agree on a jump there, as after lost tracking; the "
           "optimised trajectory is corrected, odometry.tum is not",
           "see the log for the keyframes, and odometry in summary.json");
-    // The 99.9999 % quantile of chi-squared with 6 degrees of freedom, as for closures.
-    constexpr double kContradicting = 38.3 / 6.0;
-    if (run_.correction && run_.correction->normalised_square > kContradicting)
+    if (run_.correction && !is_near)
       add(kWarning, "odometry.contradicted",
           "the optimised trajectory is up to " + fixed(run_.correction->largest_m, 2) +
               " m from odometry, " + fixed(std::sqrt(run_.correction->normalised_square), 1) +

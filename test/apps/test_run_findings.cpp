@@ -172,6 +172,10 @@ TEST_CASE("A finding on a run is reported with its severity and its number") {
       {nullptr, kNote, "a short pause", of([](auto& s) { s.paused_s = 0.75; })},
       {"odometry.noisy", kWarning, "1.0 times the stated one in rotation, 6.8 times",
        of([](auto& s) { s.pgo.odometry_translation_noise = 6.75; })},
+      {"odometry.noisy", kNote, "2.8 times the stated one in rotation", of([](auto& s) {
+         s.pgo.odometry_rotation_noise = 2.8;
+         s.correction = {.largest_m = 0.07, .normalised_square = 3.6};
+       })},
       {nullptr, kNote, "little noise", of([](auto& s) { s.pgo.odometry_translation_noise = 1.5; })},
       {"odometry.broken", kWarning, "2 steps of odometry are wrong",
        of([](auto& s) { s.pgo.odometry_breaks = 2; })},
