@@ -3,6 +3,7 @@
 #include <CLI/Error.hpp>
 #include <algorithm>
 #include <deque>
+#include <iostream>
 #include <string_view>
 #include <utility>
 
@@ -165,9 +166,16 @@ LabelPalette read_palette(fs::path file, const fs::path& mesh, std::span<const M
   return palette;
 }
 
+LabelledMesh read_shown_mesh(const fs::path& file) {
+  std::vector<std::string> notes;
+  LabelledMesh mesh = without_far_vertices(read_mesh(file), file.string(), notes);
+  for (const std::string& note : notes) std::cout << "note: " << note << '\n';
+  return mesh;
+}
+
 LabelledMesh read_meshes(const std::vector<fs::path>& files) {
   LabelledMesh all;
-  for (const fs::path& file : files) all.append(read_mesh(file));
+  for (const fs::path& file : files) all.append(read_shown_mesh(file));
   return all;
 }
 

@@ -46,7 +46,10 @@ template <typename T>
                                const std::vector<std::filesystem::path>& references,
                                bool one_for_all);
 
-/// All meshes of the files as one.
+/// The mesh of a file by without_far_vertices(), whose note is printed.
+[[nodiscard]] LabelledMesh read_shown_mesh(const std::filesystem::path& file);
+
+/// All meshes of the files as one, each by read_shown_mesh().
 [[nodiscard]] LabelledMesh read_meshes(const std::vector<std::filesystem::path>& files);
 
 /// The palette in `file`, or else in label_palette.csv beside `mesh`, where the simulator and

@@ -11,7 +11,6 @@
 #include "apps/output_file.hpp"
 #include "apps/result_files.hpp"
 #include "modules/evaluation/mesh/mesh_error.hpp"
-#include "modules/mesh/mesh_file.hpp"
 
 namespace km {
 namespace {
@@ -84,7 +83,7 @@ struct RenderCommand {
     PictureScene scene;
     LabelledMesh all;
     for (const fs::path& file : meshes) {
-      placed.emplace_back(read_mesh(file)).transform(T_picture_mesh);
+      placed.emplace_back(read_shown_mesh(file)).transform(T_picture_mesh);
       all.append(placed.back());
       scene.names.push_back(short_name(file));
     }

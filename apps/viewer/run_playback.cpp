@@ -167,6 +167,10 @@ OccupancyGrid read_map_2d(const fs::path& file, RobotId anchor) {
   return map;
 }
 
+LabelledMesh read_shown(const fs::path& file, std::vector<std::string>& notes) {
+  return without_far_vertices(read_mesh(file), file.string(), notes);
+}
+
 // The content if a robot could send it. Numbers in files may be impossible.
 std::optional<ViewContent> checked_content(std::optional<ViewContent> content) {
   if (!content || !decode_view(encode_view(*content)))
@@ -186,7 +190,8 @@ std::vector<ViewContent> read_layers(const fs::path& folder, RobotId robot, Robo
   };
   add(kObjectsFile, [](const fs::path& file) { return view_objects(read_object_list(file)); });
   add(kMap2d, [&](const fs::path& file) { return view_raster(read_map_2d(file, anchor)); });
-  add(kDistanceSlice, [&](const fs::path& file) { return view_raster(read_mesh(file), robot); });
+  add(kDistanceSlice,
+      [&](const fs::path& file) { return view_raster(read_shown(file, notes), robot); });
   return layers;
 }
 
@@ -196,7 +201,7 @@ std::vector<MeshChunk> read_team_mesh(const fs::path& folder, RobotId robot, Rob
                                       std::vector<std::string>& notes) {
   const auto other = static_cast<RobotId>(robot ^ 1U);
   return read_if_there(folder / kTeamMesh, notes, [&](const fs::path& file) {
-    return split_mesh(read_mesh(file), other, anchor, ChunkGrid{}).chunks;
+    return split_mesh(read_shown(file, notes), other, anchor, ChunkGrid{}).chunks;
   });
 }
 
@@ -233,8 +238,12 @@ RunPlayback read_run(const fs::path& folder, Stamp begin) {
   for (const fs::path& one : folders_of_robots(folder)) {
     RobotPlayback robot = read_robot(one, run.notes);
     if (robot.is_empty()) continue;
-    const auto map = read_if_there(one / kMapFile, run.notes, read_map_file);
-    const auto optimized = read_if_there(one / "mesh_optimized.ply", run.notes, read_mesh);
+    const auto map = read_if_there(one / kMapFile, run.notes, [&](const fs::path& file) {
+      return without_far_vertices(read_map_file(file).mesh, file.string(), run.notes);
+    });
+    const auto optimized =
+        read_if_there(one / "mesh_optimized.ply", run.notes,
+                      [&](const fs::path& file) { return read_shown(file, run.notes); });
     for (ViewContent& layer : read_layers(one, robot.robot(), robot.anchor(), run.notes))
       robot.add_at_end(std::move(layer));
     if (!fused.contains(robot.anchor()))
@@ -242,7 +251,7 @@ RunPlayback read_run(const fs::path& folder, Stamp begin) {
         fused.insert(robot.anchor());
         robot.add_at_end(std::move(chunk));
       }
-    const std::vector<ViewUpdate> updates = robot.finish(map.mesh, optimized);
+    const std::vector<ViewUpdate> updates = robot.finish(map, optimized);
     if (!robots.insert(robot.robot()).second)
       throw std::runtime_error(folder.string() + ": two folders are of robot " +
                                std::to_string(robot.robot()) + ": give one run");

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
@@ -352,6 +353,36 @@ LabelledMesh read_mesh(const std::filesystem::path& file) {
   } catch (const std::runtime_error& error) {
     throw InputFileError(file.string() + ": " + readable(error.what()));
   }
+}
+
+LabelledMesh without_far_vertices(LabelledMesh mesh, const std::string& name,
+                                  std::vector<std::string>& notes) {
+  constexpr float kFar = 100.0F;
+  if (mesh.empty()) return mesh;
+  const std::size_t last = mesh.vertices.size() - 1;
+  std::vector<float> values(mesh.vertices.size());
+  Eigen::Vector3f low, high;  // quartiles
+  for (int axis = 0; axis < 3; ++axis) {
+    for (std::size_t v = 0; v <= last; ++v) values[v] = mesh.vertices[v][axis];
+    std::ranges::sort(values);
+    low[axis] = values[last / 4];
+    high[axis] = values[3 * last / 4];
+  }
+  const float bound_m = kFar * (high - low).norm();
+  const auto distance = [middle = Eigen::Vector3f(0.5F * (low + high))](const auto& vertex) {
+    return (vertex - middle).norm();
+  };
+  std::vector<std::uint32_t> kept;
+  for (std::uint32_t v = 0; v <= last; ++v)
+    if (bound_m == 0.0F || distance(mesh.vertices[v]) <= bound_m) kept.push_back(v);
+  if (kept.size() > last) return mesh;
+  const std::size_t faces = std::erase_if(mesh.faces, [&](const LabelledMesh::Face& face) {
+    return !std::ranges::all_of(face, [&](auto v) { return std::ranges::binary_search(kept, v); });
+  });
+  mesh.keep_vertices(kept);
+  notes.push_back(name + ": not shown: " + std::to_string(faces) + " faces with a vertex over " +
+                  std::to_string(std::lround(bound_m)) + " m from the middle");
+  return mesh;
 }
 
 void write_mesh(const std::filesystem::path& file, const LabelledMesh& mesh) {

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
+#include <vector>
 
 #include "modules/mesh/labelled_mesh.hpp"
 
@@ -13,6 +15,12 @@ namespace km {
 /// missing, truncated or not PLY, for coordinates that are not finite, and for faces with vertices
 /// that do not exist.
 [[nodiscard]] LabelledMesh read_mesh(const std::filesystem::path& file);
+
+/// `mesh` for a view, without vertices far away and their faces, which would make a picture empty:
+/// those beyond 100 times the size of the box of the quartiles, from its middle. `notes` gets one
+/// line about `name` if there are any.
+[[nodiscard]] LabelledMesh without_far_vertices(LabelledMesh mesh, const std::string& name,
+                                                std::vector<std::string>& notes);
 
 /// Writes binary little endian PLY, which read_mesh() reads back unchanged: vertices as float, then
 /// uchar red, green, blue and label if the mesh has them. Throws std::invalid_argument for another

@@ -101,6 +101,20 @@ TEST_CASE("render draws one picture per view") {
   CHECK(run.picture("out_2.png").cols == 320);
 }
 
+TEST_CASE("render and glb leave out a face with a vertex far away, and tell") {
+  const Meshes run;
+  LabelledMesh mesh = room();
+  mesh.faces.push_back({0, 1, static_cast<std::uint32_t>(mesh.vertices.size())});
+  mesh.vertices.emplace_back(1e6F, 1e6F, 0.0F);
+  mesh.labels.push_back(1);
+  run.write("far.ply", mesh);
+  for (const std::string command : {"glb --output far.glb", "render --view front --output far.png"})
+    CHECK_THAT(succeeded(run(command + " --mesh far.ply")).output,
+               StartsWith("note: far.ply: not shown: 1 faces with a vertex over "));
+  succeeded(run("render --view front --output out.png --mesh world.ply"));
+  CHECK(cv::norm(run.picture("far.png"), run.picture("out.png"), cv::NORM_INF) == 0.0);
+}
+
 TEST_CASE("render stands a map upright by a reference trajectory") {
   const Meshes run;
   run.write("a/mesh.ply", room(),

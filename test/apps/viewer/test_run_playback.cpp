@@ -104,6 +104,18 @@ TEST_CASE("Damaged layers are noted with their file and left out") {
   CHECK(run.updates.size() < all);
 }
 
+TEST_CASE("A face with a vertex far away is left out of a mesh, and noted") {
+  const SmallRun files;
+  LabelledMesh mesh = read_mesh(files.of(1) / "mesh_optimized.ply");
+  mesh.faces.push_back({0, 1, static_cast<std::uint32_t>(mesh.vertices.size())});
+  mesh.vertices.emplace_back(2e6F, 0.0F, 0.0F);  // beyond the range of chunks
+  write_mesh(files.of(1) / "mesh_optimized.ply", mesh);
+  const RunPlayback run = read_run(files.folder.path(), kBegin);
+  CHECK(updates_of<MeshChunk>(run, 1).size() == 4);
+  REQUIRE(run.notes.size() == 1);
+  CHECK_THAT(run.notes[0], Contains("r1/mesh_optimized.ply: not shown: 1 faces"));
+}
+
 TEST_CASE("A closure is shown with each of its stages") {
   const SmallRun files;
   std::vector<std::pair<double, ViewClosure>> closures;
