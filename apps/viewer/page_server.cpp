@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "modules/core/json.hpp"
+#include "runtime/clock.hpp"
 #include "runtime/dds/participant.hpp"
 
 namespace km {
@@ -21,11 +22,12 @@ namespace {
 
 constexpr std::size_t kBatchBytes = 1 << 18;
 constexpr double kWait_s = 0.2;
-// Each open connection occupies one thread of the server. A connection is closed if no request
-// arrives, or a page does not read, for kIdle_ms. Otherwise idle connections would
-// keep pages waiting for the default of 30 s.
+// Each open connection occupies one thread of the server, and further ones wait for a thread. A
+// connection is closed if its request takes longer than kRequest_s, or if nothing is read from it:
+// a page for kIdle_s, because the number of pages is limited, a file for kRequest_s.
 constexpr const char* kConnections = "192";
-constexpr const char* kIdle_ms = "10000";
+constexpr const char* kRequest_ms = "1000";
+constexpr double kRequest_s = 1.0, kIdle_s = 10.0;
 // Open pages in all and of one address: the other threads serve files.
 constexpr std::size_t kMaxPages = 96, kMaxPagesOfAddress = 48;
 constexpr std::size_t kMaxImages = 64;  // robots whose images a page requests
@@ -76,6 +78,21 @@ std::string parameter(const mg_connection* connection, const char* name) {
   return value.data();
 }
 
+// False if the page has gone or does not read. mg_write() gives up earlier.
+bool write_to_page(mg_connection* connection, std::string_view bytes) {
+  for (double read_s = steady_now_s(); !bytes.empty();) {
+    const double start_s = steady_now_s();
+    const int written = mg_write(connection, bytes.data(), bytes.size());
+    const double now_s = steady_now_s();
+    if (written > 0)
+      read_s = now_s;
+    else if (now_s - start_s < kRequest_s || now_s - read_s > kIdle_s)
+      return false;
+    bytes.remove_prefix(static_cast<std::size_t>(std::max(written, 0)));
+  }
+  return true;
+}
+
 // Sends a frame: four bytes, in which the lowest bit stands for binary data and the others for the
 // size, and the data. False if the page has gone or does not read.
 bool send(mg_connection* connection, bool binary, std::string_view bytes) {
@@ -83,7 +100,7 @@ bool send(mg_connection* connection, bool binary, std::string_view bytes) {
   const std::size_t head = bytes.size() << 1U | (binary ? 1U : 0U);
   for (unsigned k = 0; k < 32; k += 8) frame += static_cast<char>(head >> k);
   frame.append(bytes);
-  return std::cmp_equal(mg_write(connection, frame.data(), frame.size()), frame.size());
+  return write_to_page(connection, frame);
 }
 
 int refuse(mg_connection* connection) {
@@ -162,7 +179,7 @@ void PageServer::start() {
   const std::string port = host + ':' + std::to_string(options_.port);
   const std::array<const char*, 11> settings = {
       "listening_ports",          port.c_str(), "num_threads", kConnections,
-      "request_timeout_ms",       kIdle_ms,     "tcp_nodelay", "1",
+      "request_timeout_ms",       kRequest_ms,  "tcp_nodelay", "1",
       "enable_directory_listing", "no",         nullptr};
   mg_init_data init{};
   mg_callbacks callbacks{};

@@ -6,6 +6,7 @@
 
 #include <cerrno>
 #include <regex>
+#include <thread>
 
 #include "apps/viewer/page_server.hpp"
 #include "test/apps/viewer/page_listener.hpp"
@@ -120,7 +121,7 @@ class RawConnection {
   int socket_;
 };
 
-TEST_CASE("A page does not wait until idle connections are closed") {
+TEST_CASE("A page waits for a second at most while others send nothing, or byte by byte") {
   ViewStore store(1'000'000);
   const PageServer server(store, any_port());
   const int port = port_of(server);
@@ -128,6 +129,14 @@ TEST_CASE("A page does not wait until idle connections are closed") {
   for (int i = 0; i < 40; ++i) idle.push_back(std::make_unique<RawConnection>(port));
   CHECK(get(port, "/").status == 200);
   CHECK(std::ranges::all_of(idle, [](const auto& connection) { return connection->is_open(); }));
+  while (idle.size() < 250) idle.push_back(std::make_unique<RawConnection>(port));
+  const std::jthread writer([&](const std::stop_token& stop) {
+    for (; !stop.stop_requested(); std::this_thread::sleep_for(std::chrono::milliseconds(100)))
+      for (const auto& connection : idle) connection->send("x");
+  });
+  const auto start = std::chrono::steady_clock::now();
+  CHECK(get(port, "/").status == 200);
+  CHECK(std::chrono::steady_clock::now() - start < std::chrono::seconds(2));
 }
 
 TEST_CASE("Pages beyond the limit are refused, and files are served still") {
