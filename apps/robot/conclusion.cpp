@@ -218,6 +218,8 @@ int conclude(const StoppedRun& run, std::optional<Watch>& watch, FinalRoom& room
   const auto& [options, config, robot, result, record] = run;
   watch->finish(record);
   RunEnd end = end_of(options, robot, result, watch->reason(), record);
+  const PeerTable::SameId same_id = robot.bridge().peers().ask(&PeerTable::same_id);
+  end.id_taken |= same_id == PeerTable::SameId::kOpen;
   end.is_alone = watch->is_alone();
   end.missed = watch->missed();
   end.unmet = watch->unmet();
@@ -253,6 +255,13 @@ int conclude(const StoppedRun& run, std::optional<Watch>& watch, FinalRoom& room
       log::warn("peers") << path.what;
       summary.noticed.push_back(std::move(path));
     }
+  if (end.id_taken || same_id != PeerTable::SameId::kNone)
+    summary.noticed.push_back(
+        {.id = "network.same_id",
+         .severity = end.id_taken ? Severity::kError : Severity::kWarning,
+         .what = "another robot had this robot's id " + std::to_string(options.robot),
+         .means = "the robots of the team may have taken the data of one for those of the other",
+         .to_do = "give every robot its own --robot, and run again"});
   end.lost_results = results.lost();
   summary.exit_reason = verdict_of(end).reason;
   summary.findings =

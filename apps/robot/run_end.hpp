@@ -116,7 +116,7 @@ struct ImageCounts {
 struct RunEnd {
   RobotId robot = 0;
   RunResult result;
-  bool id_taken = false;                   ///< Another running robot had the same id first.
+  bool id_taken = false;                   ///< Another robot had the same id first, or may have.
   const char* departure = nullptr;         ///< Reason why the robot left its team, if it did.
   std::optional<ImageCounts> images = {};  ///< Absent for a robot without sensors.
   std::string odometry_fault = {};         ///< Error of the input for which odometry failed.

@@ -194,6 +194,7 @@ void PeerTable::twin_received(const Guid& guid, double its_uptime_s, double own_
   const std::string claim = "at " + twin.addresses + " also claims this robot's id " +
                             std::to_string(self_.robot) + ": give every robot its own --robot";
   if (!twin.twin) {
+    has_met_twin_ = true;
     const double older_by_s = its_uptime_s - own_uptime_s;
     const bool is_new = own_uptime_s <= kNew_s;
     const bool yields = is_new && older_by_s > kYounger_s;
@@ -209,6 +210,14 @@ void PeerTable::twin_received(const Guid& guid, double its_uptime_s, double own_
   if (twin.identity->boot < self_.boot)
     emit(PeerEventKind::kConflict, *twin.identity,
          claim + "; both started at about the same time, and this robot ends");
+}
+
+PeerTable::SameId PeerTable::same_id() const {
+  if (!has_met_twin_) return SameId::kNone;
+  const auto is_open = [](const auto& entry) {
+    return entry.second.twin && !entry.second.twin->decided;
+  };
+  return std::ranges::any_of(participants_, is_open) ? SameId::kOpen : SameId::kKept;
 }
 
 std::vector<Peer> PeerTable::peers() const {

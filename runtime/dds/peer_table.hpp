@@ -133,6 +133,11 @@ class PeerTable {
   /// and both stay, the one with the higher boot id yields.
   void twin_received(const Guid& guid, double its_uptime_s, double own_uptime_s);
 
+  /// kOpen: another process with this robot's id was received, and neither has yielded yet.
+  /// kKept: there was such a process.
+  enum class SameId { kNone, kKept, kOpen };
+  [[nodiscard]] SameId same_id() const;
+
   /// Events since the last call, in order.
   [[nodiscard]] std::vector<PeerEvent> take_events() { return std::exchange(events_, {}); }
 
@@ -220,6 +225,7 @@ class PeerTable {
   std::map<RobotId, KnownPeer> peers_;
   std::uint64_t arrivals_ = 0;
   std::size_t forged_ = 0;
+  bool has_met_twin_ = false;
   std::vector<PeerEvent> events_;
 };
 

@@ -81,6 +81,16 @@ TEST_CASE(
   CHECK(incumbent.wait() == 0);
 }
 
+TEST_CASE("Two robots with one id say so and fail, also if their input ends within seconds") {
+  const TemporaryFolder one, two;
+  const int domain = random_domain();
+  Process a(robot_on({7, 0}, {1, 40}, one.path(), domain, "max", 0));
+  Process b(robot_on({7, 0}, {1, 40}, two.path(), domain, "max", 0));
+  const int end_of_a = a.wait();
+  CHECK(std::max(end_of_a, b.wait()) == 3);
+  CHECK_THAT((end_of_a == 3 ? one : two).read("robot7/summary.json"), Contains("network.same_id"));
+}
+
 // Robots and a viewer, over the network.
 
 TEST_CASE("A viewer receives nothing without --view, and nothing from a team with keys", "[view]") {
