@@ -101,18 +101,19 @@ void examine_buffers(const NetworkFacts& facts, Examination& result) {
 }
 
 void examine_ids(const std::vector<DiscoveredRobot>& robots, Examination& result) {
-  std::map<RobotId, std::map<std::uint64_t, std::string>> processes;
+  // Robots with keys and those without ignore each other.
+  std::map<std::pair<RobotId, bool>, std::map<std::uint64_t, std::string>> processes;
   for (const DiscoveredRobot& robot : robots)
     if (robot.identity)
-      processes[robot.identity->robot][robot.identity->boot] =
+      processes[{robot.identity->robot, robot.has_keys}][robot.identity->boot] =
           name_of(robot) + " at " + robot.address;
-  for (const auto& [id, boots] : processes) {
+  for (const auto& [key, boots] : processes) {
     if (boots.size() < 2) continue;
     std::set<std::string> names;
     for (const auto& [boot, name] : boots) names.insert(name);
     result.add(kError, "network.same_id",
-               std::to_string(boots.size()) + " robots have id " + std::to_string(id) + ": " +
-                   joined(names),
+               std::to_string(boots.size()) + " robots have id " + std::to_string(key.first) +
+                   ": " + joined(names),
                "the robot that started last stops", "give every robot its own --robot");
   }
 }

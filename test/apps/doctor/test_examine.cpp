@@ -258,6 +258,12 @@ TEST_CASE("The reason that keeps robots apart on a network is named") {
              facts.robots = {robot(7, "alice"), robot(7, "bob")};
              facts.robots[1].identity->boot = 0x50000;
            }},
+      Case{"error network.keys ",  // and these two ignore each other
+           [](auto& facts) {
+             facts.robots = {robot(7, "alice"), robot(7, "bob")};
+             facts.robots[1].identity->boot = 0x50000;
+             facts.robots[1].has_keys = true;
+           }},
       Case{"note network.other_programs ", [](auto& facts) { facts.ros_topics = 3; }},
       Case{"warning network.unreachable ", echo({.host = {}, .sent = 20})},
       Case{"warning network.loss ", echo({.host = {}, .sent = 20, .received = 15})},
