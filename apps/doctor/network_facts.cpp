@@ -184,12 +184,18 @@ void examine_robots(const NetworkFacts& facts, Examination& result) {
                                        fixed(facts.listened_s, 1) + " s");
   examine_ids(facts.robots, result);
   examine_keys(facts.robots, result);
-  const bool is_alone = facts.robots.empty();
+  // If peers on other hosts are named, robots on this host do not count.
+  const std::string here = '/' + facts.chosen->address + ':';
+  const bool asks_others = std::ranges::any_of(
+      facts.config.peers, [&](const std::string& peer) { return '/' + peer + ':' != here; });
+  const bool is_alone = std::ranges::all_of(facts.robots, [&](const DiscoveredRobot& robot) {
+    return asks_others && robot.address.find(here) != robot.address.npos;
+  });
   examine_elsewhere(facts, is_alone, result);
   if (is_alone)
     result.add(facts.config.peers.empty() ? kNote : kWarning, "network.no_peers",
-               "no robot of team " + facts.config.team + " is received in " +
-                   fixed(facts.listened_s, 1) + " s",
+               "no robot of team " + facts.config.team + (asks_others ? " on another host" : "") +
+                   " is received in " + fixed(facts.listened_s, 1) + " s",
                "none runs, it has another dds.team, or one of the other findings is the reason",
                "start a robot on another host, or name the address of a running one in --peers");
 }

@@ -275,6 +275,11 @@ TEST_CASE("The reason that keeps robots apart on a network is named") {
              facts.config.peers = {"10.0.0.2"};
              facts.robots.clear();
            }},
+      Case{"warning network.no_peers ",  // as behind NAT: this host's own robot is received
+           [](auto& facts) {
+             facts.config.peers = {"10.0.0.2"};
+             facts.robots[0].address = "udp/" + facts.chosen->address + ":7411@2";
+           }},
       Case{"note network.no_peers ", [](auto& facts) { facts.robots.clear(); }},
       Case{"warning network.other_domain note network.no_peers ",
            [](auto& facts) {
