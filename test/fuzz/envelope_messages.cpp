@@ -4,6 +4,7 @@
 #include <memory>
 #include <stdexcept>
 
+#include "runtime/dds/codec.hpp"
 #include "runtime/dds/envelope.hpp"
 #include "runtime/dds/participant.hpp"
 #include "runtime/dds/qos.hpp"
@@ -30,7 +31,7 @@ class EnvelopeReader {
         dds_create_reader(participant_.handle(), topic_.handle(), nullptr, nullptr), "reader");
     const DdsEntity writer(
         dds_create_writer(participant_.handle(), topic_.handle(), nullptr, nullptr), "writer");
-    for (const std::size_t size : {0, 4, 300}) {  // without padding: every octet is used
+    for (const std::size_t size : {0U, 4U, 300U}) {  // without padding: every octet is used
       Bytes content(size, 7);
       km_wire_Envelope envelope{
           .key = 5, .boot = 70, .number = 3, .version = 1, .robot = 2, .content = {}};
