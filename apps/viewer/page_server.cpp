@@ -23,8 +23,8 @@ namespace {
 constexpr std::size_t kBatchBytes = 1 << 18;
 constexpr double kWait_s = 0.2;
 // Each open connection occupies one thread of the server, and further ones wait for a thread. A
-// connection is closed if its request takes longer than kRequest_s, or if nothing is read from it:
-// a page for kIdle_s, because the number of pages is limited, a file for kRequest_s.
+// connection is closed if its request takes longer than kRequest_s. It is also closed if a file is
+// not read for kRequest_s, or a page for kIdle_s: the number of pages is limited.
 constexpr const char* kConnections = "192";
 constexpr const char* kRequest_ms = "1000";
 constexpr double kRequest_s = 1.0, kIdle_s = 10.0;

@@ -16,8 +16,8 @@ namespace km {
 /// that do not exist.
 [[nodiscard]] LabelledMesh read_mesh(const std::filesystem::path& file);
 
-/// `mesh` for a view, without vertices far away and their faces, which would make a picture empty:
-/// those beyond 100 times the size of the box of the quartiles, from its middle. `notes` gets one
+/// `mesh` for a view, without vertices far away and their faces, which would make a picture empty.
+/// Far is beyond 100 times the size of the box of the quartiles, from its middle. `notes` gets one
 /// line about `name` if there are any.
 [[nodiscard]] LabelledMesh without_far_vertices(LabelledMesh mesh, const std::string& name,
                                                 std::vector<std::string>& notes);

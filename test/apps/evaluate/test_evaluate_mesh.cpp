@@ -101,7 +101,7 @@ TEST_CASE("render draws one picture per view") {
   CHECK(run.picture("out_2.png").cols == 320);
 }
 
-TEST_CASE("render and glb leave out a face with a vertex far away, and tell") {
+TEST_CASE("render and glb leave out a face with a vertex far away, and report it") {
   const Meshes run;
   LabelledMesh mesh = room();
   mesh.faces.push_back({0, 1, static_cast<std::uint32_t>(mesh.vertices.size())});
