@@ -1129,13 +1129,46 @@ def levels_section(results):
                 "hides it, by the angle between the optical axes."))
 
 
+# ---------------------------------------------------------------------------- maps
+
+def maps_section(results):
+    maps = sorted((match[1], match[2]) for match in results.matches(r"map-(\w+)-(mesh|open3d)\.json"))
+    quality = lambda row: results.json(f"map-{row[0]}-{row[1]}.json")["quality"]
+
+    def seen(part, name):
+        return lambda row: percent(number(part(quality(row)), name))
+
+    def percent(value):
+        return fixed(100.0 * or_nan(value), 1)
+
+    near, far = (lambda tree, k=k: tree["by_depth"][k] for k in range(2))
+    buildings = lambda tree: tree["by_class"].get("building")
+
+    return maps and (
+        "Maps of one robot by true poses and recorded depth, as the robot makes them by default, beside "
+        "Open3D's ScalableTSDFVolume with voxels of 0.1 m in the city and 0.05 m in rooms.\n\n"
+        + table("Maps beside Open3D", {
+            "world and seed": lambda row: row[0], "map": lambda row: {"mesh": "ours"}.get(row[1], row[1]),
+            "seen below 10 m [%]: within 20 cm": seen(near, "within_20cm"),
+            "seen below 10 m [%]: 5 cm": seen(near, "within_5cm"),
+            "seen at 10 to 20 m [%]: 20 cm": seen(far, "within_20cm"),
+            "buildings [%]: 20 cm": seen(buildings, "within_20cm"),
+            "map to truth [%]: within 5 cm": lambda row: percent(quality(row)["within_5cm"]),
+            "map to truth [%]: 10 cm": lambda row: percent(quality(row)["within_10cm"]),
+            "walls [deg]": lambda row: fixed(quality(row)["wall_deg"], 1),
+            "walls, rms [mm]": lambda row: fixed(quality(row)["wall_rms_mm"], 1)},
+                maps, "Seen: true surface that the camera saw from this distance, with a mapped one near "
+                "it."))
+
+
 # ---------------------------------------------------------------------------- report
 
 SECTIONS = {"pcm": ("Outlier rejection", pcm_section), "cosmo": ("COSMO-Bench", cosmo_section),
             "trajectory": ("Trajectories", trajectory_section),
             "resources": ("Communication and computation", resources_section),
             "mesh": ("Meshes", mesh_section), "semantics": ("Labels", semantics_section),
-            "levels": ("Worlds that fight back", levels_section)}
+            "levels": ("Worlds that fight back", levels_section),
+            "maps": ("Maps beside Open3D", maps_section)}
 
 
 def targets_section(targets):

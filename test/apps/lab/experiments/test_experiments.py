@@ -69,6 +69,11 @@ class CannedCity(Folder):
         for run, published_m in (("city", 0.006), ("city-run2", 0.006), ("city-run3", 0.006),
                                  ("city-paper", 0.008), ("level2-city-seed1", 0.006)):
             self.write_run(run, published_m)
+        for name in ("mesh", "open3d"):
+            near = {"within_5cm": 0.94, "within_20cm": 0.98}
+            self.write(f"results/map-city4-{name}.json", {"quality": {
+                "within_5cm": 0.84, "within_10cm": 0.93, "wall_deg": 5.06, "wall_rms_mm": 3.0,
+                "by_depth": [near, {"within_20cm": 0.92}], "by_class": {"building": near}}})
         for run, share in (("city", 1.0), ("city-run2", 0.9), ("city-run3", 0.8)):
             for method in tables.METHODS:
                 self.write_method(run, method, share)
