@@ -91,8 +91,9 @@ TEST_CASE("All errors of a file of options are reported by line") {
                  !Contains("citty"));  // the command line says city
   CHECK_THAT(refusal_of_options({"--config", folder.write("c.yaml", "robots: [2\n").string()}),
              Contains("c.yaml:2: not YAML"));
-  CHECK_THAT(refusal_of_options({"--config", "nowhere.yaml"}),
-             Contains("nowhere.yaml: cannot open"));
+  CHECK_THAT(
+      refusal_of_options({"--config", "nowhere.yaml"}),
+      Contains("no file nowhere.yaml, and none of this name in simulation: camp, city, demo"));
 }
 
 TEST_CASE("The files of options that come with the program can be used") {
