@@ -49,7 +49,7 @@ class Watchdog {
     double limit_s = 0.0;
     std::uint64_t beats = 0;
     double passed_s = 0.0;                 // since it is stuck
-    std::optional<double> starved_s = {};  // of the thread, when it became stuck
+    std::optional<double> starved_s = {};  // starved time of the thread at that moment
     double stuck_s = 0.0;                  // part of passed_s in which the thread had a processor
     bool named = false;
     bool ending = false;
