@@ -37,7 +37,7 @@ PcmAddResult WitnessedPair::add(const Closure& closure) {
   known_.insert(id);
   added_.insert(id);
   contest_.add(closure);
-  has_unstated_ |= closure.inliers == 0;
+  if (closure.inliers == 0) unstated_.insert(id);
   const std::size_t before = witnesses();
   if (!is_witnessed()) test(test_.orient(closure));
   return witnesses() > before ? PcmAddResult::kGrew : PcmAddResult::kAdded;
@@ -60,10 +60,21 @@ void WitnessedPair::thin() {
 }
 
 std::vector<ClosureId> WitnessedPair::closures() const {
+  std::set<ClosureId> overruled;
+  for (const PreparedClosure& closure : tested_)  // empty with witnesses
+    if (contradicts_unstated(closure)) overruled.insert(closure.id);
   std::vector<ClosureId> result;
-  std::ranges::copy_if(added_, std::back_inserter(result),
-                       [this](const ClosureId& id) { return !contest_.is_overruled(id); });
+  std::ranges::copy_if(added_, std::back_inserter(result), [&](const ClosureId& id) {
+    return !contest_.is_overruled(id) && !overruled.contains(id);
+  });
   return result;
+}
+
+bool WitnessedPair::contradicts_unstated(const PreparedClosure& closure) const {
+  if (unstated_.empty() || unstated_.contains(closure.id)) return false;
+  return std::ranges::none_of(tested_, [&](const PreparedClosure& other) {
+    return unstated_.contains(other.id) && test_.consistent(closure, other);
+  });
 }
 
 void WitnessedPair::test(const Closure& closure) {

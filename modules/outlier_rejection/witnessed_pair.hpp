@@ -32,7 +32,8 @@ class WitnessedPair {
   [[nodiscard]] PcmAddResult add(const Closure& closure);
 
   /// The added closures without dropped ones and those that stronger ones beside them contradict
-  /// (LocalContest), ascending.
+  /// (LocalContest), ascending. Without witnesses, those that do not state their inliers overrule
+  /// the others: a constellation is known by many objects, a place that looks alike by one view.
   [[nodiscard]] std::vector<ClosureId> closures() const;
   /// Number of witnesses found, at most PcmConfig::min_witnesses.
   [[nodiscard]] std::size_t witnesses() const { return clique_.clique().size(); }
@@ -42,7 +43,7 @@ class WitnessedPair {
   /// inliers (0, as in recorded graphs). Without witnesses, a place with less may be one that only
   /// looks alike.
   [[nodiscard]] bool is_strong() const {
-    return has_unstated_ || support() >= config_.min_lone_support;
+    return !unstated_.empty() || support() >= config_.min_lone_support;
   }
   /// Most inliers of a closure and of those beside it that agree, see LocalContest.
   [[nodiscard]] int support() const { return static_cast<int>(contest_.most_support()); }
@@ -50,14 +51,15 @@ class WitnessedPair {
  private:
   void test(const Closure& closure);
   void thin();
+  [[nodiscard]] bool contradicts_unstated(const PreparedClosure& closure) const;
 
   RobotId a_, b_;
   PcmConfig config_;
   CycleTest test_;
   std::set<ClosureId> known_;  // added closures
   std::set<ClosureId> added_;
-  bool has_unstated_ = false;  // true if an added closure does not state its inliers
-  LocalContest contest_;       // among added closures
+  std::set<ClosureId> unstated_;  // added closures that do not state their inliers
+  LocalContest contest_;          // among added closures
   std::vector<PreparedClosure> tested_;
   MaxClique clique_;  // over `tested_`; closures that share a neighbourhood are not connected
 };

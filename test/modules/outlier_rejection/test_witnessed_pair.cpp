@@ -50,6 +50,27 @@ TEST_CASE("A cluster of aliased keyframes does not join two robots, a second pla
   CHECK(pair.closures().size() == 18);  // the optimiser weighs the one that contradicts
 }
 
+TEST_CASE("Without witnesses a constellation overrules a place that only looks alike") {
+  const Aisles aisles(60);
+  const auto seen = [&](std::size_t i, std::size_t j, double offset_m) {
+    Closure closure = aisles.at(i, j, offset_m);
+    closure.inliers = 70;
+    return closure;
+  };
+  WitnessedPair pair(0, 1, PcmConfig{});
+  for (const std::size_t j : {0U, 1U, 2U}) (void)pair.add(seen(26, j, 62.0));
+  CHECK(pair.closures().size() == 3);
+  const Closure constellation = aisles.at(50, 30);
+  (void)pair.add(constellation);
+  CHECK(pair.closures() == std::vector{constellation.id()});
+  (void)pair.add(seen(49, 30, 0.0));  // beside it, and agrees
+  CHECK(pair.closures().size() == 2);
+  CHECK_FALSE(pair.is_witnessed());
+  (void)pair.add(seen(40, 20, 0.0));
+  CHECK(pair.is_witnessed());
+  CHECK(pair.closures().size() == 6);  // the optimiser weighs those that contradict
+}
+
 TEST_CASE("Along a common stretch there is a witness every fourth keyframe") {
   const Aisles aisles(40);
   PcmConfig config{.min_witnesses = 1000};
