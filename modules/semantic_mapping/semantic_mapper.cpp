@@ -65,6 +65,7 @@ bool fits(const Image& image, const Pixels& pixels, const Camera& camera) {
 double fitting_voxel_m(const SemanticMappingConfig& config,
                        std::span<const std::shared_ptr<const DepthImage>> images) {
   constexpr std::array kSides_m = {0.02, 0.03, 0.05, 0.1};
+  constexpr std::array kNearest_m = {1.48, 2.22, 3.15};  // lower quartile up to which a side fits
   std::vector<std::uint16_t> known;
   for (const auto& image : images)
     for (const std::uint16_t mm : image->millimetres)
@@ -72,8 +73,8 @@ double fitting_voxel_m(const SemanticMappingConfig& config,
   if (known.empty()) return kSides_m.back();
   const auto quartile = known.begin() + static_cast<std::ptrdiff_t>(known.size() / 4);
   std::ranges::nth_element(known, quartile);
-  const auto found = std::ranges::lower_bound(kSides_m, 1e-3 * *quartile / 74.0);
-  return found == kSides_m.end() ? kSides_m.back() : *found;
+  const auto found = std::ranges::lower_bound(kNearest_m, 1e-3 * *quartile);
+  return kSides_m.at(static_cast<std::size_t>(found - kNearest_m.begin()));
 }
 
 struct SemanticMapper::State {

@@ -254,7 +254,7 @@ TEST_CASE("The smallest voxels fit the depths") {
   CHECK(voxel_m(1400) == 0.02);
   CHECK(voxel_m(2200) == 0.03);
   CHECK(voxel_m(3000) == 0.05);
-  CHECK(voxel_m(4000) == 0.1);
+  CHECK(voxel_m(3300) == 0.1);
   CHECK(voxel_m(0) == 0.1);                                                    // unknown
   CHECK_THROWS_AS(SemanticMapper({}, small_camera()), std::invalid_argument);  // without images
 }
