@@ -11,7 +11,6 @@ namespace km {
 
 /// Shows a watchdog whether a thread makes progress. A step that waits for its time, or for room in
 /// the queue of another worker, does not count as stuck, because the other worker may be the cause.
-/// Neither does the time for which a busy machine leaves the thread without a processor.
 /// A circular wait is therefore not detected. Thread-safe.
 class Heartbeat {
  public:
@@ -61,9 +60,8 @@ class Heartbeat {
   [[nodiscard]] std::uint64_t beats() const { return beats_; }
   [[nodiscard]] bool in_step() const { return beats_ % 2 == 1; }
   [[nodiscard]] bool waiting() const { return waiting_; }
-  /// Time for which the thread of the last step has been without a processor that it could use,
-  /// since it started [s].
-  [[nodiscard]] double starved_s() const { return starved_time_s(thread_); }
+  /// The thread of the last step by this_thread_id(), 0 before the first one.
+  [[nodiscard]] pid_t thread() const { return thread_; }
 
   void give_up() const {
     if (give_up_) give_up_();

@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <fstream>
 #include <string>
 #include <thread>
 #include <utility>
@@ -42,14 +41,6 @@ inline void name_this_thread(const std::string& name) {
 inline pid_t this_thread_id() {
   static thread_local const pid_t id = gettid();
   return id;
-}
-
-/// Time for which a thread could run, but had no processor, since it started [s]: the second number
-/// of its schedstat (Linux). 0 for a thread that does not exist.
-[[nodiscard]] inline double starved_time_s(pid_t thread) {
-  std::ifstream file("/proc/self/task/" + std::to_string(thread) + "/schedstat");
-  double runs_ns = 0.0, starves_ns = 0.0;
-  return file >> runs_ns >> starves_ns ? 1e-9 * starves_ns : 0.0;
 }
 
 /// False in a process whose input waits for it, as a recording does that is played as fast as

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 
 #include "runtime/log.hpp"
 
@@ -11,6 +12,14 @@ namespace {
 std::string for_so_long(bool ending, double s) {
   return (ending ? "has not ended for " : "has not finished one step for ") +
          std::to_string(std::lround(s)) + " s";
+}
+
+// Time for which a thread could run, but had no processor, since it started [s]: the second number
+// of its schedstat. 0 for a thread that does not exist.
+double starved_time_s(pid_t thread) {
+  std::ifstream file("/proc/self/task/" + std::to_string(thread) + "/schedstat");
+  double runs_ns = 0.0, starves_ns = 0.0;
+  return file >> runs_ns >> starves_ns ? 1e-9 * starves_ns : 0.0;
 }
 
 }  // namespace
@@ -39,23 +48,24 @@ void Watchdog::look_at(Watched& w, double dt_s) {
     if (w.named)
       log::info("supervisor") << w.node->name() << " continues after " << std::lround(w.stuck_s)
                               << " s";
-    w.passed_s = w.stuck_s = 0.0;
+    w.stuck_s = 0.0;
     w.starved_s.reset();
     w.named = false;
     if (w.heartbeat != nullptr) w.beats = w.heartbeat->beats();
     return;
   }
-  const double starved_s = w.heartbeat != nullptr ? w.heartbeat->starved_s() : 0.0;
+  w.stuck_s += dt_s;
+  const double starved_s = w.heartbeat != nullptr ? starved_time_s(w.heartbeat->thread()) : 0.0;
   if (!w.starved_s) w.starved_s = starved_s;
-  w.passed_s += dt_s;
-  w.stuck_s = w.passed_s - (starved_s - *w.starved_s);  // Linux counts a wait when it is over
+  // A difference of totals, because Linux counts a wait when it is over.
+  const double counted_s = w.stuck_s - (starved_s - *w.starved_s);
   const bool in_step = w.heartbeat != nullptr && w.heartbeat->in_step();
-  if (w.stuck_s >= kNotice_s && !w.named && in_step) {
+  if (counted_s >= kNotice_s && !w.named && in_step) {
     w.named = true;
-    log::warn("supervisor") << w.node->name() << ' ' << for_so_long(false, w.stuck_s)
+    log::warn("supervisor") << w.node->name() << ' ' << for_so_long(false, counted_s)
                             << ": given up after " << w.limit_s << " s";
   }
-  if (w.stuck_s >= w.limit_s) w.why = for_so_long(!in_step, w.stuck_s);
+  if (counted_s >= w.limit_s) w.why = for_so_long(!in_step, counted_s);
 }
 
 void Watchdog::tick(double dt_s) {

@@ -11,7 +11,8 @@
 namespace km {
 
 /// Finds nodes without progress. A node that has not finished a step for kNotice_s is named in the
-/// log. One that has not for its step_limit_s() is abandoned. Thread-safe.
+/// log. One that has not for its step_limit_s() is abandoned. The time for which a busy machine
+/// leaves its thread without a processor does not count. Thread-safe.
 class Watchdog {
  public:
   static constexpr double kNotice_s = 4.0;
@@ -48,9 +49,8 @@ class Watchdog {
     const Heartbeat* heartbeat = nullptr;
     double limit_s = 0.0;
     std::uint64_t beats = 0;
-    double passed_s = 0.0;                 // since it is stuck
-    std::optional<double> starved_s = {};  // starved time of the thread at that moment
-    double stuck_s = 0.0;                  // part of passed_s in which the thread had a processor
+    double stuck_s = 0.0;
+    std::optional<double> starved_s = {};  // of its thread, as it became stuck
     bool named = false;
     bool ending = false;
     std::string why = {};  // reason if it was given up, otherwise empty
