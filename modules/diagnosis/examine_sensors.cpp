@@ -16,6 +16,7 @@
 #include "modules/diagnosis/inertial_fit.hpp"
 #include "modules/diagnosis/stereo_fit.hpp"
 #include "modules/recordings/bag_summary.hpp"
+#include "modules/sensors/sample_streams.hpp"
 #include "modules/sensors/stream_stamps.hpp"
 #include "modules/sensors/usual_numbers.hpp"
 
@@ -79,8 +80,8 @@ void examine_rate(const char* sensor, const std::string& id, const std::vector<S
                std::string(sensor) + " at " + fixed(found.rate_hz, 1) + " Hz, less than " +
                    fixed(least_hz, 0) + " Hz",
                "odometry may lose track in fast motion", "record at a higher rate");
-  constexpr double kPeriods = 2.5;  // as for kImuGap
-  if (!is_jump && found.largest_gap_s > std::max(longest_gap_s, kPeriods * found.median_s))
+  if (!is_jump &&
+      found.largest_gap_s > std::max(longest_gap_s, ImuStream::kGapPeriods * found.median_s))
     result.add(
         kWarning, id + ".gap",
         std::string(sensor) + " with a gap of " + fixed(found.largest_gap_s, 2) + " s" + place,

@@ -376,7 +376,7 @@ std::optional<SensorPacket> BagDataset::read_packet(const ChooseUse& choose) {
     auto frame = decode(*joined, use);
     if (!frame) continue;
     auto samples = has_imu() ? imu_.until(joined->stamp) : std::vector<ImuSample>{};
-    report_gaps(samples, imu_.rate_hz(rig_.sensors.imu.rate_hz), name_, report_);
+    imu_.report_gaps(samples, rig_.sensors.imu.rate_hz, name_, report_);
     return SensorPacket{std::make_shared<const StereoFrame>(std::move(*frame)), std::move(samples),
                         pose};
   }

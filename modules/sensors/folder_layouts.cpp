@@ -340,8 +340,8 @@ bool FolderReader::has_imu(const StereoPairFile& files) {
 std::vector<ImuSample> FolderReader::imu_until(Stamp stamp) {
   if (!folder_.rig.has_imu) return {};
   std::vector<ImuSample> samples = folder_.imu.until(stamp);
-  report_gaps(samples, folder_.imu.rate_hz(folder_.rig.imu.rate_hz), folder_.imu_list.string(),
-              folder_.report);
+  folder_.imu.report_gaps(samples, folder_.rig.imu.rate_hz, folder_.imu_list.string(),
+                          folder_.report);
   return samples;
 }
 

@@ -70,10 +70,6 @@ void ImuStream::add(const ImuSample& sample) {
   samples_.push_back(sample);
 }
 
-double ImuStream::rate_hz(double stated_hz) const {
-  return intervals_s_.empty() ? stated_hz : std::min(stated_hz, 1.0 / quantile(intervals_s_, 0.5));
-}
-
 std::vector<ImuSample> ImuStream::until(Stamp stamp) {
   if (!has_begun_) begin_at(stamp);
   has_begun_ = true;
@@ -93,13 +89,12 @@ void ImuStream::drop_before(Stamp stamp) {
                  std::ranges::lower_bound(samples_, stamp, {}, &ImuSample::stamp));
 }
 
-void report_gaps(std::span<const ImuSample> samples, double rate_hz, const std::string& place,
-                 ReaderReport& report) {
-  constexpr double kPeriods = 2.5;
+void ImuStream::report_gaps(std::span<const ImuSample> samples, double stated_hz,
+                            const std::string& place, ReaderReport& report) const {
   for (std::size_t i = 1; i < samples.size(); ++i) {
     const Stamp before = samples[i - 1].stamp;
     const double length_s = seconds_between(before, samples[i].stamp);
-    if (length_s > kPeriods / rate_hz)
+    if (length_s > kGapPeriods / stated_hz && length_s > kGapPeriods * quantile(intervals_s_, 0.5))
       report.add(ReaderFault::kImuGap,
                  place + ": " + std::to_string(length_s) + " s after " + std::to_string(before));
   }

@@ -47,8 +47,12 @@ class ImuStream {
   /// Bounds the memory of a stream whose cameras pause.
   void drop_before(Stamp stamp);
 
-  /// The rate [Hz] by the median of the first intervals, at most `stated_hz`.
-  [[nodiscard]] double rate_hz(double stated_hz) const;
+  /// Counts pauses between `samples` of this stream in `report`, each with `place`, length and
+  /// start. A pause has more than kGapPeriods, so that a single lost sample does not count. The
+  /// period is the median of the first intervals, at least that of the stated rate [Hz].
+  void report_gaps(std::span<const ImuSample> samples, double stated_hz, const std::string& place,
+                   ReaderReport& report) const;
+  static constexpr double kGapPeriods = 2.5;
 
  private:
   std::deque<ImuSample> samples_;
@@ -56,11 +60,6 @@ class ImuStream {
   std::vector<double> intervals_s_;  // the first ones
   bool has_begun_ = false;
 };
-
-/// Counts pauses of an inertial sensor in `report`, each with `place`, length and start. A pause
-/// has more than 2.5 periods, so that a single lost sample does not count.
-void report_gaps(std::span<const ImuSample> samples, double rate_hz, const std::string& place,
-                 ReaderReport& report);
 
 /// Makes inertial samples from a gyroscope and an accelerometer that have their own stamps. There
 /// is one sample for each gyroscope reading. Its acceleration is interpolated linearly between the
