@@ -18,6 +18,7 @@
 
 #include "modules/core/config.hpp"
 #include "modules/core/input_file.hpp"
+#include "modules/core/quantile.hpp"
 #include "modules/core/text_rows.hpp"
 #include "modules/core/write_file.hpp"
 
@@ -359,23 +360,19 @@ LabelledMesh without_far_vertices(LabelledMesh mesh, const std::string& name,
                                   std::vector<std::string>& notes) {
   constexpr float kFar = 100.0F;
   if (mesh.empty()) return mesh;
-  const std::size_t last = mesh.vertices.size() - 1;
   std::vector<float> values(mesh.vertices.size());
   Eigen::Vector3f low, high;  // quartiles
   for (int axis = 0; axis < 3; ++axis) {
-    for (std::size_t v = 0; v <= last; ++v) values[v] = mesh.vertices[v][axis];
-    std::ranges::sort(values);
-    low[axis] = values[last / 4];
-    high[axis] = values[3 * last / 4];
+    std::ranges::transform(mesh.vertices, values.begin(), [&](const auto& v) { return v[axis]; });
+    low[axis] = static_cast<float>(quantile(values, 0.25));
+    high[axis] = static_cast<float>(quantile(values, 0.75));
   }
   const float bound_m = kFar * (high - low).norm();
-  const auto distance = [middle = Eigen::Vector3f(0.5F * (low + high))](const auto& vertex) {
-    return (vertex - middle).norm();
-  };
+  const Eigen::Vector3f middle = 0.5F * (low + high);
   std::vector<std::uint32_t> kept;
-  for (std::uint32_t v = 0; v <= last; ++v)
-    if (bound_m == 0.0F || distance(mesh.vertices[v]) <= bound_m) kept.push_back(v);
-  if (kept.size() > last) return mesh;
+  for (std::uint32_t v = 0; v < values.size(); ++v)
+    if (bound_m == 0.0F || (mesh.vertices[v] - middle).norm() <= bound_m) kept.push_back(v);
+  if (kept.size() == values.size()) return mesh;
   const std::size_t faces = std::erase_if(mesh.faces, [&](const LabelledMesh::Face& face) {
     return !std::ranges::all_of(face, [&](auto v) { return std::ranges::binary_search(kept, v); });
   });
