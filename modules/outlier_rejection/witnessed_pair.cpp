@@ -37,7 +37,7 @@ PcmAddResult WitnessedPair::add(const Closure& closure) {
   known_.insert(id);
   added_.insert(id);
   contest_.add(closure);
-  if (closure.inliers == 0) unstated_.insert(id);
+  if (closure.inliers == 0 && !is_witnessed()) unstated_.insert(id);
   const std::size_t before = witnesses();
   if (!is_witnessed()) test(test_.orient(closure));
   return witnesses() > before ? PcmAddResult::kGrew : PcmAddResult::kAdded;

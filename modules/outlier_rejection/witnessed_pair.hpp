@@ -58,7 +58,7 @@ class WitnessedPair {
   CycleTest test_;
   std::set<ClosureId> known_;  // added closures
   std::set<ClosureId> added_;
-  std::set<ClosureId> unstated_;  // added closures that do not state their inliers
+  std::set<ClosureId> unstated_;  // those in `tested_` that do not state their inliers
   LocalContest contest_;          // among added closures
   std::vector<PreparedClosure> tested_;
   MaxClique clique_;  // over `tested_`; closures that share a neighbourhood are not connected
