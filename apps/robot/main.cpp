@@ -237,7 +237,8 @@ RobotOptions options_of(int argc, char** argv) {
   app.callback([&] {
     check_use(app);
     if (options.from_s && options.to_s && !(*options.from_s < *options.to_s))
-      throw CLI::ValidationError("--from is not before --to");
+      throw CLI::ValidationError("--from " + app["--from"]->as<std::string>() +
+                                 " s is not before --to " + app["--to"]->as<std::string>() + " s");
   });
   if (const auto exit_code = parse_options(app, argc, argv)) std::exit(*exit_code);
   if (options.name.empty()) options.name = "robot" + std::to_string(options.robot);
