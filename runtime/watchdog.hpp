@@ -50,7 +50,7 @@ class Watchdog {
     double limit_s = 0.0;
     std::uint64_t beats = 0;
     double stuck_s = 0.0;
-    std::optional<double> starved_s = {};  // of its thread, as it became stuck
+    std::optional<double> starved_s = {};  // by starved_time_s(), as it became stuck
     bool named = false;
     bool ending = false;
     std::string why = {};  // reason if it was given up, otherwise empty
