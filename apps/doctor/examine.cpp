@@ -144,8 +144,7 @@ std::vector<Figure> figures_of(const RunFacts& facts) {
                          ", " + fixed(run.seconds, 1) + " s: " + run.exit_reason}};
 }
 
-}  // namespace
-
+// Findings on the packets of a reader: for `live_s` if it is above 0, otherwise up to the end.
 Examination examine_packets(DatasetReader& reader, const RobotConfig& config, double live_s,
                             const ReportProgress& report_progress) {
   std::vector<Doubt> doubts;
@@ -167,6 +166,8 @@ Examination examine_packets(DatasetReader& reader, const RobotConfig& config, do
   sort_by_severity(result.findings);
   return result;
 }
+
+}  // namespace
 
 Examination examine_recording(const RobotOptions& options, const RobotConfig& config, double live_s,
                               const ReportProgress& report_progress) try {

@@ -25,10 +25,6 @@ using ReportProgress = std::function<void(std::string_view stage, double share)>
 [[nodiscard]] Examination examine_recording(const RobotOptions& options, const RobotConfig& config,
                                             double live_s, const ReportProgress& report_progress);
 
-/// Findings on the packets of a reader: for `live_s` if it is above 0, otherwise up to the end.
-[[nodiscard]] Examination examine_packets(DatasetReader& reader, const RobotConfig& config,
-                                          double live_s, const ReportProgress& report_progress);
-
 /// A topic that a rig file names, and the number of messages received from it.
 struct ListenedTopic {
   std::string topic, type;

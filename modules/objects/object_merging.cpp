@@ -26,8 +26,6 @@ void absorb(MapObject& main, const MapObject& part) {
   main.robots = united(main.robots, part.robots);
 }
 
-}  // namespace
-
 bool are_same(const MapObject& a, const MapObject& b, const ObjectsConfig& config) {
   if (a.layer != b.layer || a.label != b.label) return false;
   const ObjectBox box_a = a.box.grown(0.5 * config.gap_m), box_b = b.box.grown(0.5 * config.gap_m);
@@ -36,6 +34,8 @@ bool are_same(const MapObject& a, const MapObject& b, const ObjectsConfig& confi
   const double smaller = std::min(box_a.volume_m3(), box_b.volume_m3());
   return smaller > 0.0 && shared_volume_m3(box_a, box_b) >= kMergeOverlap * smaller;
 }
+
+}  // namespace
 
 std::vector<MapObject> merge_objects(std::vector<MapObject> objects, const ObjectsConfig& config) {
   std::ranges::stable_sort(

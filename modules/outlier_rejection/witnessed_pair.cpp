@@ -12,11 +12,11 @@ bool near(const KeyframeId& x, const KeyframeId& y) {
   return std::max(x.index, y.index) - std::min(x.index, y.index) <= WitnessedPair::kNeighbourhood;
 }
 
-}  // namespace
-
 bool share_neighbourhood(const ClosureId& x, const ClosureId& y) {
   return near(x.from, y.from) && near(x.to, y.to);
 }
+
+}  // namespace
 
 WitnessedPair::WitnessedPair(RobotId a, RobotId b, const PcmConfig& config)
     : a_(std::min(a, b)),

@@ -64,8 +64,4 @@ class WitnessedPair {
   MaxClique clique_;  // over `tested_`; closures that share a neighbourhood are not connected
 };
 
-/// True if both ends of `x` are within WitnessedPair::kNeighbourhood keyframes of those of `y`.
-/// Precondition: both are between the same robots, each with the lower keyframe first.
-[[nodiscard]] bool share_neighbourhood(const ClosureId& x, const ClosureId& y);
-
 }  // namespace km

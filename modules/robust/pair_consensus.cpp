@@ -5,7 +5,6 @@
 #include <cmath>
 #include <set>
 #include <tuple>
-#include <vector>
 
 #include "modules/core/lie.hpp"
 #include "modules/robust/closure_places.hpp"
@@ -144,6 +143,18 @@ constexpr double kMostPrecise = 4.0;
 constexpr double kBestOdometry = 1.25;
 constexpr std::size_t kMajority = 3;
 
+// Of kappa and of tau, independently. Precondition: `values` is not empty.
+Precision lower_median(std::span<const Precision> values) {
+  const auto of = [&](double Precision::*weight) {
+    std::vector<double> weights;
+    for (const Precision& value : values) weights.push_back(value.*weight);
+    const auto middle = weights.begin() + (static_cast<std::ptrdiff_t>(weights.size()) - 1) / 2;
+    std::nth_element(weights.begin(), middle, weights.end());
+    return *middle;
+  };
+  return {of(&Precision::kappa), of(&Precision::tau)};
+}
+
 }  // namespace
 
 std::optional<PairMotion> motion_of_pair(std::span<const PoseEdge> closures, RobotId a,
@@ -262,17 +273,6 @@ std::map<RobotId, SE3> common_placement(const PairMotions& given) {
     }
   }
   return placed;
-}
-
-Precision lower_median(std::span<const Precision> values) {
-  const auto of = [&](double Precision::*weight) {
-    std::vector<double> weights;
-    for (const Precision& value : values) weights.push_back(value.*weight);
-    const auto middle = weights.begin() + (static_cast<std::ptrdiff_t>(weights.size()) - 1) / 2;
-    std::nth_element(weights.begin(), middle, weights.end());
-    return *middle;
-  };
-  return {of(&Precision::kappa), of(&Precision::tau)};
 }
 
 Precision usual_strength(const PairMotions& all) {

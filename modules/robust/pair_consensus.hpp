@@ -6,7 +6,6 @@
 #include <map>
 #include <optional>
 #include <span>
-#include <vector>
 
 #include "modules/core/geometry.hpp"
 #include "modules/core/ids.hpp"
@@ -67,9 +66,6 @@ inline constexpr Precision kUnlimited{.kappa = std::numeric_limits<double>::max(
 /// with more such robots, then those with more votes of closures. The lowest robot does not move.
 /// O(pairs * robots).
 [[nodiscard]] std::map<RobotId, SE3> common_placement(const PairMotions& pairs);
-
-/// Lower medians of kappa and of tau, independently. Precondition: `values` is not empty.
-[[nodiscard]] Precision lower_median(std::span<const Precision> values);
 
 /// The strength of the usual pair of robots: the lower median over all robots of the lower median
 /// over the confirmed pairs of each robot. Pairs are confirmed as in common_placement(). One robot

@@ -104,6 +104,34 @@ StatePrior prior_after_oldest(const Window& window) {
   return prior;
 }
 
+// Without derivatives; infinite if a landmark lies behind a camera that sees it.
+double window_cost(const Window& window) {
+  double cost = 0.0;
+  if (!window.prior.frames.empty()) {
+    const auto dx = prior_offset(window.prior, prior_states(window), window.calibration);
+    cost += 0.5 * (window.prior.J * dx + window.prior.r).squaredNorm();
+  }
+  for (std::size_t k = 1; k < window.frames.size(); ++k)
+    if (window.frames[k].imu)
+      cost += 0.5 * window.frames[k]
+                        .imu->error(window.frames[k - 1].state, window.frames[k].state)
+                        .squaredNorm();
+  const std::vector<SE3> images = image_poses(window);
+  Eigen::Vector2d r;
+  for (const WindowLandmark& landmark : window.landmarks) {
+    if (!landmark.located || landmark.observations.size() < 2) continue;
+    for (const WindowObservation& o : landmark.observations)
+      for (std::size_t c = 0; c < 2; ++c) {
+        if (!o.bearings[c]) continue;
+        if (!reprojection_error(window.views[c], *o.bearings[c], images[o.frame], landmark.p_odom,
+                                r))
+          return std::numeric_limits<double>::infinity();
+        cost += 0.5 * cauchy(r.squaredNorm(), window.loss_scale);
+      }
+  }
+  return cost;
+}
+
 }  // namespace
 
 WindowEquations::WindowEquations(const Window& window, double damping)
@@ -347,33 +375,6 @@ void WindowEquations::apply(const Eigen::VectorXd& dx, Window& target) const {
     state.gyro_bias += dx.segment<3>(at + 9);
     state.accel_bias += dx.segment<3>(at + 12);
   }
-}
-
-double window_cost(const Window& window) {
-  double cost = 0.0;
-  if (!window.prior.frames.empty()) {
-    const auto dx = prior_offset(window.prior, prior_states(window), window.calibration);
-    cost += 0.5 * (window.prior.J * dx + window.prior.r).squaredNorm();
-  }
-  for (std::size_t k = 1; k < window.frames.size(); ++k)
-    if (window.frames[k].imu)
-      cost += 0.5 * window.frames[k]
-                        .imu->error(window.frames[k - 1].state, window.frames[k].state)
-                        .squaredNorm();
-  const std::vector<SE3> images = image_poses(window);
-  Eigen::Vector2d r;
-  for (const WindowLandmark& landmark : window.landmarks) {
-    if (!landmark.located || landmark.observations.size() < 2) continue;
-    for (const WindowObservation& o : landmark.observations)
-      for (std::size_t c = 0; c < 2; ++c) {
-        if (!o.bearings[c]) continue;
-        if (!reprojection_error(window.views[c], *o.bearings[c], images[o.frame], landmark.p_odom,
-                                r))
-          return std::numeric_limits<double>::infinity();
-        cost += 0.5 * cauchy(r.squaredNorm(), window.loss_scale);
-      }
-  }
-  return cost;
 }
 
 WindowSolution optimize(Window& window, int max_iterations) {

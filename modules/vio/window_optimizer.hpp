@@ -97,10 +97,6 @@ class WindowEquations {
   std::vector<Coupling> couplings_;
 };
 
-/// The cost of the whole window without derivatives; infinite if a landmark lies behind a camera
-/// that sees it.
-[[nodiscard]] double window_cost(const Window& window);
-
 struct WindowSolution {
   int iterations = 0;
   double initial_cost = 0.0;

@@ -333,21 +333,6 @@ RigCalibration read_camera_infos(const std::vector<CalibrationMap>& maps, const 
   return calibration;
 }
 
-RigCalibration read_maps(const std::vector<CalibrationMap>& maps, const RigChoice& choice) {
-  const CalibrationMap& first = maps.front();
-  if (first.has("camera_matrix")) return read_camera_infos(maps, choice);
-  if (first.has("T_BS"))
-    throw DatasetError(first.file().string() +
-                       ": one sensor.yaml of several; give the folder that holds cam0, cam1 and "
-                       "imu0");
-  if (!first.has("value0")) return read_kalibr(maps, choice);
-  if (maps.size() > 1)
-    throw DatasetError(maps[1].file().string() + ": a second file beside one of Basalt");
-  return read_basalt(first, choice);
-}
-
-}  // namespace
-
 RigCalibration read_kalibr(const std::vector<CalibrationMap>& maps, const RigChoice& choice) {
   Chains chains;
   for (const CalibrationMap& map : maps) chains.add(map);
@@ -392,6 +377,21 @@ RigCalibration read_basalt(const CalibrationMap& map, const RigChoice& choice) {
   note_biases(root, calibration);
   return calibration;
 }
+
+RigCalibration read_maps(const std::vector<CalibrationMap>& maps, const RigChoice& choice) {
+  const CalibrationMap& first = maps.front();
+  if (first.has("camera_matrix")) return read_camera_infos(maps, choice);
+  if (first.has("T_BS"))
+    throw DatasetError(first.file().string() +
+                       ": one sensor.yaml of several; give the folder that holds cam0, cam1 and "
+                       "imu0");
+  if (!first.has("value0")) return read_kalibr(maps, choice);
+  if (maps.size() > 1)
+    throw DatasetError(maps[1].file().string() + ": a second file beside one of Basalt");
+  return read_basalt(first, choice);
+}
+
+}  // namespace
 
 RigCalibration read_rig(const std::vector<std::filesystem::path>& files, const RigChoice& choice) {
   if (files.empty()) throw DatasetError(std::string("no file of calibration: ") + kExpected);

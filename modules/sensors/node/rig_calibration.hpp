@@ -72,11 +72,6 @@ struct RigChoice {
 [[nodiscard]] RigCalibration read_rig(const std::vector<std::filesystem::path>& files,
                                       const RigChoice& choice = {});
 
-/// Readers of Kalibr's and Basalt's files, for read_rig().
-[[nodiscard]] RigCalibration read_kalibr(const std::vector<CalibrationMap>& maps,
-                                         const RigChoice& choice);
-[[nodiscard]] RigCalibration read_basalt(const CalibrationMap& map, const RigChoice& choice);
-
 /// Reads a calibration from a map in some other file, with the keys of Kalibr's files or Basalt's.
 [[nodiscard]] RigCalibration read_inline_rig(const CalibrationMap& map,
                                              const RigChoice& choice = {});
