@@ -13,8 +13,6 @@
 #include <map>
 #include <sstream>
 #include <stdexcept>
-#include <string>
-#include <vector>
 
 #include "modules/core/config.hpp"
 #include "modules/core/input_file.hpp"

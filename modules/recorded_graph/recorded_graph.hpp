@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <filesystem>
-#include <iosfwd>
 #include <map>
 #include <optional>
 #include <string>

@@ -1,11 +1,8 @@
 #include "modules/robust/closure_places.hpp"
 
 #include <algorithm>
-#include <cstdint>
 #include <iterator>
 #include <numeric>
-
-#include "modules/core/geometry.hpp"
 
 namespace km {
 namespace {

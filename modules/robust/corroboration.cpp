@@ -11,7 +11,6 @@
 #include "modules/outlier_rejection/chi_squared.hpp"
 #include "modules/robust/closure_places.hpp"
 #include "modules/robust/cycle_mixture.hpp"
-#include "modules/robust/odometry_cycles.hpp"
 
 namespace km {
 namespace {

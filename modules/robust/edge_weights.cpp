@@ -5,7 +5,6 @@
 #include <cmath>
 #include <map>
 #include <optional>
-#include <utility>
 
 #include "modules/core/lie.hpp"
 #include "modules/robust/cycle_mixture.hpp"

@@ -5,7 +5,6 @@
 #include <optional>
 #include <set>
 #include <utility>
-#include <vector>
 
 #include "modules/core/lie.hpp"
 #include "modules/outlier_rejection/chi_squared.hpp"

@@ -8,7 +8,6 @@
 #include <map>
 #include <optional>
 #include <utility>
-#include <vector>
 
 #include "modules/robust/closure_places.hpp"
 #include "modules/robust/cycle_mixture.hpp"

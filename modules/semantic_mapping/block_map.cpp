@@ -1,8 +1,6 @@
 #include "modules/semantic_mapping/block_map.hpp"
 
 #include <cassert>
-#include <cstdint>
-#include <utility>
 
 namespace km {
 

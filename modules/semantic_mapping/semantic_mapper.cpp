@@ -11,7 +11,6 @@
 #include <utility>
 #include <vector>
 
-#include "modules/core/geometry.hpp"
 #include "modules/core/measurement_limits.hpp"
 #include "modules/mesh/coarse_view.hpp"
 #include "modules/semantic_mapping/block_fusion.hpp"

@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <limits>
 #include <map>
-#include <utility>
 
 #include "modules/robust/closure_places.hpp"
 #include "modules/robust/corroboration.hpp"

@@ -1,7 +1,6 @@
 #include "modules/session/session_part.hpp"
 
 #include <algorithm>
-#include <cstddef>
 #include <exception>
 #include <set>
 #include <stdexcept>

@@ -1,6 +1,5 @@
 #include "modules/session/session_schedule.hpp"
 
-#include <algorithm>
 #include <tuple>
 
 namespace km {

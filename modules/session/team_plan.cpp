@@ -4,9 +4,7 @@
 #include <set>
 #include <stdexcept>
 #include <string>
-#include <tuple>
 #include <utility>
-#include <vector>
 
 #include "modules/core/precision.hpp"
 #include "modules/session/team_tree.hpp"

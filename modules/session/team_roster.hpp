@@ -4,7 +4,6 @@
 #include <map>
 #include <optional>
 #include <set>
-#include <vector>
 
 #include "modules/core/team_links.hpp"
 #include "modules/session/pgo_method.hpp"

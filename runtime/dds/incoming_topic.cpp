@@ -6,7 +6,6 @@
 #include <array>
 #include <chrono>
 #include <exception>
-#include <iterator>
 
 #include "runtime/clock.hpp"
 #include "runtime/dds/envelope.hpp"

@@ -1,7 +1,3 @@
-#include <atomic>
-#include <future>
-#include <thread>
-
 #include "apps/result_files.hpp"
 #include "apps/robot/journal_node.hpp"
 #include "apps/robot/wiring.hpp"

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <memory>
-#include <string>
 #include <utility>
 
 #include "modules/loop_closure/node/loop_closure_codec.hpp"

@@ -1,9 +1,5 @@
 #include <sched.h>
 
-#include <atomic>
-#include <chrono>
-#include <thread>
-
 #include "runtime/clock.hpp"
 #include "runtime/thread.hpp"
 #include "runtime/watchdog.hpp"

@@ -2,8 +2,6 @@
 
 #include <filesystem>
 #include <random>
-#include <stdexcept>
-#include <string>
 #include <vector>
 
 #include "modules/core/lie.hpp"

@@ -4,7 +4,6 @@
 #include <stdexcept>
 #include <utility>
 
-#include "apps/lab/pgo/team_graph_file.hpp"
 #include "modules/core/input_file.hpp"
 
 namespace km {

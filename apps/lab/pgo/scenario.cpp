@@ -7,7 +7,6 @@
 #include <numbers>
 #include <set>
 #include <stdexcept>
-#include <utility>
 
 #include "modules/core/lie.hpp"
 

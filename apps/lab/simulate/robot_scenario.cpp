@@ -1,7 +1,6 @@
 #include "apps/lab/simulate/robot_scenario.hpp"
 
 #include <zlib.h>
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -14,7 +13,6 @@
 #include "apps/lab/simulation/motion/sensor_errors.hpp"
 #include "apps/lab/simulation/motion/vehicle_trajectory.hpp"
 #include "apps/lab/simulation/world/seeded_random.hpp"
-#include "apps/lab/simulation/world/world.hpp"
 #include "modules/core/text_rows.hpp"
 #include "modules/evaluation/input_row.hpp"
 

@@ -10,7 +10,6 @@
 #include <tuple>
 
 #include "apps/program_options.hpp"
-#include "modules/core/config.hpp"
 #include "runtime/yaml_config.hpp"
 
 namespace km {

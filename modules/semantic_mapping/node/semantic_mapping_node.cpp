@@ -1,7 +1,5 @@
 #include "modules/semantic_mapping/node/semantic_mapping_node.hpp"
 
-#include <utility>
-
 #include "modules/core/text_table.hpp"
 #include "runtime/log.hpp"
 

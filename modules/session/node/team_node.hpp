@@ -2,7 +2,6 @@
 
 #include <cstdint>
 #include <functional>
-#include <memory>
 #include <variant>
 
 #include "modules/session/team_agent.hpp"

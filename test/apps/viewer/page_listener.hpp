@@ -2,8 +2,6 @@
 
 #include <civetweb.h>
 
-#include <thread>
-
 #include "test/support/patience.hpp"
 #include "test/support/test.hpp"
 

@@ -6,7 +6,6 @@
 
 #include <cerrno>
 #include <regex>
-#include <thread>
 
 #include "apps/viewer/page_server.hpp"
 #include "test/apps/viewer/page_listener.hpp"

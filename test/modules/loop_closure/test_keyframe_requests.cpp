@@ -1,7 +1,5 @@
 #include "modules/loop_closure/keyframe_requests.hpp"
 
-#include <map>
-
 #include "test/support/test.hpp"
 
 namespace km {

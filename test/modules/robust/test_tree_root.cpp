@@ -1,7 +1,5 @@
 #include "modules/robust/tree_root.hpp"
 
-#include <array>
-
 #include "modules/robust/odometry_evidence.hpp"
 #include "test/support/test.hpp"
 

@@ -1,5 +1,3 @@
-#include <random>
-
 #include "modules/core/lie.hpp"
 #include "modules/core/stamp.hpp"
 #include "modules/sensors/sample_streams.hpp"

@@ -2,7 +2,6 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
-#include <set>
 
 #include "modules/tree_newton/closure_cover.hpp"
 #include "modules/tree_newton/frontal_cholesky.hpp"

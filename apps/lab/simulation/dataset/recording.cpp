@@ -1,15 +1,11 @@
 #include "apps/lab/simulation/dataset/recording.hpp"
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
-#include <span>
 #include <sstream>
-#include <string>
-#include <vector>
 
 #include "modules/core/config.hpp"
 #include "modules/core/json.hpp"

@@ -8,7 +8,6 @@
 #include "apps/lab/simulation/world/objects.hpp"
 #include "apps/lab/simulation/world/scene.hpp"
 #include "apps/lab/simulation/world/seeded_random.hpp"
-#include "apps/lab/simulation/world/world.hpp"
 #include "modules/core/lie.hpp"
 
 namespace km {

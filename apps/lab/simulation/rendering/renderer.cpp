@@ -6,7 +6,6 @@
 #include <cstdlib>
 #include <limits>
 #include <optional>
-#include <span>
 
 #include "apps/lab/simulation/rendering/surface_shader.hpp"
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 
 #include "apps/lab/simulation/rendering/surfaces.hpp"
 #include "apps/lab/simulation/world/canvas.hpp"

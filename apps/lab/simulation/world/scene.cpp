@@ -4,8 +4,6 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numbers>
-#include <utility>
 
 namespace km {
 namespace {

@@ -1,7 +1,5 @@
 #include "apps/lab/simulation/world/world.hpp"
 
-#include <array>
-
 namespace km {
 namespace {
 
