@@ -19,9 +19,6 @@ inline constexpr const char* kLabelPalette = "label_palette.csv";
 inline constexpr const char* kMap2d = "map.yaml";
 inline constexpr const char* kMap2dImage = "map.pgm";
 
-/// Slice of the distance field.
-inline constexpr const char* kDistanceSlice = "distance_field.ply";
-
 /// Written at the end of a run.
 inline constexpr const char* kSummary = "summary.json";
 
@@ -41,7 +38,7 @@ inline constexpr std::array kResultFiles = {
     "traffic.csv",    "process.csv",   "timing.csv",         "config.yaml",
     kSummary,         "mesh.ply",      "mesh_optimized.ply", kLabelPalette,
     kTeamMesh,        kObjectsFile,    kMap2dImage,          kMap2d,
-    kDistanceSlice,   kTeamMap2d,      kTeamMap2dImage};
+    kTeamMap2d,       kTeamMap2dImage};
 
 /// Results that grow during the run, and continue when it is resumed.
 inline constexpr std::array kGrowingFiles = {"optimizer.csv", "traffic.csv", "process.csv"};

@@ -77,7 +77,6 @@ MeshFilesNode::MeshFilesNode(std::filesystem::path folder, ResultWriter& results
   keep_newest(topics.maps, latest_map_);
   keep_newest(topics.optimized, optimized_);
   keep_newest(topics.maps_2d, map_2d_);
-  keep_newest(topics.slices, slice_);
 }
 
 void MeshFilesNode::handle(const Tick& /*tick*/) {
@@ -91,8 +90,6 @@ void MeshFilesNode::handle(const Tick& /*tick*/) {
   if (const auto mesh = optimized_.take())
     write("mesh_optimized.ply", [&](const auto& file) { write_mesh(file, mesh->mesh); });
   if (const auto map = map_2d_.take()) write_map_2d(folder_, kMap2d, kMap2dImage, *map, results_);
-  if (const auto slice = slice_.take())
-    write(kDistanceSlice, [&](const auto& file) { write_mesh(file, slice->points); });
 }
 
 void MeshFilesNode::follow_first_pose(const Trajectory& trajectory) {

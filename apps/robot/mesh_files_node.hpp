@@ -8,7 +8,6 @@
 #include "modules/core/occupancy_grid.hpp"
 #include "modules/core/odometry.hpp"
 #include "modules/core/pose_graph.hpp"
-#include "modules/distance_field/distance_slice.hpp"
 #include "modules/map_2d/map_2d_config.hpp"
 #include "modules/mesh/map_mesh.hpp"
 #include "modules/mesh_deformation/mesh_corrector.hpp"
@@ -26,7 +25,6 @@ struct MeshFilesTopics {
   In<MapMesh> maps;
   In<OptimizedMesh> optimized;
   In<OccupancyGrid> maps_2d;
-  In<DistanceSlice> slices;
 };
 
 /// Keeps a robot's meshes and 2D map on disk while it runs, each file whole at any time.
@@ -34,8 +32,7 @@ struct MeshFilesTopics {
 /// mesh.ply is the mapper's mesh, as odometry built it. It is moved rigidly so that its first
 /// keyframe has its optimised pose in the team's frame. mesh_optimized.ply is the mesh deformed to
 /// the optimised keyframes, in the team's frame. map.pgm and map.yaml are the 2D map for map_server
-/// of Nav2, in the team's frame. distance_field.ply is the last slice of the distance field, in the
-/// odometry frame. run.map is the mapper's mesh for a process that resumes the run.
+/// of Nav2, in the team's frame. run.map is the mapper's mesh for a process that resumes the run.
 class MeshFilesNode final : public WorkerNode<Tick> {
  public:
   /// `results` outlives this and records meshes that could not be written. Such a failure does not
@@ -71,7 +68,6 @@ class MeshFilesNode final : public WorkerNode<Tick> {
   Latest<MapMesh> latest_map_;
   Latest<OptimizedMesh> optimized_;
   Latest<OccupancyGrid> map_2d_;
-  Latest<DistanceSlice> slice_;
 };
 
 /// Writes objects.json to `folder`.

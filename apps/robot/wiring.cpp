@@ -100,12 +100,10 @@ Robot::Robot(const RobotOptions& options, const RobotConfig& config, RobotInput 
   add_records();
   add_view(config, camera);
   if (input.ros != nullptr && config.ros.publish.value_or(true))
-    add_ros_output("ros_output", std::make_unique<LiveSink>(std::move(input.ros)),
-                   {.mesh_points = kMeshPoints,
-                    .mesh_faces = kMeshFaces,
-                    .mesh_bytes_per_s = kMeshBytesPerS,
-                    .slices = true},
-                   std::nullopt);
+    add_ros_output(
+        "ros_output", std::make_unique<LiveSink>(std::move(input.ros)),
+        {.mesh_points = kMeshPoints, .mesh_faces = kMeshFaces, .mesh_bytes_per_s = kMeshBytesPerS},
+        std::nullopt);
   if (options.record) add_record(options, results);
   if (seal_ != nullptr)
     add<TeamKeysNode>(false, options.security, *seal_,
@@ -465,9 +463,6 @@ void Robot::add_ros_output(std::string_view node, std::unique_ptr<RosSink> sink,
   });
   topics_.joint_objects.subscribe([&output](const auto& objects) { output.offer(objects); });
   topics_.maps_2d.subscribe([&output](const auto& map) { output.offer(map); });
-  topics_.distance_slices.subscribe([&output](const auto& slice) {
-    output.offer_slice({slice, &slice->points}, slice->stamp);
-  });
   (node == kRecordNode ? record_ : ros_output_) = &output;
 }
 
@@ -516,9 +511,6 @@ void Robot::add_view(const RobotConfig& config, const std::optional<Camera>& cam
                                     .objects = t.joint_objects,
                                     .maps_2d = t.maps_2d,
                                     .images = t.tracked_images});
-  t.distance_slices.subscribe([this](const auto& slice) {
-    view_->offer_slice({slice, &slice->points});
-  });
   t.optimized_meshes.subscribe([this](const auto& optimized) {
     view_->offer(optimized->anchor, {optimized, &optimized->mesh});
   });

@@ -24,7 +24,6 @@
 #include "modules/core/processing_load.hpp"
 #include "modules/core/tracked_image.hpp"
 #include "modules/dense_sensing/dense_sensor.hpp"
-#include "modules/distance_field/node/distance_field_node.hpp"
 #include "modules/localization/node/localization_node.hpp"
 #include "modules/loop_closure/keyframe_requests.hpp"
 #include "modules/map_2d/node/map_2d_node.hpp"
@@ -81,8 +80,6 @@ struct Topics {
   Topic<SupersededSurface> superseded_surface;
   Topic<ObjectList> joint_objects;
   Topic<OccupancyGrid> maps_2d;
-  Topic<SpaceUpdate> space_updates;
-  Topic<DistanceSlice> distance_slices;
   Topic<MappingProgress> mapping_progress;
   Topic<RelativePose> measured_closures;
   Topic<PlaceQuery> place_queries;

@@ -33,16 +33,9 @@ void Robot::add_mapping(const RobotConfig& config, const PlaybackPace& pace, con
       SemanticMappingTopics{.frames = topics_.dense_frames,
                             .superseded = topics_.superseded_surface,
                             .maps = topics_.maps,
-                            .progress = topics_.mapping_progress,
-                            .space = topics_.space_updates});
-  mapper.track_space_while([this] {
-    return (view_ != nullptr && view_->has_map_viewers()) ||
-           (ros_output_ != nullptr && ros_output_->has_slice_readers());
-  });
+                            .progress = topics_.mapping_progress});
   if (before) mapper.continue_from(*std::move(before));
   ray_thinner_.emplace(camera, map.max_range_m);
-  add<DistanceFieldNode>(
-      true, DistanceFieldTopics{.space = topics_.space_updates, .slices = topics_.distance_slices});
 }
 
 void Robot::add_mesh_correction(const RobotConfig& config) {
@@ -70,8 +63,7 @@ void Robot::add_mesh_files(const std::filesystem::path& folder, ResultWriter& re
                                                     .trajectory = topics_.trajectory,
                                                     .maps = topics_.maps,
                                                     .optimized = topics_.optimized_meshes,
-                                                    .maps_2d = topics_.maps_2d,
-                                                    .slices = topics_.distance_slices});
+                                                    .maps_2d = topics_.maps_2d});
 }
 
 // A robot without a map only receives the meshes of the others.

@@ -44,9 +44,6 @@ Json json_of(const Eigen::Vector3f& v) {
 // By ClosureStatus.
 constexpr std::array kStatusNames = {"candidate", "verified", "rejected", "kept"};
 
-// By RasterKind.
-constexpr std::array kRasterNames = {"map_2d", "distances"};
-
 bool is_of_team(const ViewUpdate& update) {
   const auto* const chunk = std::get_if<MeshChunk>(&update.content);
   return chunk != nullptr && chunk->key.robot != update.robot;
@@ -145,7 +142,7 @@ struct Writer {
 
   void operator()(const ViewRaster& raster) const {
     json["kind"] = "raster";
-    json["layer"] = kRasterNames.at(static_cast<std::size_t>(raster.kind));
+    json["layer"] = "map_2d";
     json["anchor"] = raster.anchor;
     json["resolution_m"] = raster.resolution_m;
     json["origin"] = raster.origin;

@@ -178,9 +178,9 @@ std::optional<ViewContent> checked_content(std::optional<ViewContent> content) {
   return content;
 }
 
-// The objects, the 2D map and the slice of the distance field. `anchor`: robot whose odometry frame
-// is the frame of the 2D map. Files that are missing are left out.
-std::vector<ViewContent> read_layers(const fs::path& folder, RobotId robot, RobotId anchor,
+// The objects and the 2D map. `anchor`: robot whose odometry frame is the frame of the 2D map.
+// Files that are missing are left out.
+std::vector<ViewContent> read_layers(const fs::path& folder, RobotId anchor,
                                      std::vector<std::string>& notes) {
   std::vector<ViewContent> layers;
   const auto add = [&](const char* name, const auto& read) {
@@ -190,8 +190,6 @@ std::vector<ViewContent> read_layers(const fs::path& folder, RobotId robot, Robo
   };
   add(kObjectsFile, [](const fs::path& file) { return view_objects(read_object_list(file)); });
   add(kMap2d, [&](const fs::path& file) { return view_raster(read_map_2d(file, anchor)); });
-  add(kDistanceSlice,
-      [&](const fs::path& file) { return view_raster(read_shown(file, notes), robot); });
   return layers;
 }
 
@@ -244,7 +242,7 @@ RunPlayback read_run(const fs::path& folder, Stamp begin) {
     const auto optimized =
         read_if_there(one / "mesh_optimized.ply", run.notes,
                       [&](const fs::path& file) { return read_shown(file, run.notes); });
-    for (ViewContent& layer : read_layers(one, robot.robot(), robot.anchor(), run.notes))
+    for (ViewContent& layer : read_layers(one, robot.anchor(), run.notes))
       robot.add_at_end(std::move(layer));
     if (!fused.contains(robot.anchor()))
       for (MeshChunk& chunk : read_team_mesh(one, robot.robot(), robot.anchor(), run.notes)) {

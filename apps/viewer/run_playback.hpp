@@ -30,8 +30,8 @@ struct RunPlayback {
 /// - otherwise, the robot itself: the mesh of its map;
 /// - otherwise, another robot: no mesh.
 ///
-/// Objects, 2D map and slice of the distance field are those of the end of the run, and are shown
-/// from then on. So is the fused mesh of the first robot in each frame that has one.
+/// Objects and 2D map are those of the end of the run, and are shown from then on. So is the fused
+/// mesh of the first robot in each frame that has one.
 [[nodiscard]] RunPlayback read_run(const std::filesystem::path& folder, Stamp begin);
 
 inline constexpr double kMaxPause_s = 10.0;

@@ -29,8 +29,7 @@ std::optional<ViewStore::Key> ViewStore::key_of(const ViewUpdate& update) {
   const std::int64_t robot = update.robot;
   if (std::holds_alternative<ViewImage>(update.content)) return Key{robot, kImage};
   if (std::holds_alternative<ViewObjects>(update.content)) return Key{robot, kLayer};
-  if (const auto* const raster = std::get_if<ViewRaster>(&update.content))
-    return Key{robot, kLayer, 1 + static_cast<std::int64_t>(raster->kind)};
+  if (std::holds_alternative<ViewRaster>(update.content)) return Key{robot, kLayer, 1};
   if (std::holds_alternative<ViewPose>(update.content)) return Key{robot, kPose};
   if (std::holds_alternative<RobotSample>(update.content)) return Key{robot, kState};
   if (const auto* const chunk = std::get_if<MeshChunk>(&update.content))

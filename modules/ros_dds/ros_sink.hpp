@@ -36,9 +36,6 @@ class RosSink {
   virtual void put(std::size_t topic, std::optional<Stamp> time,
                    std::span<const std::uint8_t> message) = 0;
 
-  /// Number of readers of a topic; 0 for a file.
-  [[nodiscard]] virtual std::size_t readers(std::size_t /*topic*/) const { return 0; }
-
   /// Writes all buffered messages. Called once a second.
   virtual void flush() {}
 

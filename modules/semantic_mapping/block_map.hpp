@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <tuple>
 #include <unordered_map>
 #include <utility>
 #include <vector>
@@ -89,17 +88,11 @@ struct VoxelBlock {
   double last_seen_m = 0.0;         ///< Distance travelled by the camera at the last selection [m].
   KeyframeIndex changed_since = 0;  ///< First keyframe of the changes not yet meshed.
   bool changed = false;             ///< Changed since the block was last meshed.
-  bool has_mesh = false;  ///< Surface was seen from a distance that fits the voxels: it is meshed.
 };
 
-/// Hash and order of the positions of blocks; the order is by z, then y, then x.
+/// Hash of the positions of blocks.
 struct BlockHash {
   std::size_t operator()(const Eigen::Vector3i& position) const noexcept;
-};
-struct BlockOrder {
-  bool operator()(const Eigen::Vector3i& a, const Eigen::Vector3i& b) const {
-    return std::tie(a.z(), a.y(), a.x()) < std::tie(b.z(), b.y(), b.x());
-  }
 };
 
 /// The blocks of a map with voxels of one size, hashed by their position. References to blocks stay

@@ -139,7 +139,6 @@ void IncrementalMesh::release_faces(VoxelBlock& block) {
 
 void IncrementalMesh::mesh_block(VoxelBlock& block, BlockMap& map,
                                  std::span<const BlockMap> finer) {
-  if (!block.has_mesh) return;
   const BlockCells cells(block, map);
   if (!cells.any()) return;
   std::array<std::uint32_t, MarchingCubes::kEdges> vertices;

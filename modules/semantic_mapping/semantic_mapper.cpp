@@ -16,7 +16,6 @@
 #include "modules/semantic_mapping/block_fusion.hpp"
 #include "modules/semantic_mapping/block_map.hpp"
 #include "modules/semantic_mapping/depth_view.hpp"
-#include "modules/semantic_mapping/space_tracker.hpp"
 
 namespace km {
 namespace {
@@ -98,7 +97,7 @@ struct SemanticMapper::State {
   }
 
   void integrate(std::size_t level, const DepthView& view, const BlockFusion& fusion,
-                 const SE3& T_odom_cam, bool sees_free, IntegrationReport& report);
+                 const SE3& T_odom_cam, IntegrationReport& report);
   std::vector<Update> select(std::size_t level, const DepthView& view, const BlockFusion& fusion,
                              const SE3& T_odom_cam, IntegrationReport& report);
   static void fuse(const BlockFusion& fusion, const std::vector<Update>& updates);
@@ -112,7 +111,6 @@ struct SemanticMapper::State {
     return std::span(maps).first(level);
   }
   [[nodiscard]] std::size_t block_count() const;
-  [[nodiscard]] std::size_t space_level() const;
 
   SemanticMappingConfig config;
   Camera camera;
@@ -126,7 +124,6 @@ struct SemanticMapper::State {
   KeyframeIndex keyframe = 0;
   std::optional<Eigen::Vector3d> camera_at;  // last position
   double way_m = 0.0;                        // distance travelled by the camera
-  std::optional<SpaceTracker> space;
   bool labelled = false, coloured = false;
   std::size_t dropped_faces = 0;
 };
@@ -137,23 +134,11 @@ std::size_t SemanticMapper::State::block_count() const {
   return count;
 }
 
-// Free space is followed in the finest map whose band contains its range. This map also has
-// surface that is nearer than its band, without a mesh.
-std::size_t SemanticMapper::State::space_level() const {
-  std::size_t level = 0;
-  while (level + 1 < bands.size() && bands[level].to_m < SpaceTracker::kFreeRange_m) ++level;
-  return level;
-}
-
 void SemanticMapper::State::integrate(std::size_t level, const DepthView& view,
                                       const BlockFusion& fusion, const SE3& T_odom_cam,
-                                      bool sees_free, IntegrationReport& report) {
+                                      IntegrationReport& report) {
   const auto updates = select(level, view, fusion, T_odom_cam, report);
   fuse(fusion, updates);
-  if (space && level == space_level()) {
-    for (const Update& update : updates) space->note(update.block->position);
-    if (sees_free) space->see_free(view, fusion, T_odom_cam, maps[level], way_m);
-  }
   remove_empty(level, fusion, updates);
 }
 
@@ -163,24 +148,18 @@ std::vector<SemanticMapper::State::Update> SemanticMapper::State::select(
   std::vector<Update> updates;
   BlockMap& map = maps[level];
   const std::size_t others = block_count() - map.size();
-  const auto add_near = [&](const DepthBand& band, bool is_meshed) {
-    const NearBlocks near =
-        select_near_blocks(view, T_odom_cam, band,
-                           std::max(static_cast<std::size_t>(config.max_blocks), others) - others,
-                           frame, keyframe, map);
-    report.blocks_refused += near.refused;
-    for (VoxelBlock* block : near.blocks) {
-      if (view.labelled && block->labels == nullptr)
-        block->labels = std::make_unique<std::array<VoxelLabels, kBlockVoxels>>();
-      if (!view.colors.empty() && block->colors == nullptr)
-        block->colors = std::make_unique<std::array<VoxelColor, kBlockVoxels>>();
-      block->last_seen_m = way_m;
-      block->has_mesh |= is_meshed;
-      updates.push_back({block, true, false});
-    }
-  };
-  add_near(bands[level], true);
-  if (level == space_level()) add_near({0.0, bands[level].above_m}, false);
+  const NearBlocks near = select_near_blocks(
+      view, T_odom_cam, bands[level],
+      std::max(static_cast<std::size_t>(config.max_blocks), others) - others, frame, keyframe, map);
+  report.blocks_refused += near.refused;
+  for (VoxelBlock* block : near.blocks) {
+    if (view.labelled && block->labels == nullptr)
+      block->labels = std::make_unique<std::array<VoxelLabels, kBlockVoxels>>();
+    if (!view.colors.empty() && block->colors == nullptr)
+      block->colors = std::make_unique<std::array<VoxelColor, kBlockVoxels>>();
+    block->last_seen_m = way_m;
+    updates.push_back({block, true, false});
+  }
   for (const auto& block : map.blocks()) {
     if (block->selected_in == frame) continue;
     const BlockFusion::Relation relation = fusion.relation_to(*block);
@@ -208,7 +187,6 @@ void SemanticMapper::State::remove_empty(std::size_t level, const BlockFusion& f
   for (const Update& update : updates) {
     if (update.near || !fusion.is_empty(*update.block)) continue;
     mesh.forget(*update.block, maps[level], keyframe);
-    if (space && level == space_level()) space->note_empty(update.block->position, way_m);
     maps[level].erase(Eigen::Vector3i(update.block->position));
   }
 }
@@ -241,7 +219,6 @@ void SemanticMapper::State::finalise(std::size_t level, const std::vector<VoxelB
   unreported += mesh.finalise(blocks, maps[level], finer_than(level));
   for (VoxelBlock* block : blocks) {
     note_finer(level, *block);
-    if (space && level == space_level()) space->note_left(block->position);
     maps[level].erase(Eigen::Vector3i(block->position));
   }
 }
@@ -314,7 +291,7 @@ IntegrationReport SemanticMapper::integrate(const DepthImage& depth, const Label
   for (std::size_t level = 0; level < state.maps.size(); ++level) {
     const BlockFusion fusion(state.config, state.maps[level].voxel_m(), view, T_odom_cam, keyframe,
                              gain);
-    state.integrate(level, view, fusion, T_odom_cam, new_keyframe || state.frame == 1, report);
+    state.integrate(level, view, fusion, T_odom_cam, report);
   }
   if (new_keyframe) state.leave_window();
   state.make_room();
@@ -332,22 +309,6 @@ SurfaceDrop SemanticMapper::drop(const SupersededSurface& superseded) {
   const SurfaceDrop dropped = state_->mesh.drop(superseded);
   state_->dropped_faces += dropped.faces;
   return dropped;
-}
-
-void SemanticMapper::track_space(bool is_wanted) {
-  state_->space.reset();
-  if (!is_wanted) return;
-  state_->space.emplace(state_->config.max_range_m, state_->config.window_m);
-  for (const auto& block : state_->maps[state_->space_level()].blocks())
-    state_->space->note(block->position);
-}
-
-SpaceChanges SemanticMapper::take_space_changes() {
-  return state_->space->take(state_->maps[state_->space_level()]);
-}
-
-double SemanticMapper::space_voxel_m() const {
-  return state_->maps[state_->space_level()].voxel_m();
 }
 
 MapMesh SemanticMapper::mesh() const {

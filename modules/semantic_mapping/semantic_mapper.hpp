@@ -13,7 +13,6 @@
 #include "modules/mesh/map_mesh.hpp"
 #include "modules/semantic_mapping/incremental_mesh.hpp"
 #include "modules/semantic_mapping/semantic_mapping_config.hpp"
-#include "modules/semantic_mapping/space_changes.hpp"
 
 namespace km {
 
@@ -99,17 +98,6 @@ class SemanticMapper {
   [[nodiscard]] MapMesh mesh() const;
 
   [[nodiscard]] MapSize size() const;
-
-  /// Begins or ends to follow the free and occupied space. The mesh does not depend on it.
-  void track_space(bool is_wanted);
-
-  /// Free and occupied space of the blocks that changed since the last call, for a distance field;
-  /// at first that of all blocks. Free space away from surface is updated with the first frame of
-  /// each keyframe. Voxels that known_from() excludes are unknown. Precondition: track_space(true).
-  [[nodiscard]] SpaceChanges take_space_changes();
-
-  /// Side of the voxels of the space changes [m].
-  [[nodiscard]] double space_voxel_m() const;
 
  private:
   struct State;

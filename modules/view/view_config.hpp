@@ -14,8 +14,7 @@ struct ViewConfig {
 
   /// Maximum rate while earlier data are sent to a new viewer.
   [[nodiscard]] double past_bytes_per_s() const { return 10.0 * bytes_per_s; }
-  /// Maximum rate of the map: the mesh in chunks, and objects, 2D map and slice of the distance
-  /// field, at most a quarter of it.
+  /// Maximum rate of the map: the mesh in chunks, and objects and 2D map, at most a quarter of it.
   [[nodiscard]] double mesh_bytes_per_s() const { return 40.0 * bytes_per_s; }
 
   void visit_fields(auto& visitor) {

@@ -3,12 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <limits>
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 #include <utility>
 
-#include "modules/core/distance_color.hpp"
 #include "modules/images/image_codec.hpp"
 #include "modules/images/image_view.hpp"
 
@@ -35,7 +33,6 @@ std::size_t bytes_of(const MapObject& object) {
 
 constexpr std::size_t kRasterHead_bytes = 64;
 constexpr std::size_t kLongest_run = 255;
-constexpr double kMaxSliceCells = 1 << 26;
 
 // Cells of a raster that may still be too large.
 struct Cells {
@@ -77,16 +74,6 @@ ViewRaster fitted(ViewRaster raster, Cells cells) {
     cells = halved(cells);
     raster.resolution_m *= 2.0F;
   }
-}
-
-// Distance between neighbours along x; infinite if no two consecutive points are in one row.
-float spacing_of(const std::vector<Eigen::Vector3f>& points) {
-  float spacing = std::numeric_limits<float>::infinity();
-  for (std::size_t k = 1; k < points.size(); ++k) {
-    const float step = std::abs(points[k].x() - points[k - 1].x());
-    if (points[k].y() == points[k - 1].y() && step > 0.0F) spacing = std::min(spacing, step);
-  }
-  return spacing;
 }
 
 }  // namespace
@@ -136,37 +123,9 @@ std::optional<ViewRaster> view_raster(const OccupancyGrid& map) {
                            : cell == OccupancyGrid::kFree  ? ViewRaster::kFree
                                                            : ViewRaster::kOccupied);
   const Eigen::Vector2f corner = map.origin.cast<float>();
-  return fitted({.kind = RasterKind::kOccupancy,
-                 .anchor = map.anchor,
+  return fitted({.anchor = map.anchor,
                  .resolution_m = static_cast<float>(map.resolution_m),
                  .origin = {corner.x(), corner.y(), static_cast<float>(map.z_m)}},
-                std::move(cells));
-}
-
-std::optional<ViewRaster> view_raster(const LabelledMesh& slice, RobotId robot) {
-  const std::vector<Eigen::Vector3f>& points = slice.vertices;
-  const float spacing = spacing_of(points);
-  if (!std::isfinite(spacing) || slice.colors.size() != points.size()) return std::nullopt;
-  Eigen::Vector3f low = points.front(), high = low;
-  for (const Eigen::Vector3f& point : points) {
-    low = low.cwiseMin(point);
-    high = high.cwiseMax(point);
-  }
-  const Eigen::Vector2d sides =
-      ((high - low).head<2>() / spacing).array().round().cast<double>() + 1.0;
-  if (!(sides.prod() <= kMaxSliceCells)) return std::nullopt;
-  Cells cells{static_cast<std::size_t>(sides.x()), static_cast<std::size_t>(sides.y()), {}};
-  cells.values.assign(cells.width * cells.height, ViewRaster::kUnknown);
-  for (std::size_t k = 0; k < points.size(); ++k) {
-    const Eigen::Vector2f at = ((points[k] - low).head<2>() / spacing).array().round();
-    cells
-        .values[static_cast<std::size_t>(at.x()) + cells.width * static_cast<std::size_t>(at.y())] =
-        static_cast<std::uint8_t>(distance_share(slice.colors[k]) * ViewRaster::kFarthest);
-  }
-  return fitted({.kind = RasterKind::kDistances,
-                 .anchor = robot,
-                 .resolution_m = spacing,
-                 .origin = {low.x() - spacing / 2, low.y() - spacing / 2, low.z()}},
                 std::move(cells));
 }
 

@@ -5,7 +5,6 @@
 #include "modules/core/camera.hpp"
 #include "modules/core/occupancy_grid.hpp"
 #include "modules/core/tracked_image.hpp"
-#include "modules/mesh/labelled_mesh.hpp"
 #include "modules/objects/map_object.hpp"
 #include "modules/view/view_update.hpp"
 
@@ -25,9 +24,5 @@ inline constexpr int kMaxViewWidth = 640;
 /// The 2D map, reduced until it fits into an update: 2 x 2 cells become one. nullopt for an empty
 /// map.
 [[nodiscard]] std::optional<ViewRaster> view_raster(const OccupancyGrid& map);
-
-/// A slice of the distance field (see DistanceSlice) that `robot` sends, reduced in the same way.
-/// nullopt for points without colours, and for points that form no grid.
-[[nodiscard]] std::optional<ViewRaster> view_raster(const LabelledMesh& slice, RobotId robot);
 
 }  // namespace km

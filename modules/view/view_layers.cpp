@@ -19,10 +19,6 @@ void ViewLayers::add(std::shared_ptr<const OccupancyGrid> map) {
   set(1, [map = std::move(map)] { return view_raster(*map); });
 }
 
-void ViewLayers::add(std::shared_ptr<const LabelledMesh> slice) {
-  set(2, [self = self_, slice = std::move(slice)] { return view_raster(*slice, self); });
-}
-
 void ViewLayers::begin_again() {
   due_s_ = 0.0;
   for (Layer& layer : layers_) {

@@ -8,25 +8,21 @@
 #include <optional>
 #include <vector>
 
-#include "modules/core/ids.hpp"
 #include "modules/core/occupancy_grid.hpp"
-#include "modules/mesh/labelled_mesh.hpp"
 #include "modules/objects/map_object.hpp"
 #include "modules/view/view_update.hpp"
 
 namespace km {
 
-/// Chooses the next update for viewers from the objects, the 2D map and the slice of the distance
-/// field of a robot. The newest of each is sent, in turn, if it has changed since it was sent. They
-/// share a rate. Inputs are converted only when they are sent. Not thread-safe.
+/// Chooses the next update for viewers from the objects and the 2D map of a robot. The newest of
+/// each is sent, in turn, if it has changed since it was sent. They share a rate. Inputs are
+/// converted only when they are sent. Not thread-safe.
 class ViewLayers {
  public:
-  ViewLayers(RobotId self, double bytes_per_s) : self_(self), bytes_per_s_(bytes_per_s) {}
+  explicit ViewLayers(double bytes_per_s) : bytes_per_s_(bytes_per_s) {}
 
   void add(std::shared_ptr<const ObjectList> objects);
   void add(std::shared_ptr<const OccupancyGrid> map);
-  /// Points of a DistanceSlice.
-  void add(std::shared_ptr<const LabelledMesh> slice);
 
   /// A viewer has appeared: sends the newest of each again.
   void begin_again();
@@ -43,9 +39,8 @@ class ViewLayers {
   };
   void set(std::size_t layer, std::function<std::optional<ViewContent>()> newest);
 
-  RobotId self_;
   double bytes_per_s_;
-  std::array<Layer, 3> layers_;
+  std::array<Layer, 2> layers_;
   std::size_t turn_ = 0;  // layer that is considered first
   double due_s_ = 0.0;
 };

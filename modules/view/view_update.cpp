@@ -16,10 +16,8 @@ constexpr std::size_t kFeatureBytes = 2 * sizeof(float);
 constexpr std::size_t kObjectBytes = 1 + 7 * sizeof(float) + 1;
 constexpr std::size_t kTripleBytes = 3 * sizeof(std::uint16_t);
 
-bool is_value(RasterKind kind, std::uint8_t value) {
-  const std::uint8_t most =
-      kind == RasterKind::kOccupancy ? ViewRaster::kFree : ViewRaster::kFarthest;
-  return value <= most || value == ViewRaster::kUnknown;
+bool is_value(std::uint8_t value) {
+  return value <= ViewRaster::kFree || value == ViewRaster::kUnknown;
 }
 
 void describe_single(auto& archive, As<SE3> auto& T) {
@@ -90,7 +88,6 @@ void describe(auto& archive, As<ViewObjects> auto& update) {
 }
 
 void describe(auto& archive, As<ViewRaster> auto& raster) {
-  archive.choice(raster.kind, RasterKind::kDistances);
   archive(raster.anchor, raster.resolution_m, raster.width, raster.height);
   for (auto& x : raster.origin) archive(x);
   archive.list(raster.runs, kMaxViewBytes, 1, [&](auto& byte) { archive(byte); });
@@ -106,7 +103,7 @@ bool is_valid(const ViewRaster& raster) {
     return false;
   std::uint64_t sum = 0;
   for (std::size_t k = 0; k < raster.runs.size(); k += 2) {
-    if (raster.runs[k] == 0 || !is_value(raster.kind, raster.runs[k + 1])) return false;
+    if (raster.runs[k] == 0 || !is_value(raster.runs[k + 1])) return false;
     sum += raster.runs[k];
   }
   return sum == cells;

@@ -74,27 +74,17 @@ struct ViewObjects {
   std::uint32_t left_out = 0;  ///< Number of smaller objects for which there was no room.
 };
 
-enum class RasterKind : std::uint8_t {
-  kOccupancy,  ///< 2D map, in `world`.
-  kDistances,  ///< Slice of the distance field, in the odometry frame of the sending robot.
-};
-
-/// A horizontal grid of values; the newest of its kind counts. Smaller values are nearer to
-/// obstacles: where several cells become one, the smallest value remains.
+/// The 2D map in `world`; the newest counts. Where several cells become one, the smallest value
+/// remains.
 struct ViewRaster {
-  /// Value of an occupied cell of a 2D map, and of a point on a surface or behind it.
   static constexpr std::uint8_t kOccupied = 0;
-  static constexpr std::uint8_t kFree = 1;  ///< Value of a free cell of a 2D map.
-  /// Value of a point at the largest distance of the field; values between are proportional to the
-  /// distance. With few values the runs are long.
-  static constexpr std::uint8_t kFarthest = 31;
+  static constexpr std::uint8_t kFree = 1;
   static constexpr std::uint8_t kUnknown = 255;
 
   static constexpr std::size_t kMaxCells = std::size_t{1} << 20U;
   static constexpr std::uint32_t kMaxSide = 4096;  ///< [cells] Browsers draw no larger images.
 
-  RasterKind kind = RasterKind::kOccupancy;
-  RobotId anchor = 0;  ///< Robot whose odometry frame is `world`; of a slice: the sending robot.
+  RobotId anchor = 0;                       ///< Robot whose odometry frame is `world`.
   float resolution_m = 0.05F;               ///< Side of a cell.
   std::array<float, 3> origin = {0, 0, 0};  ///< Corner of cell (0, 0), and height [m].
   std::uint32_t width = 0;                  ///< [cells] along x

@@ -25,7 +25,6 @@ struct Bench {
   Topic<MapMesh> maps;
   Topic<OptimizedMesh> optimized;
   Topic<OccupancyGrid> maps_2d;
-  Topic<DistanceSlice> slices;
   ResultWriter results;
   MeshFilesNode node{folder.path(),
                      results,
@@ -33,8 +32,7 @@ struct Bench {
                       .trajectory = trajectory,
                       .maps = maps,
                       .optimized = optimized,
-                      .maps_2d = maps_2d,
-                      .slices = slices}};
+                      .maps_2d = maps_2d}};
 
   [[nodiscard]] LabelledMesh written(const char* file) const {
     return read_mesh(folder.path() / file);
@@ -63,17 +61,15 @@ TEST_CASE("A mesh is moved to the optimised pose of its first keyframe") {
   CHECK(bench.written("mesh_optimized.ply").vertices == triangle().mesh.vertices);
 }
 
-TEST_CASE("The 2D map and the slice of the distance field are written") {
+TEST_CASE("The 2D map is written") {
   Bench bench;
   bench.node.start();
   bench.maps_2d.publish(OccupancyGrid{0.5, {-1, 2}, 2, 1, {100, -1}});
-  bench.slices.publish(DistanceSlice{.points = triangle().mesh});
   bench.node.stop();
   const OccupancyGrid map =
       load_nav2_map(bench.folder.read("map.yaml"), bench.folder.read("map.pgm"));
   CHECK(map.origin == Eigen::Vector2d(-1, 2));
   CHECK(map.cells == std::vector<std::int8_t>{100, -1});
-  CHECK(bench.written("distance_field.ply").vertices == triangle().mesh.vertices);
 }
 
 TEST_CASE("A mesh that cannot be written is named, and no end of the run") {

@@ -37,7 +37,6 @@ const std::map<std::string, std::set<std::string>> kModuleUses = {
     {"simulation", {"images", "mesh"}},
     {"semantic_mapping", {"mesh"}},
     {"team_map", {"mesh", "semantic_mapping"}},
-    {"distance_field", {"mesh", "semantic_mapping"}},
     {"map_2d", {"mesh"}},
     {"mesh_deformation", {"mesh"}},
     {"objects", {"mesh", "mesh_deformation"}},

@@ -273,8 +273,7 @@ addLayer('optimized', 'Optimised');
 addLayer('odometry', 'Odometry');
 addLayer('keyframes', 'Keyframes');
 for (const [verdict, {color, text}] of Object.entries(VERDICTS)) addLayer(verdict, text, color);
-for (const [name, text] of [
-         ['objects', 'Objects'], ['map_2d', '2D map'], ['distances', 'Distances']])
+for (const [name, text] of [['objects', 'Objects'], ['map_2d', '2D map']])
   addLayer(name, text).dataset.layer = name;
 
 // ---- pointer and keys

@@ -142,7 +142,7 @@ export class Model {
   clear() {
     this.robots = new Map();  // by id, ascending
     this.byNumber = new Map();
-    this.layers = new Set();  // layers with content at any time: objects, team, map_2d, distances
+    this.layers = new Set();  // layers with content at any time: objects, team, map_2d
     this.start_ms = null;
     this.end = 0;  // [s] since the start
     this.time = 0;

@@ -1,23 +1,16 @@
-// The 2D maps and the slices of distance fields: horizontal images.
+// The 2D maps: horizontal images.
 import * as THREE from './three/build/three.module.js';
 
-const OCCUPIED = 0, FREE = 1, FARTHEST = 31, UNKNOWN = 255;  // values, as in view_update.hpp
+const OCCUPIED = 0, FREE = 1;  // values, as in view_update.hpp
 const CLEAR = [0, 0, 0, 0];
 const LIFT_M = 0.05;  // height of the 2D map above the floor
 
-// Colours of the images of a layer, the lowest first: [red, green, blue, opacity] of a value.
+// Colours of the images of a map, the lowest first: [red, green, blue, opacity] of a value.
 // Obstacles have an image of their own, so that no free space of another robot covers them.
-const IMAGES = {
-  map_2d: [
-    (value) => (value === FREE ? [232, 236, 242, 190] : CLEAR),
-    (value) => (value === OCCUPIED ? [4, 6, 10, 255] : CLEAR),
-  ],
-  distances: [(value) => {
-    if (value === UNKNOWN) return CLEAR;
-    const share = (2 * value) / FARTHEST;
-    return [255 * Math.min(1, 2 - share), 255 * Math.min(1, share), 40, 200];
-  }],
-};
+const IMAGES = [
+  (value) => (value === FREE ? [232, 236, 242, 190] : CLEAR),
+  (value) => (value === OCCUPIED ? [4, 6, 10, 255] : CLEAR),
+];
 
 function textureOf({width, height, runs}, colorOf) {
   const pixels = new Uint32Array(width * height);
@@ -28,9 +21,9 @@ function textureOf({width, height, runs}, colorOf) {
 }
 
 function build(message) {
-  const {layer, width, height, resolution_m, origin: [x, y, z]} = message;
+  const {width, height, resolution_m, origin: [x, y, z]} = message;
   const [dx, dy] = [width * resolution_m, height * resolution_m];
-  const lift = layer === 'map_2d' ? z + LIFT_M : z;
+  const lift = z + LIFT_M;
   const geometry = new THREE.BufferGeometry();
   geometry.setAttribute(
       'position',
@@ -38,7 +31,7 @@ function build(message) {
           [x, y, lift, x + dx, y, lift, x, y + dy, lift, x + dx, y + dy, lift], 3));
   geometry.setAttribute('uv', new THREE.Float32BufferAttribute([0, 0, 1, 0, 0, 1, 1, 1], 2));
   geometry.setIndex([0, 1, 2, 2, 1, 3]);
-  return IMAGES[layer].map((colorOf, i) => {
+  return IMAGES.map((colorOf, i) => {
     const object = new THREE.Mesh(geometry, new THREE.MeshBasicMaterial({
       map: textureOf(message, colorOf),
       transparent: true,
@@ -46,7 +39,7 @@ function build(message) {
       side: THREE.DoubleSide
     }));
     object.matrixAutoUpdate = false;
-    object.renderOrder = i - IMAGES[layer].length;  // below all lines
+    object.renderOrder = i - IMAGES.length;  // below all lines
     return object;
   });
 }
@@ -54,7 +47,7 @@ function build(message) {
 export class RasterLayer {
   constructor() { this.shown = new Map(); }  // message -> its objects
 
-  /** Shows the rasters of the layers that are on, in the places place(message). */
+  /** Shows the rasters of the layers that are on, in the places place(anchor, robot). */
   sync(model, layers, place) {
     const wanted = new Set();
     for (const robot of model.robots.values())
@@ -72,7 +65,7 @@ export class RasterLayer {
     }
     for (const message of wanted) {
       if (!this.shown.has(message)) this.shown.set(message, build(message));
-      const {group, T} = place(message);
+      const {group, T} = place(message.anchor, message.robot);
       for (const object of this.shown.get(message)) {
         if (object.parent !== group) group.add(object);
         object.matrix.copy(T ?? new THREE.Matrix4());

@@ -119,8 +119,7 @@ export class Scene {
       candidate: false,
       rejected: false,
       objects: true,
-      map_2d: false,
-      distances: false
+      map_2d: false
     };
     this.measured = null;  // null: not measuring; else up to two points
     this.follows = null;
@@ -192,19 +191,10 @@ export class Scene {
     return now ? {group: now.group, T: this.correction(robot)} : {group: this.scene, T: null};
   }
 
-  // Group and transform for content in the odometry frame of a robot.
-  placeOdometry(id) {
-    const robot = this.model.robots.get(id), frame = this.frames.get(this.frameOf(robot));
-    return {group: frame?.group ?? this.scene, T: this.correction(robot)};
-  }
-
   updateLayers() {
     const place = (anchor, of) => this.place(anchor, of);
     this.objects.sync(this.model, this.layers.objects, place, this.meshes);
-    this.rasters.sync(
-        this.model, this.layers,
-        ({layer, anchor, robot}) =>
-            layer === 'distances' ? this.placeOdometry(robot) : place(anchor, robot));
+    this.rasters.sync(this.model, this.layers, place);
   }
 
   updateFrames(model) {

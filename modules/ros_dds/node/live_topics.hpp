@@ -62,9 +62,6 @@ class LiveSink final : public RosSink {
            std::span<const std::uint8_t> message) override {
     publishers_.at(topic)->publish(message);
   }
-  [[nodiscard]] std::size_t readers(std::size_t topic) const override {
-    return publishers_.at(topic)->reader_count();
-  }
 
  private:
   std::shared_ptr<const RosNetwork> network_;

@@ -106,13 +106,8 @@ void RosOutputNode::open_topics(bool has_images) {
   }
   if (options_.objects) objects_ = latest("objects", RosMarkerArray::kType);
   if (options_.logs) log_ = sink_->open({"/rosout", RosLog::kType});
-  if (options_.slices) open_slices();
   if (has_images)
     image_ = sink_->open({prefix + "left/image_raw/compressed", RosCompressedImage::kType});
-}
-
-void RosOutputNode::open_slices() {
-  slice_ = sink_->open({'/' + name_ + "/distance_slice", RosPointCloud2::kType, true, 1});
 }
 
 void RosOutputNode::start_sources() {
@@ -229,12 +224,6 @@ void RosOutputNode::step(const Topic<ObjectList>::Message& objects) {
   publish_latest(false);
 }
 
-void RosOutputNode::step(const RosSlice& slice) {
-  if (!slice_) open_slices();
-  const std::size_t most = std::max<std::size_t>(slice.points->vertices.size(), 1);
-  publish(*slice_, cloud_of(*slice.points, most, {slice.stamp, odom_}));
-}
-
 void RosOutputNode::step(const std::shared_ptr<const OccupancyGrid>& grid) {
   newest_map_2d_ = grid;
   map_2d_.changed = true;
@@ -349,7 +338,6 @@ void RosOutputNode::step(const Tick& /*tick*/) {
   }
   publish_latest(false);
   publish_pieces();
-  has_slice_readers_ = slice_ && sink_->readers(*slice_) > 0;
   publish_team_frame();
   sink_->flush();
 }

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <atomic>
 #include <cstddef>
 #include <exception>
 #include <functional>
@@ -53,9 +52,8 @@ struct RosOutputOptions {
   bool awaits_trajectory = false;
   /// Classes of the objects that are published; nullopt: no objects are published.
   std::optional<LabelPalette> objects = std::nullopt;
-  bool draws = false;   ///< Publish faces of the mesh and closures as markers.
-  bool logs = false;    ///< Publish the log of this process.
-  bool slices = false;  ///< Open the topic of slices before the first one, so that it can be read.
+  bool draws = false;  ///< Publish faces of the mesh and closures as markers.
+  bool logs = false;   ///< Publish the log of this process.
   /// Maximum rate of each of the topics `path`, `mesh`, `map_2d`, `closures` and `objects`.
   double state_bytes_per_s = std::numeric_limits<double>::infinity();
   /// Maximum number of waiting inputs; beyond it the oldest are dropped, so that no node waits for
@@ -67,15 +65,10 @@ struct RosOutputOptions {
 struct RosCoarseMesh {
   std::shared_ptr<const LabelledMesh> mesh;
 };
-/// A slice of the distance field.
-struct RosSlice {
-  std::shared_ptr<const LabelledMesh> points;
-  Stamp stamp = 0;
-};
 using RosOutputInput =
     std::variant<Tick, Topic<OdometryState>::Message, Topic<KeyframeOdometry>::Message,
                  Topic<Trajectory>::Message, std::shared_ptr<const LabelledMesh>, RosCoarseMesh,
-                 Topic<ObjectList>::Message, std::shared_ptr<const OccupancyGrid>, RosSlice,
+                 Topic<ObjectList>::Message, std::shared_ptr<const OccupancyGrid>,
                  std::shared_ptr<const RosLog>, std::shared_ptr<const RosCompressedImage>>;
 
 /// Publishes the state of a robot NAME to ROS viewers and planners, or into a file that they read:
@@ -88,8 +81,6 @@ using RosOutputInput =
 ///   /NAME/path         nav_msgs/Path in `map`: the keyframes, whenever they are optimised
 ///   /NAME/mesh         sensor_msgs/PointCloud2 in `map`: vertices, whenever they are corrected
 ///   /NAME/map_2d       nav_msgs/OccupancyGrid in `map`, whenever it is made
-///   /NAME/distance_slice  sensor_msgs/PointCloud2 in NAME/odom, see DistanceSlice; while it
-///                      has readers
 ///   /diagnostics       diagnostic_msgs/DiagnosticArray, once a second: odometry, and what
 ///                      Diagnose returns
 /// and on request:
@@ -119,16 +110,8 @@ class RosOutputNode final : public WorkerNode<RosOutputInput> {
   void offer(std::shared_ptr<const LabelledMesh> mesh) { post(std::move(mesh)); }
   /// Replaces the objects by `objects`, whose frame is `map`. Thread-safe; does not wait.
   void offer(std::shared_ptr<const ObjectList> objects) { post(std::move(objects)); }
-  /// Publishes a slice of the distance field: points in the frame NAME/odom. Thread-safe; does not
-  /// wait.
-  void offer_slice(std::shared_ptr<const LabelledMesh> points, Stamp stamp) {
-    post(RosSlice{std::move(points), stamp});
-  }
   /// Replaces the 2D map, whose frame is `map`. Thread-safe; does not wait.
   void offer(std::shared_ptr<const OccupancyGrid> grid) { post(std::move(grid)); }
-
-  /// True if the topic of slices has readers, as of the last second. Thread-safe.
-  [[nodiscard]] bool has_slice_readers() const { return has_slice_readers_; }
 
   std::exception_ptr error() const override {
     return first_of({WorkerNode::error(), encoder_.error()});
@@ -159,7 +142,6 @@ class RosOutputNode final : public WorkerNode<RosOutputInput> {
   };
 
   void open_topics(bool has_images);
-  void open_slices();
   void handle(const Input& input) override {
     std::visit([this](const auto& message) { step(message); }, input);
   }
@@ -173,7 +155,6 @@ class RosOutputNode final : public WorkerNode<RosOutputInput> {
   void step(const std::shared_ptr<const LabelledMesh>& mesh);
   void step(const RosCoarseMesh& coarse);
   void step(const Topic<ObjectList>::Message& objects);
-  void step(const RosSlice& slice);
   void step(const std::shared_ptr<const OccupancyGrid>& grid);
   void step(const std::shared_ptr<const RosLog>& line);
   void step(const std::shared_ptr<const RosCompressedImage>& image);
@@ -198,8 +179,6 @@ class RosOutputNode final : public WorkerNode<RosOutputInput> {
   const Diagnose diagnose_;
   const Closures closures_of_;
   std::size_t odometry_ = 0, pose_ = 0, tf_ = 0, diagnostics_ = 0, faces_ = 0, log_ = 0, image_ = 0;
-  std::optional<std::size_t> slice_;  // opened with the first slice at the latest
-  std::atomic<bool> has_slice_readers_ = false;
   LatestTopic path_, mesh_, map_2d_, closures_, objects_;
   LiveFrames frames_;
   std::size_t poses_ = 0;

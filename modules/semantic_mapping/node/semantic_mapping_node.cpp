@@ -71,10 +71,7 @@ void SemanticMappingNode::map(const DenseFrame& frame) {
   count(frame, mapper_->integrate(*frame.depth, frame.labels.get(), frame.T_odom_cam,
                                   frame.keyframe, frame.color.get()));
   // The mesh is updated once for each keyframe, so that a vertex gets the first one that saw it.
-  if (meshed_ != frame.keyframe) {
-    mapper_->update_mesh();
-    publish_space(frame);
-  }
+  if (meshed_ != frame.keyframe) mapper_->update_mesh();
   meshed_ = frame.keyframe;
   if (!published_) published_ = frame.stamp;
   if (seconds_between(*published_, frame.stamp) >= mesh_interval_s_) {
@@ -106,18 +103,6 @@ void SemanticMappingNode::count(const DenseFrame& frame, const IntegrationReport
   progress_.off_palette_pixels += report.off_palette_pixels;
   progress_.blocks_refused += report.blocks_refused;
   progress_.too_late = load().dropped;
-}
-
-void SemanticMappingNode::publish_space(const DenseFrame& frame) {
-  const bool is_wanted = wants_space_ && wants_space_();
-  const bool is_first = is_wanted && !tracks_space_;
-  if (is_wanted != std::exchange(tracks_space_, is_wanted)) mapper_->track_space(is_wanted);
-  if (is_wanted)
-    topics_.space.publish(SpaceUpdate{.stamp = frame.stamp,
-                                      .voxel_m = mapper_->space_voxel_m(),
-                                      .camera_z_m = frame.T_odom_cam.translation().z(),
-                                      .is_first = is_first,
-                                      .changes = mapper_->take_space_changes()});
 }
 
 void SemanticMappingNode::publish_mesh() {

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <functional>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -20,7 +19,6 @@ struct SemanticMappingTopics {
                                      ///< newest message counts.
   Out<MapMesh> maps;                 ///< The whole map.
   Out<MappingProgress> progress;     ///< With every frame.
-  Out<SpaceUpdate> space;            ///< With every keyframe while wants_space().
 };
 
 /// Builds a robot's map as a thread with one SemanticMapper. The mesh is published every few
@@ -34,12 +32,6 @@ class SemanticMappingNode final : public WorkerNode<Topic<DenseFrame>::Message> 
                       const LabelPalette& palette, double mesh_interval_s, Overflow overflow,
                       const SemanticMappingTopics& topics);
   ~SemanticMappingNode() override { stop(); }
-
-  /// Space is tracked and published while `wants_space` returns true. The thread calls it for every
-  /// keyframe. Call before start().
-  void track_space_while(std::function<bool()> wants_space) {
-    wants_space_ = std::move(wants_space);
-  }
 
   /// The mesh is appended to the map of an earlier process. Call before start().
   void continue_from(ResumedMap before) { before_.emplace(std::move(before)); }
@@ -57,7 +49,6 @@ class SemanticMappingNode final : public WorkerNode<Topic<DenseFrame>::Message> 
   void count(const DenseFrame& frame, const IntegrationReport& report);
   void drop_superseded();
   void publish_mesh();
-  void publish_space(const DenseFrame& frame);
 
   SemanticMappingConfig config_;
   Camera camera_;
@@ -66,8 +57,6 @@ class SemanticMappingNode final : public WorkerNode<Topic<DenseFrame>::Message> 
   LabelPalette palette_;
   const double mesh_interval_s_;
   const SemanticMappingTopics topics_;
-  std::function<bool()> wants_space_;
-  bool tracks_space_ = false;
   std::optional<ResumedMap> before_;
   MappingProgress progress_;
   std::optional<KeyframeIndex> meshed_;  // keyframe of the last update of the mesh

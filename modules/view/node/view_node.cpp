@@ -52,7 +52,7 @@ ViewNode::ViewNode(const ViewConfig& config, const DdsParticipant& participant,
                  {writer_on(participant, ViewChannel::kImages), budget_of(kUnlimited)}}},
       past_budget_(budget_of(config.past_bytes_per_s())),
       selector_(self_),
-      layers_(self_, kLayerShare * config.mesh_bytes_per_s()) {
+      layers_(kLayerShare * config.mesh_bytes_per_s()) {
   follow(topics.odometry, topics.keyframes, topics.outcomes, topics.restored_outcomes,
          topics.closures, topics.restarts, topics.objects, topics.maps_2d);
   if (!camera_ || config_.images_per_s <= 0.0) return;

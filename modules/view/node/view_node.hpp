@@ -43,8 +43,7 @@ using ViewInput = std::variant<
     Tick, ViewMeshOffer, Topic<OdometryState>::Message, Topic<KeyframeOdometry>::Message,
     Topic<ClosureOutcome>::Message, Topic<Closure>::Message, Topic<ClosureJudgements>::Message,
     Topic<PoseChanges>::Message, Topic<RobotSample>::Message, Topic<PeerEvent>::Message,
-    Topic<ObjectList>::Message, Topic<OccupancyGrid>::Message, std::shared_ptr<const LabelledMesh>,
-    Topic<TrackedImage>::Message>;
+    Topic<ObjectList>::Message, Topic<OccupancyGrid>::Message, Topic<TrackedImage>::Message>;
 
 /// Sends the state of the robot to viewers (see ViewUpdate), on topics of its own in the team's
 /// domain. It sends the updates of a ViewSelector, the mesh in chunks, the updates of ViewLayers,
@@ -62,11 +61,6 @@ class ViewNode final : public WorkerNode<ViewInput> {
   /// Replaces the mesh, given in the frame of the robot `anchor`. Thread-safe; does not wait.
   void offer(RobotId anchor, std::shared_ptr<const LabelledMesh> mesh);
 
-  /// Replaces the points of the slice (see DistanceSlice). Thread-safe; does not wait.
-  void offer_slice(std::shared_ptr<const LabelledMesh> points) { post(std::move(points)); }
-
-  /// True if a viewer reads the map. Thread-safe.
-  [[nodiscard]] bool has_map_viewers() const { return sends_mesh_; }
   /// Sends an event of the recorder: ClosureJudgements, PoseChanges or RobotSample. Thread-safe;
   /// does not wait.
   template <typename Event>
@@ -102,7 +96,6 @@ class ViewNode final : public WorkerNode<ViewInput> {
   void take(const Topic<PeerEvent>::Message& event);
   void take(const Topic<ObjectList>::Message& objects) { layers_.add(objects); }
   void take(const Topic<OccupancyGrid>::Message& map) { layers_.add(map); }
-  void take(const std::shared_ptr<const LabelledMesh>& slice) { layers_.add(slice); }
   void take(const Topic<TrackedImage>::Message& image);
   template <typename T>
   void take(const std::shared_ptr<const T>& message) {

@@ -95,7 +95,7 @@ class SmallRun {
                    {.mesh = std::move(mesh), .seen_by = std::vector(vertices, std::array{0U, 2U})});
   }
 
-  // Two objects, a 2D map of 2 x 1 cells, a slice of two points, and the fused mesh of the team.
+  // Two objects, a 2D map of 2 x 1 cells, and the fused mesh of the team.
   void write_layers(const LabelledMesh& mesh) {
     ObjectList objects{
         0, {{.label = 1, .box = {}, .robots = {0}}, {.label = 2, .box = {}, .robots = {0, 1}}}};
@@ -106,10 +106,6 @@ class SmallRun {
                             0.5};
     folder.write("r0/map.yaml", map_yaml(map, kMap2dImage));
     folder.write("r0/map.pgm", map_image(map));
-    LabelledMesh slice;
-    slice.vertices = {{0, 0, 1}, {0.5F, 0, 1}};
-    slice.colors = {{255, 0, 0}, {0, 255, 0}};
-    write_mesh(of(0) / kDistanceSlice, slice);
     write_mesh(of(0) / kTeamMesh, mesh);
   }
 

@@ -100,10 +100,9 @@ TEST_CASE("Poses, closures and objects are lists of numbers") {
 }
 
 TEST_CASE("A raster is sent as its runs, an image after its features") {
-  const ViewRaster raster{
-      .kind = RasterKind::kDistances, .origin = {1, 2, 3}, .width = 5, .runs = {5, 31}};
+  const ViewRaster raster{.origin = {1, 2, 3}, .width = 5, .runs = {5, 31}};
   const auto [object, data] = parts_of(page_message({0, 1, 0, raster}, 1));
-  CHECK(object["layer"] == "distances");
+  CHECK(object["layer"] == "map_2d");
   CHECK(object["origin"] == json::parse("[1, 2, 3]"));
   CHECK(object["width"] == 5);
   CHECK(data == "\x05\x1f");

@@ -118,7 +118,6 @@ TEST_CASE("A robot's record holds the published messages and the final states") 
       std::make_shared<const OccupancyGrid>(OccupancyGrid{0.5, {-1, 2}, 2, 1, {100, -1}, 3}));
   const MapObject chair{.label = 7, .box = {{1, 2, 3}, 0.5, {2, 1, 4}}};
   node.offer(std::make_shared<const ObjectList>(ObjectList{0, {chair}}));
-  node.offer_slice(std::make_shared<const LabelledMesh>(mesh), 1002);
   log::info("vio") << "begins";
   StereoFrame frame{.stamp = 1007, .left = {8, 8, std::vector<std::uint8_t>(64, 9)}, .right = {}};
   packets.publish(SensorPacket{std::make_shared<const StereoFrame>(frame), {}});
@@ -159,9 +158,6 @@ TEST_CASE("A robot's record holds the published messages and the final states") 
   CHECK(name.type == RosMarkerType::kText);
   CHECK(name.text == "chair");
   CHECK(name.pose.position.z() > 3.0 + 0.5 * 4.0);
-  const auto slice = record.last<RosPointCloud2>("/bob_3/distance_slice");
-  CHECK(slice.header.frame_id == "bob_3/odom");
-  CHECK(slice.width == 3);
   const auto path = record.last<RosPath>("/bob_3/path");
   REQUIRE(path.poses.size() == 2);
   CHECK(path.poses[1].header.stamp == 1001);

@@ -21,7 +21,7 @@ void fill(VoxelBlock& block, const Distance& distance) {
         block.distance[voxel] = static_cast<float>(distance(point_of(block, x, y, z)));
         block.weight[voxel] = 1.0F;
       }
-  block.changed = block.has_mesh = true;
+  block.changed = true;
 }
 
 // Blocks from -n to n - 1 along each axis, so that many borders pass through the middle.

@@ -12,7 +12,6 @@ struct Bench {
   Topic<SupersededSurface> superseded;
   Topic<MapMesh> maps;
   Topic<MappingProgress> progress;
-  Topic<SpaceUpdate> space;
   std::vector<std::shared_ptr<const MapMesh>> meshes;
   MappingProgress last;
   std::unique_ptr<SemanticMappingNode> node;
@@ -20,13 +19,10 @@ struct Bench {
   Bench() {
     maps.subscribe([this](const auto& message) { meshes.push_back(message); });
     progress.subscribe([this](const auto& message) { last = *message; });
-    node = std::make_unique<SemanticMappingNode>(settings(), small_camera(), two_classes(), 3.0,
-                                                 Overflow::kBlock,
-                                                 SemanticMappingTopics{.frames = frames,
-                                                                       .superseded = superseded,
-                                                                       .maps = maps,
-                                                                       .progress = progress,
-                                                                       .space = space});
+    node = std::make_unique<SemanticMappingNode>(
+        settings(), small_camera(), two_classes(), 3.0, Overflow::kBlock,
+        SemanticMappingTopics{
+            .frames = frames, .superseded = superseded, .maps = maps, .progress = progress});
   }
 };
 
@@ -112,33 +108,6 @@ TEST_CASE("Superseded surface is dropped with the next frame") {
   step(40, 20.0);
   CHECK(bench.last.size.dropped_faces == first.mesh.faces.size());
   CHECK(bench.last.size.faces == faces - first.mesh.faces.size());
-}
-
-TEST_CASE("Space is published while it is wanted, and begins with all blocks") {
-  Bench bench;
-  std::vector<SpaceUpdate> updates;
-  bench.space.subscribe([&](const auto& update) { updates.push_back(*update); });
-  bool is_wanted = false;
-  bench.node->track_space_while([&] { return is_wanted; });
-  int next = 0;
-  const auto step = [&](int keyframes) {
-    for (const int end = next + 2 * keyframes; next < end; ++next) bench.node->step(frame(next));
-  };
-  step(3);
-  CHECK(updates.empty());
-  is_wanted = true;
-  step(2);
-  REQUIRE(updates.size() == 2);
-  CHECK(updates[0].is_first);
-  CHECK(updates[0].changes.size() >= bench.last.size.blocks);
-  CHECK_FALSE(updates[1].is_first);
-  is_wanted = false;
-  step(1);
-  CHECK(updates.size() == 2);
-  is_wanted = true;
-  step(1);
-  REQUIRE(updates.size() == 3);
-  CHECK(updates[2].is_first);
 }
 
 }  // namespace

@@ -61,8 +61,7 @@ inline ViewObjects some_objects() {
 }
 
 inline ViewRaster some_raster() {
-  return {.kind = RasterKind::kOccupancy,
-          .anchor = 3,
+  return {.anchor = 3,
           .resolution_m = 0.25F,
           .origin = {-1.0F, 2.0F, 0.5F},
           .width = 3,

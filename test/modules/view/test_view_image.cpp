@@ -1,4 +1,3 @@
-#include "modules/core/distance_color.hpp"
 #include "modules/view/view_content.hpp"
 #include "test/support/image_file.hpp"
 #include "test/support/test.hpp"
@@ -107,40 +106,6 @@ TEST_CASE("A large 2D map is reduced until it fits, and no obstacle is lost") {
       if (cell == kFreeCell && value != ViewRaster::kOccupied) value = ViewRaster::kFree;
     }
   CHECK(cells_of(*raster) == expected);
-}
-
-TEST_CASE("A slice of the distance field has its distances in the cells of its voxels") {
-  constexpr float kVoxel_m = 0.1F;
-  LabelledMesh slice;
-  for (int y = -1; y <= 1; ++y)
-    for (int x = 7; x < 10; ++x) {
-      if (x == 8 && y == 0) continue;
-      slice.vertices.emplace_back(kVoxel_m * static_cast<float>(x),
-                                  kVoxel_m * static_cast<float>(y), 1.2F);
-      slice.colors.push_back(distance_color(static_cast<double>(x - 7) / 2.0));
-    }
-  CHECK(slice.colors[0] == LabelledMesh::Color{0, 0, 255});
-  const auto raster = view_raster(slice, 6);
-  REQUIRE(raster);
-  CHECK(is_valid(*raster));
-  CHECK(raster->kind == RasterKind::kDistances);
-  CHECK(raster->anchor == 6);
-  CHECK(raster->resolution_m == Approx(kVoxel_m));
-  CHECK(raster->origin[0] == Approx(0.65F));
-  CHECK(raster->origin[1] == Approx(-0.15F));
-  CHECK(raster->origin[2] == 1.2F);
-  CHECK(cells_of(*raster) == Values{0, 15, 31, 0, 255, 31, 0, 15, 31});
-
-  slice.colors.pop_back();
-  CHECK_FALSE(view_raster(slice, 6));
-  CHECK_FALSE(view_raster(LabelledMesh{}, 6));
-}
-
-TEST_CASE("Points that are no slice have no raster") {
-  LabelledMesh points;
-  points.vertices = {{0, 0, 0}, {1e-3F, 0, 0}, {1e30F, 1e30F, 0}};
-  points.colors.resize(3);
-  CHECK_FALSE(view_raster(points, 0));
 }
 
 TEST_CASE("The largest objects are sent if not all fit, and the others are counted") {

@@ -229,10 +229,6 @@ TEST_CASE("At the end all remaining updates are sent") {
   robot.node.start();
   robot.objects.publish(ObjectList{kSelf, {MapObject{.label = 5, .box = {}}}});
   robot.maps_2d.publish(OccupancyGrid{0.05, {0, 0}, 1, 1, {OccupancyGrid::kFree}});
-  LabelledMesh slice;
-  slice.vertices = {{0, 0, 1}, {0.1F, 0, 1}};
-  slice.colors = {{255, 0, 0}, {0, 255, 0}};
-  robot.node.offer_slice(std::make_shared<const LabelledMesh>(std::move(slice)));
   robot.node.stop();
   const std::size_t sent = robot.sent();
   robot.node.stop();
@@ -240,7 +236,7 @@ TEST_CASE("At the end all remaining updates are sent") {
   CHECK(eventually([&] {
     visitor->receive_all();
     return visitor->watcher.optimized.size() == 400 &&
-           visitor->watcher.objects.objects.size() == 1 && visitor->watcher.rasters.size() == 2 &&
+           visitor->watcher.objects.objects.size() == 1 && visitor->watcher.raster.has_value() &&
            visitor->faces() == wavy_sheet(150, 0.1).faces.size();
   }));
 }

@@ -84,10 +84,6 @@ TEST_CASE("Updates with impossible numbers are refused") {
     CAPTURE(what);
     CHECK_FALSE(is_understood(content));
   }
-  CHECK(is_understood(changed(some_raster(), [](auto& raster) {
-    raster.runs[1] = 2;
-    raster.kind = RasterKind::kDistances;
-  })));
 }
 
 TEST_CASE("The size of an update is bounded") {

@@ -34,7 +34,7 @@ struct Watcher {
   void take(const MeshChunk& chunk) { (void)mesh.add(chunk); }
   void take(const ViewImage& image) { images.push_back(image); }
   void take(const ViewObjects& update) { objects = update; }
-  void take(const ViewRaster& raster) { rasters[raster.kind] = raster; }
+  void take(const ViewRaster& update) { raster = update; }
 
   struct Placed {
     RobotId anchor = 0;
@@ -49,7 +49,7 @@ struct Watcher {
   std::vector<ViewImage> images;
   TeamMesh mesh;
   ViewObjects objects;
-  std::map<RasterKind, ViewRaster> rasters;
+  std::optional<ViewRaster> raster;
 };
 
 }  // namespace km
