@@ -8,7 +8,6 @@ namespace km {
 /// names it. A subcommand prints tables and writes the requested files. Unusable input throws an
 /// exception with a message of one line.
 void add_trajectory(CLI::App& app);
-void add_closures(CLI::App& app);
 void add_consistency(CLI::App& app);
 void add_mesh(CLI::App& app);
 void add_render(CLI::App& app);

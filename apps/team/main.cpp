@@ -35,8 +35,11 @@ constexpr const char* kAbout =
 
 A team file lists the robots and their inputs: see below, and config/teams/. If it names true poses,
 which are in one world for all robots, the tables show the errors of the trajectories and the number
-of true closures (see kimera_multi_evaluate closures --help). With truth_mesh they also show the
-errors of the robots' meshes.
+of true closures, per stage: their share (precision), and the share of the possible ones that was found
+(recall). A candidate is true if both keyframes see the same place, see closure_truth below. A verified
+closure and an inlier are false if the measured pose errs by more than these limits and by more than its
+covariance explains (99.9 %). Recall counts pairs of keyframes of two robots that see the same place, and
+keyframes that are part of such a pair. With truth_mesh the tables also show the errors of the meshes.
 
 The folder of the results receives report.html, a page for any browser, without a network: the tables
 with charts over time, every closure, and the findings.

@@ -277,17 +277,17 @@ ClosureStage stage_of(const InputRow& row, std::size_t i) {
 
 }  // namespace
 
-std::vector<KeyframeRecord> parse_keyframes(std::string_view text, const std::string& name) {
+std::vector<KeyframeRecord> read_keyframes(const fs::path& file) {
   std::vector<KeyframeRecord> keyframes;
-  for_each_row(text, name, 4, [&](const InputRow& row) {
+  for_each_row(read_input_file(file), file.string(), 4, [&](const InputRow& row) {
     keyframes.push_back({keyframe_of(row, 0), row.integer(2, kMaxKeyframeStamp), depth_of(row, 3)});
   });
   return keyframes;
 }
 
-std::vector<ClosureRecord> parse_closures(std::string_view text, const std::string& name) {
+std::vector<ClosureRecord> read_closures(const fs::path& file) {
   std::vector<ClosureRecord> closures;
-  for_each_row(text, name, kReasonColumn, [&](const InputRow& row) {
+  for_each_row(read_input_file(file), file.string(), kReasonColumn, [&](const InputRow& row) {
     ClosureRecord closure;
     closure.id = {keyframe_of(row, 0), keyframe_of(row, 2)};
     closure.stage = stage_of(row, 5);
@@ -304,14 +304,6 @@ std::vector<ClosureRecord> parse_closures(std::string_view text, const std::stri
     closures.push_back(std::move(closure));
   });
   return closures;
-}
-
-std::vector<KeyframeRecord> read_keyframes(const fs::path& file) {
-  return parse_keyframes(read_input_file(file), file.string());
-}
-
-std::vector<ClosureRecord> read_closures(const fs::path& file) {
-  return parse_closures(read_input_file(file), file.string());
 }
 
 std::vector<TrueKeyframe> place_keyframes(std::span<const KeyframeRecord> keyframes,

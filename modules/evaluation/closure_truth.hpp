@@ -142,12 +142,6 @@ struct KeyframeRecord {
 /// and the reason may be empty. Throws InputFileError, also for a verified closure without a pose.
 [[nodiscard]] std::vector<ClosureRecord> read_closures(const std::filesystem::path& file);
 
-/// Parse the text of a file; `name` replaces the file name in messages.
-[[nodiscard]] std::vector<KeyframeRecord> parse_keyframes(std::string_view text,
-                                                          const std::string& name);
-[[nodiscard]] std::vector<ClosureRecord> parse_closures(std::string_view text,
-                                                        const std::string& name);
-
 /// The keyframes that have a true pose in `truth` (ascending), with this pose.
 [[nodiscard]] std::vector<TrueKeyframe> place_keyframes(std::span<const KeyframeRecord> keyframes,
                                                         std::span<const StampedPose> truth);

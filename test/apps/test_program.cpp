@@ -166,7 +166,6 @@ TEST_CASE("An input that is missing or unreadable gives the exit code of bad inp
       "TEAM --security INPUT",
       "evaluate trajectory --truth INPUT --estimate TRUTH",
       "evaluate trajectory --truth TRUTH --estimate INPUT",
-      "evaluate closures --results INPUT --dataset DATA --truth TRUTH",
       "evaluate consistency --results INPUT --truth TRUTH",
       "evaluate mesh --truth INPUT --estimate INPUT",
       "evaluate objects --truth INPUT --estimate INPUT",

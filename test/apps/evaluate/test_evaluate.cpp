@@ -1,4 +1,3 @@
-#include "test/modules/sensors/euroc_folder.hpp"
 #include "test/support/command.hpp"
 #include "test/support/page_text.hpp"
 #include "test/support/temporary_folder.hpp"
@@ -53,38 +52,6 @@ TEST_CASE("Several truths belong to the estimates one by one") {
   CHECK_THAT(result.output, Contains(" 0.0000"));
 }
 
-TEST_CASE("closures judges the folders of a run") {
-  const EurocFolder recording;
-  const Files files;
-  const auto robot = [&](const std::string& id, const std::string& closures) {
-    files.folder.write("r" + id + "/keyframes.csv",
-                       "robot,keyframe,stamp_ns,median_depth_m\n" + id + ",0,105000000000,4\n");
-    files.folder.write("r" + id + "/loop_closures.csv",
-                       "from_robot,from_keyframe,to_robot,to_keyframe,similarity,stage,matches,"
-                       "inliers,tx,ty,tz,qx,qy,qz,qw,s1,s2,s3,s4,s5,s6,reason\n" +
-                           closures);
-    return (files.folder.path() / ("r" + id)).string();
-  };
-  const std::string a =
-      robot("1", "1,0,2,0,0.5,inlier,80,60,0.1,0,0,0,0,0,1,.1,.1,.1,.1,.1,.1,\"\"\n");
-  const std::string b =
-      robot("2", "2,0,1,0,0.5,inlier,80,60,0.9,0,0,0,0,0,1,.1,.1,.1,.1,.1,.1,\"\"\n");
-  const std::string json = (files.folder.path() / "closures.json").string();
-  const std::string command = kTool + "closures --dataset " + recording.root().string() +
-                              " --truth " + files.truth + " --json " + json + " --results ";
-  const auto result = succeeded(run_command(command + a + ' ' + b));
-  CHECK_THAT(result.output, Contains("inliers          2     1              1      50.0%"));
-  CHECK_THAT(files.folder.read("closures.json"), Contains("\"pair_recall\": 1"));
-  CHECK_THAT(result.output,
-             Contains("note: " + files.truth + " is taken for the true poses of robot 1 (" + a +
-                      ") and of robot 2 (" + b + ") at the same times"));
-  const auto own = files.folder.write("own.tum", "1 0 0 0 0 0 0 1\n2 0 0 0 0 0 0 1\n").string();
-  const auto apart = run_command(command + a + ' ' + b + " --truth " + own);
-  CHECK_THAT(apart.output,
-             Contains("note: none of the 1 keyframes of robot 2 (" + b + ") lies within " + own) &&
-                 !Contains("at the same times"));
-}
-
 TEST_CASE("Bad input is refused and named") {
   const Files files;
   const std::string bad = files.folder.write("bad.tum", "1.0 0 0 0 0 0 0 1\nhello\n").string();
@@ -94,8 +61,7 @@ TEST_CASE("Bad input is refused and named") {
       {"trajectory --truth " + bad + rest, "bad.tum line 2: 1 fields, expected 8"},
       {good + rest + " --plot x.svg", "x.svg: --plot writes *.html"},
       {good + " --truth " + files.b + rest, "give one --truth"},
-      {"closures --dataset . --truth " + files.truth + " --results /none",
-       "kimera_multi_evaluate: /none/keyframes.csv: no such file\n"},
+      {"consistency --truth " + files.truth + " --results /none", "kimera_multi_evaluate: /none/"},
       {good, "--estimate is required"},
       {"", "subcommand is required"},
       {"bogus", "bogus"},
