@@ -3,20 +3,24 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <memory>
 #include <sstream>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "apps/program_version.hpp"
 #include "apps/result_files.hpp"
-#include "apps/robot/failed_odometry.hpp"
 #include "apps/robot/peer_echo.hpp"
 #include "apps/robot/results.hpp"
+#include "apps/robot/robot_input.hpp"
 #include "apps/robot/run_end.hpp"
 #include "apps/robot/run_findings.hpp"
 #include "modules/core/input_file.hpp"
 #include "modules/core/write_file.hpp"
 #include "modules/diagnosis/doubt_finding.hpp"
+#include "modules/diagnosis/examine_sensors.hpp"
+#include "modules/diagnosis/sensor_sample.hpp"
 #include "runtime/log.hpp"
 #include "runtime/metrics.hpp"
 
@@ -34,6 +38,37 @@ std::string timings(const Robot& robot) {
         << '\n';
   }
   return out.str();
+}
+
+// Faults of images, calibration, units and signs that the first 30 s of the recording of `options`
+// show: possible causes for which odometry fails. kimera_multi_doctor states them in the same way.
+// Reads these images again, which takes some seconds. Empty without a recording, or if it cannot be
+// read.
+std::vector<Finding> causes_of_failed_odometry(const RobotOptions& options,
+                                               const RobotConfig& config,
+                                               SignalWatch& signals) try {
+  constexpr double kLook_s = 30.0;
+  if (options.is_live || options.dataset.empty()) return {};
+  RobotOptions part;
+  part.dataset = options.dataset;
+  part.rig = options.rig;
+  part.from_s = options.from_s;
+  part.to_s = std::min(options.from_s.value_or(0.0) + kLook_s, options.to_s.value_or(1e9));
+  const auto input = open_robot_input(part, config, std::nullopt, read_rig_input(part), signals);
+  if (!input) return {};
+  DatasetReader& reader = *std::get<std::unique_ptr<DatasetReader>>(input->source);
+  SensorSampler sampler;
+  while (const auto packet = reader.next()) sampler.add(*packet);
+  const SensorSample& sample = sampler.sample();
+  const StereoRig& rig = reader.rig().stereo;
+  Examination result = examine_images(sample);
+  result.add(examine_stereo(sample, rig));
+  result.add(examine_depth(sample, rig));
+  result.add(examine_inertial(sample, rig));
+  std::erase_if(result.findings, [](const Finding& f) { return f.severity == Severity::kNote; });
+  return result.findings;
+} catch (const std::runtime_error&) {  // a fault of the recording, which the run has reported
+  return {};
 }
 
 // Call when the robot has stopped. `record` is final.

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "modules/core/camera_axes.hpp"
 #include "modules/core/lie.hpp"
 
 namespace km {
@@ -17,6 +16,16 @@ constexpr double kHeldAccel = 1e-4;
 // Share of VioConfig::loss_scale without an inertial sensor. Nothing else corrects a few bad
 // tracks.
 constexpr double kLossShare = 1.0 / 3.0;
+
+// R_body_cam from the axes of a camera (x right, y down, z forward) to those of a body (x forward,
+// y left, z up) that looks the same way.
+Eigen::Matrix3d body_axes_of_camera() {
+  Eigen::Matrix3d R_body_cam;
+  R_body_cam << 0.0, 0.0, 1.0,  //
+      -1.0, 0.0, 0.0,           //
+      0.0, -1.0, 0.0;
+  return R_body_cam;
+}
 
 }  // namespace
 
