@@ -54,7 +54,7 @@ std::vector<PlotSeries> truth_series(std::span<const TrajectoryInput> inputs) {
 // A map of truth (grey) and aligned estimates (one colour each). The name of each estimate includes
 // its position rmse. Identical truths are drawn once, over the time of their estimates.
 Plot plot_from_above(std::span<const TrajectoryInput> inputs, const TeamError& team) {
-  Plot plot{.title = "From above", .is_map = true, .series = truth_series(inputs)};
+  Plot plot{.title = "From above", .series = truth_series(inputs)};
   for (std::size_t r = 0; r < inputs.size(); ++r) {
     PlotSeries& series = plot.series.emplace_back();
     series.name = team.robots[r].name + ", position rmse " +
@@ -108,7 +108,7 @@ struct TrajectoryCommand {
     std::cout << to_table(team);
     write_json_output(json, team);
     write_output(plot, [&](std::ostream& out) {
-      out << chart_page("Truth and estimates", std::vector{plot_from_above(inputs, team)});
+      out << chart_page("Truth and estimates", plot_from_above(inputs, team));
     });
   }
 };

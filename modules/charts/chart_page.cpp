@@ -1,7 +1,6 @@
 #include "modules/charts/chart_page.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
@@ -33,7 +32,6 @@ double range_of(const std::vector<PlotSeries>& all) {
   return std::max({0.0, high.x - low.x, high.y - low.y});
 }
 
-// A step of 0 keeps all points.
 std::vector<PlotPoint> thinned(const std::vector<PlotPoint>& points, double step) {
   std::vector<PlotPoint> kept;
   for (const PlotPoint& point : points)
@@ -48,13 +46,11 @@ Json number(double value) {
 }
 
 Json series_json(const PlotSeries& series, double step) {
-  constexpr std::array kStyles = {"line", "marked", "dots", "bars"};
   Json points = Json::array();
   for (const PlotPoint& point : thinned(series.points, step))
     points.push_back({number(point.x), number(point.y)});
   return {{"name", series.name},
           {"colour", series.colour == PlotSeries::kGrey ? Json() : Json(series.colour)},
-          {"style", kStyles.at(static_cast<std::size_t>(series.style))},
           {"width", series.width_px},
           {"points", std::move(points)}};
 }
@@ -62,25 +58,20 @@ Json series_json(const PlotSeries& series, double step) {
 }  // namespace
 
 void to_json(Json& json, const Plot& plot) {
-  const double step = plot.is_map ? range_of(plot.series) / kMapSteps : 0.0;
+  const double step = range_of(plot.series) / kMapSteps;
   Json series = Json::array();
   for (const PlotSeries& one : plot.series) series.push_back(series_json(one, step));
-  json = {{"title", plot.title},       {"x_label", plot.x_label},    {"y_label", plot.y_label},
-          {"log_y", plot.log_y},       {"map", plot.is_map},         {"groups", plot.groups},
-          {"decimals", plot.decimals}, {"series", std::move(series)}};
+  json = {{"title", plot.title}, {"series", std::move(series)}};
 }
 
-std::string plot_scripts(const std::map<std::string, std::vector<Plot>>& plots) {
-  return data_script("plots", plots) + module_script({page_file(chart_files(), "charts.js"),
-                                                      page_file(chart_files(), "chart_page.js")});
-}
-
-std::string chart_page(const std::string& title, const std::vector<Plot>& plots) {
+std::string chart_page(const std::string& title, const Plot& plot) {
   return html_page(
       {.title = title,
        .styles = {page_file(chart_files(), "theme.css"), page_file(chart_files(), "document.css")},
        .body = "<main id=\"charts\">\n<header><h1>" + xml_escaped(title) +
-               "</h1></header>\n</main>\n" + plot_scripts({{"charts", plots}})});
+               "</h1></header>\n</main>\n" + data_script("plot", plot) +
+               module_script({page_file(chart_files(), "charts.js"),
+                              page_file(chart_files(), "chart_page.js")})});
 }
 
 }  // namespace km

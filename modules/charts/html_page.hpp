@@ -17,7 +17,7 @@ struct PageFile {
 
 /// Files that pages of several programs share. charts.js is a module that needs no other file.
 /// theme.css has the colours of all pages. document.css has the layout of pages that are read from
-/// top to bottom, and their colours on paper. chart_page.js shows the plots of a page.
+/// top to bottom, and their colours on paper. chart_page.js shows the plot of a page.
 [[nodiscard]] std::span<const PageFile> chart_files();
 
 /// The bytes of the file with that path. Throws std::logic_error if there is none.

@@ -153,8 +153,7 @@ function frame(host, options, draw) {
   const root = element('div', 'chart', host);
   const head = element('div', 'chart-head', root);
   const title = element('span', 'chart-title', head, options.title);
-  const unit = options.yLabel ?? options.unit;
-  if (unit) element('span', 'chart-unit', title, unit);
+  if (options.unit) element('span', 'chart-unit', title, options.unit);
   const keys = element('span', 'chart-head', head);
   keys.style.marginBottom = 0;
   const body = element('div', 'chart-body', root);
@@ -244,29 +243,16 @@ function path(points, toX, toY) {
   return d;
 }
 
-// SVG of a line, or of dots, which are points without extent and with round ends.
 function seriesSvg(one, points, toX, toY) {
-  const at = points.map(([x, y]) => [toX(x), toY(y)])
-                 .filter((p) => p.every(Number.isFinite))
-                 .map((p) => p.map(px));
-  const open =
-      `<path fill="none" stroke="${one.color}" opacity="${one.opacity ?? (one.dots ? 0.35 : 1)}"`;
-  if (one.dots)
-    return `${open} stroke-width="3" stroke-linecap="round" d="${
-        at.map((p) => `M${p.join(' ')}h0`).join('')}"/>`;
   const dash = one.dashed ? ' stroke-dasharray="4 3"' : '';
-  const line = `${open} stroke-width="${one.width ?? 1.5}" stroke-linejoin="round"${dash} d="${
-      path(points, toX, toY)}"/>`;
-  const marks = one.marks ? at : [];
-  return line +
-      marks.map(([x, y]) => `<circle r="3" fill="${one.color}" cx="${x}" cy="${y}"/>`).join('');
+  return `<path fill="none" stroke="${one.color}" opacity="${one.opacity ?? 1}" stroke-width="${
+      one.width ?? 1.5}" stroke-linejoin="round"${dash} d="${path(points, toX, toY)}"/>`;
 }
 
 /**
- * Lines over a common x. set() takes {name, color, points, width, dashed, marks: discs at its
- * points, dots: only faint points}. Options:
- * - title; unit of y, or yLabel; xLabel; height [px];
- * - logY; decades: largest number of them below the largest value;
+ * Lines over a common x. set() takes {name, color, points, width, dashed}. Options:
+ * - title; unit of y; height [px];
+ * - logY;
  * - x: function for the text of an x (default: the number);
  * - from0: y begins at 0 (default: true without logY);
  * - cursor: x of a vertical line.
@@ -276,9 +262,7 @@ export function lineChart(host, options = {}) {
     unit = '',
     height = 120,
     logY = false,
-    decades = 6,
     from0 = !logY,
-    xLabel,
     x: textOfX = (x) => quantity(x)
   } = options;
   const time = textOfX === duration;
@@ -290,7 +274,7 @@ export function lineChart(host, options = {}) {
     // Values six powers of ten below the largest are not shown.
     if (logY)
       [y0, y1] = [
-        10 ** Math.floor(Math.log10(Math.max(y0, y1 * 10 ** -decades)) + 1e-9),
+        10 ** Math.floor(Math.log10(Math.max(y0, 1e-6 * y1)) + 1e-9),
         10 ** Math.ceil(Math.log10(y1) - 1e-9)
       ];
     else if (from0)
@@ -299,7 +283,7 @@ export function lineChart(host, options = {}) {
     const marks = logY ? powerTicks(y0, y1, height / 30) : ticks(y0, y1, height / 36);
     const labels = marks.map((y) => (logY ? powerText(y) : quantity(y)));
     const left = 12 + 6 * Math.max(...labels.map((l) => l.length), 2), right = 12, top = 6,
-          bottom = xLabel ? 34 : 18;
+          bottom = 18;
     const width = self.width, span = x1 > x0 ? x1 - x0 : 1;
     const toX = (x) => left + ((x - x0) / span) * (width - left - right);
     const f = logY ? (y) => (y > 0 ? Math.log10(Math.max(y, y0)) : NaN) : (y) => y;
@@ -315,9 +299,6 @@ export function lineChart(host, options = {}) {
     for (const x of (time ? timeTicks : ticks)(x0, x0 + span, width / 90))
       svg += `<text x="${px(toX(x))}" y="${height - bottom + 14}" text-anchor="middle">${
           escaped(textOfX(x))}</text>`;
-    if (xLabel)
-      svg += `<text x="${px((left + width - right) / 2)}" y="${height - 4}" text-anchor="middle">${
-          escaped(xLabel)}</text>`;
     for (const one of series) svg += seriesSvg(one, thinned(one.points, toX), toX, toY);
     if (Number.isFinite(options.cursor))
       svg += `<line class="chart-cursor" x1="${px(toX(options.cursor))}" x2="${
@@ -357,9 +338,8 @@ function hover(chart, scaleOf, textOfX, unit, height) {
     if (!s || !group) return;
     const at = event.clientX - chart.canvas.getBoundingClientRect().left;
     const x = s.x0 + ((at - s.left) / (s.width - s.left - s.right)) * s.span;
-    const found = s.series.filter((one) => !one.dots)
-                      .map((one) => [one, nearest(one.points, x)])
-                      .filter(([, p]) => p);
+    const found =
+        s.series.map((one) => [one, nearest(one.points, x)]).filter(([, p]) => p);
     if (!found.length) return;
     const shown =
         found.reduce((a, b) => (Math.abs(a[1][0] - x) <= Math.abs(b[1][0] - x) ? a : b))[1][0];
@@ -392,20 +372,17 @@ function showTip(chart, at, head, rows) {
 /**
  * Groups of horizontal bars, a bar per series in each. set() takes {name, color, values: {group:
  * value}}. Options:
- * - title; unit, or yLabel;
- * - most: number of groups shown, the largest first; groups: only these, in this order;
- * - decimals: each bar has its value with this number of decimals, instead of one value per group;
+ * - title; unit;
+ * - most: number of groups shown, the largest first;
  * - full: value of a bar over the whole width.
  */
 export function barChart(host, options = {}) {
-  const {unit = '', most = 8, decimals} = options;
-  const each = decimals !== undefined;
+  const {unit = '', most = 8} = options;
   return frame(host, options, (self, series) => {
-    const groups = options.groups ?? [...new Set(series.flatMap((s) => Object.keys(s.values)))];
+    const groups = [...new Set(series.flatMap((s) => Object.keys(s.values)))];
     const largest = (g) => Math.max(...series.map((s) => s.values[g] ?? 0));
-    if (!options.groups)
-      groups.sort((a, b) => largest(b) - largest(a) || (a < b ? -1 : 1)).splice(most);
-    const bar = each ? 11 : 5, gap = 2, row = Math.max(18, series.length * (bar + gap) + 8);
+    groups.sort((a, b) => largest(b) - largest(a) || (a < b ? -1 : 1)).splice(most);
+    const bar = 5, gap = 2, row = Math.max(18, series.length * (bar + gap) + 8);
     const left = 10 + 6.3 * Math.max(...groups.map((g) => g.length), 4), right = 44;
     const full = options.full ?? Math.max(1e-12, ...groups.map(largest));
     const height = Math.max(20, row * groups.length + 2);
@@ -417,17 +394,12 @@ export function barChart(host, options = {}) {
           escaped(group.replaceAll('_', ' '))}</text>`;
       series.forEach((one, i) => {
         const value = one.values[group] ?? 0;
-        if (each && !(group in one.values)) return;
         const y = middle + (i - series.length / 2) * (bar + gap) + gap / 2;
         const length = Math.max(1, Math.min(1, value / full) * (self.width - left - right));
         svg += `<rect x="${px(left)}" y="${px(y)}" width="${px(length)}" height="${
                    bar}" rx="1.5" fill="${one.color}">` +
             `<title>${escaped(`${one.name}: ${quantity(value, unit)}`)}</title></rect>`;
-        if (each)
-          svg += `<text x="${px(left + length + 4)}" y="${px(y + bar - 2)}">${
-              value.toFixed(decimals)}</text>`;
       });
-      if (each) return;
       svg += `<text x="${self.width}" y="${middle + 3}" text-anchor="end">${
           escaped(quantity(largest(group), unit))}</text>`;
     });
@@ -552,31 +524,6 @@ export function mapChart(host, options = {}) {
   });
   navigate(chart, () => shown);
   return chart;
-}
-
-/** A chart of a plot from to_json() of chart_page.hpp. */
-export function plotChart(host, plot) {
-  const series = plot.series.map((one) => ({
-                                   name: one.name,
-                                   color: one.colour === null ? GREY : robotColor(one.colour),
-                                   width: one.width,
-                                   marks: one.style === 'marked',
-                                   dots: one.style === 'dots',
-                                   points: one.points.map((p) => p.map((n) => n ?? NaN))
-                                 }));
-  const options = {title: plot.title, xLabel: plot.x_label, yLabel: plot.y_label, height: 260};
-  if (plot.map)
-    mapChart(host, {title: plot.title, height: 560}).set(series);
-  else if (plot.groups.length)
-    barChart(host, {...options, groups: plot.groups, decimals: plot.decimals})
-        .set(series.map(
-            (one) => ({
-              ...one,
-              values: Object.fromEntries(one.points.filter((p) => p.every(Number.isFinite))
-                                             .map(([x, y]) => [plot.groups[x], y]))
-            })));
-  else
-    lineChart(host, {...options, logY: plot.log_y, decades: Infinity}).set(series);
 }
 
 // ---- pictures

@@ -38,10 +38,7 @@ TEST_CASE("trajectory prints a table and writes JSON and a plot") {
   CHECK_THAT(result.output, Contains("a/optimized") && Contains("b/optimized") &&
                                 Contains("\nteam") && Contains(" 50.0%"));
   CHECK_THAT(files.folder.read("out.json"), Contains("\"joint\""));
-  const Json plots = data_of_page(files.folder.read("out.html"), "plots")["charts"];
-  REQUIRE(plots.size() == 1);
-  CHECK(plots[0]["map"] == true);
-  CHECK(plots[0]["series"].size() == 3);
+  CHECK(data_of_page(files.folder.read("out.html"), "plot")["series"].size() == 3);
 }
 
 TEST_CASE("Several truths belong to the estimates one by one") {
