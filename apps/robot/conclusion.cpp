@@ -74,12 +74,12 @@ std::vector<Finding> causes_of_failed_odometry(const RobotOptions& options,
 // Call when the robot has stopped. `record` is final.
 RunEnd end_of(const RobotOptions& options, const Robot& robot, const RunResult& result,
               const char* departure, const RunRecord& record) {
-  RunEnd end{options.robot, result, robot.id_taken(), departure};
+  RunEnd end{options.robot, result, robot.back_end().id_taken(), departure};
   end.is_live = options.is_live;
-  if (const SensorsNode* sensors = robot.sensors()) {
+  if (const SensorsNode* sensors = robot.sensing().sensors()) {
     // The last image of former processes of this run is played once more.
-    const bool is_repeated = options.resume && robot.restored_images() > 0;
-    const std::size_t before = robot.restored_images() - (is_repeated ? 1 : 0);
+    const bool is_repeated = options.resume && robot.sensing().restored_images() > 0;
+    const std::size_t before = robot.sensing().restored_images() - (is_repeated ? 1 : 0);
     end.images = ImageCounts{before + sensors->listed(), before + sensors->published(),
                              sensors->skipped(), record.odometry().size()};
   }
@@ -132,23 +132,26 @@ void write_all(const StoppedRun& run, ResultWriter& results) {
   write_results(options.output, record, results);
   if (result.is_left_behind("mesh_files"))
     results.note(options.output / "mesh.ply", "not as at the end of the run: mesh_files hangs");
-  else if (robot.mesh_files() != nullptr)
-    robot.mesh_files()->finish(record.trajectory());
-  if (robot.team_map() != nullptr && !result.is_left_behind(robot.team_map()->name()))
-    write_team_map(options.output, config.map_2d, *robot.team_map(), results);
-  if (robot.objects() != nullptr && !result.is_left_behind(robot.objects()->name()))
-    if (const auto objects = robot.objects()->finish(record.trajectory()))
-      write_objects(options.output, *objects, robot.objects()->palette(), results);
-  if (robot.record() != nullptr) finish_record(options, *robot.record(), record, result, results);
+  else if (robot.mapping().files() != nullptr)
+    robot.mapping().files()->finish(record.trajectory());
+  if (robot.mapping().team_map() != nullptr &&
+      !result.is_left_behind(robot.mapping().team_map()->name()))
+    write_team_map(options.output, config.map_2d, *robot.mapping().team_map(), results);
+  if (robot.mapping().objects() != nullptr &&
+      !result.is_left_behind(robot.mapping().objects()->name()))
+    if (const auto objects = robot.mapping().objects()->finish(record.trajectory()))
+      write_objects(options.output, *objects, robot.mapping().objects()->palette(), results);
+  if (robot.records().record() != nullptr)
+    finish_record(options, *robot.records().record(), record, result, results);
   results.write(options.output / "timing.csv",
                 [&robot](const auto& file) { write_file(file, timings(robot)); });
 }
 
 FixesSummary fixes_summary(const Robot& robot, const RunRecord& record) {
-  const FixCounts counts = robot.fixes()->counts();
+  const FixCounts counts = robot.places().fixes()->counts();
   const FixesState state = record.progress().fixes.value_or(FixesState{});
   FixesSummary summary{.located = record.progress().located && record.trajectory().has_value(),
-                       .after_s = robot.located_after_s(),
+                       .after_s = robot.records().progress().located_after_s(),
                        .used = state.used,
                        .rejected = state.rejected,
                        .residual_m = state.residual_m,
@@ -164,7 +167,7 @@ FixesSummary fixes_summary(const Robot& robot, const RunRecord& record) {
                        .datum = {},
                        .odometry_frame = {}};
   std::erase_if(summary.not_used, [](const auto& reason) { return reason.second == 0; });
-  if (const auto datum = robot.fixes()->datum())
+  if (const auto datum = robot.places().fixes()->datum())
     summary.datum = {datum->latitude_deg, datum->longitude_deg, datum->altitude_m};
   const auto& trajectory = record.trajectory();
   if (!summary.located || trajectory->T_world_kf.size() > record.keyframes().size()) return summary;
@@ -194,19 +197,19 @@ void add_reports(RunSummary& summary, const StoppedRun& run, const RunEnd& end,
   const auto& [options, config, robot, result, record] = run;
   summary.frames = end.images.value_or(ImageCounts{}).read;
   summary.frames_skipped = end.images.value_or(ImageCounts{}).skipped;
-  if (const SensorsNode* sensors = robot.sensors()) {
+  if (const SensorsNode* sensors = robot.sensing().sensors()) {
     summary.paused_s = sensors->paused_s();
     const ReaderReport faults = sensors->faults();
     for (const auto& [fault, entry] : faults.entries())
       summary.sensor_faults[to_string(fault)] = entry.count;
     for (const Doubt& doubt : sensors->doubts()) summary.noticed.push_back(finding_of(doubt));
   }
-  summary.traffic = robot.sent_bytes();
-  if (const LocalizationNode* localization = robot.localization())
+  summary.traffic = robot.records().sent_bytes();
+  if (const LocalizationNode* localization = robot.places().localization())
     summary.localization = {options.localize.string(), record.progress().located,
-                            robot.located_after_s(), localization->compared(),
+                            robot.records().progress().located_after_s(), localization->compared(),
                             localization->matched()};
-  if (robot.fixes() != nullptr) summary.fixes = fixes_summary(robot, record);
+  if (robot.places().fixes() != nullptr) summary.fixes = fixes_summary(robot, record);
   if (config.budget.is_limited()) summary.held_back = held_back(robot);
   summary.process = watch.process();
   summary.seconds = watch.seconds();

@@ -3,10 +3,10 @@
 #include <optional>
 
 #include "apps/result_writer.hpp"
+#include "apps/robot/assemblies/robot.hpp"
 #include "apps/robot/final_room.hpp"
 #include "apps/robot/robot_config.hpp"
 #include "apps/robot/watch.hpp"
-#include "apps/robot/wiring.hpp"
 #include "runtime/signal_watch.hpp"
 #include "runtime/supervisor.hpp"
 

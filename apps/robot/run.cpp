@@ -16,10 +16,10 @@
 #include "apps/program_version.hpp"
 #include "apps/result_files.hpp"
 #include "apps/result_writer.hpp"
+#include "apps/robot/assemblies/robot.hpp"
 #include "apps/robot/conclusion.hpp"
 #include "apps/robot/final_room.hpp"
 #include "apps/robot/watch.hpp"
-#include "apps/robot/wiring.hpp"
 #include "modules/core/write_file.hpp"
 #include "modules/sensors/node/rig_file.hpp"
 #include "runtime/log.hpp"
@@ -165,13 +165,14 @@ int run_robot(const RobotOptions& asked, SignalWatch& signals,
       write(kLabelPalette, to_csv(mapping->palette));
   };
   write_settings();
-  FinalRoom room(options.output, robot.sensors() != nullptr ? robot.sensors()->listed() : 0);
+  FinalRoom room(options.output,
+                 robot.sensing().sensors() != nullptr ? robot.sensing().sensors()->listed() : 0);
 
   std::optional<Watch> watch;
   watch.emplace(options, config, continues, std::move(partners), robot, results);
   const RunResult result = robot.run([&] {
     std::size_t images = 0, keyframes = 0;
-    (void)robot.recorder().try_with_record([&](const RunRecord& record) {
+    (void)robot.records().recorder().try_with_record([&](const RunRecord& record) {
       images = record.odometry().size();
       keyframes = record.keyframes().size();
     });
@@ -185,8 +186,9 @@ int run_robot(const RobotOptions& asked, SignalWatch& signals,
   };
   if (result.is_left_behind("recorder"))
     results.note(options.output, "what was recorded is lost with the recorder, which hangs");
-  const int exit_code = result.is_left_behind("recorder") ? end(RunRecord(options.robot))
-                                                          : robot.recorder().with_record(end);
+  const int exit_code = result.is_left_behind("recorder")
+                            ? end(RunRecord(options.robot))
+                            : robot.records().recorder().with_record(end);
   if (result.left_behind.empty()) return exit_code;
   // Hung threads use objects that a return would destroy. The process therefore ends here, after
   // the robot has left the network.

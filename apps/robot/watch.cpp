@@ -57,7 +57,7 @@ bool Watch::poll() {
   const TrafficSnapshot traffic = robot_.bridge().traffic();
   const bool ended = robot_.input_ended();  // before the record is read, which is then complete
   // If the recorder is at work, the next call reads the record: this thread does not wait.
-  (void)robot_.recorder().try_with_record([&](const RunRecord& record) {
+  (void)robot_.records().recorder().try_with_record([&](const RunRecord& record) {
     log_progress(now_s, record, traffic);
     rounds_csv_.append(record.rounds());
     if (!leaving_since_s_) update_phase(now_s, ended, record);
@@ -68,7 +68,8 @@ bool Watch::poll() {
     return_freed_memory();
     next_trim_s_ = now_s + kTrimInterval_s;
   }
-  return robot_.id_taken() || (departure_.reason() != nullptr && leave_notice_sent(now_s));
+  return robot_.back_end().id_taken() ||
+         (departure_.reason() != nullptr && leave_notice_sent(now_s));
 }
 
 void Watch::update_phase(double now_s, bool ended, const RunRecord& record) {
@@ -83,7 +84,8 @@ void Watch::update_phase(double now_s, bool ended, const RunRecord& record) {
     return member != record.robot() && !peers.contains(member);
   });
   // Messages that wait for the budget may change the graphs of other robots.
-  const bool settled = record.settled() && !robot_.bridge().holds_back() && robot_.has_shared_map();
+  const bool settled =
+      record.settled() && !robot_.bridge().holds_back() && robot_.mapping().is_shared();
   const auto reported =
       departure_.update(now_s, {.input_ended = ended,
                                 .graph_settled = settled,
@@ -91,10 +93,10 @@ void Watch::update_phase(double now_s, bool ended, const RunRecord& record) {
                                 .present_peers = present,
                                 .not_received = static_cast<std::size_t>(not_received),
                                 .awaits_peers = ended && awaits_peers(now_s, team)});
-  robot_.set_settled(reported);
+  robot_.records().progress().set_settled(reported);
   const auto running = [](const auto& peer) { return peer.phase == RobotPhase::kRunning; };
   if (reported.phase == RobotPhase::kSettled && std::ranges::none_of(present, running))
-    robot_.expect_no_more_closures();
+    robot_.back_end().expect_no_more_closures();
 }
 
 void Watch::finish(const RunRecord& record) {
@@ -124,7 +126,7 @@ bool Watch::awaits_peers(double now_s, std::span<const RobotId> team) {
 bool Watch::leave_notice_sent(double now_s) {
   if (!leaving_since_s_) {
     leaving_since_s_ = now_s;
-    robot_.set_settled({RobotPhase::kLeaving, kMaxSettledLinks});
+    robot_.records().progress().set_settled({RobotPhase::kLeaving, kMaxSettledLinks});
     sample(now_s);
     robot_.freeze_record();
   }
@@ -140,13 +142,13 @@ void Watch::log_progress(double now_s, const RunRecord& record, const TrafficSna
 
 void Watch::show_status(const RunRecord& record, const TrafficSnapshot& traffic) {
   std::vector<Peer> peers = robot_.bridge().peers().list();
-  for (const RobotStatus& status : robot_.status_node().peers())
+  for (const RobotStatus& status : robot_.records().statuses().peers())
     for (Peer& peer : peers)
       if (status.phase == RobotPhase::kLeaving && peer.identity.robot == status.robot &&
           peer.identity.boot == status.boot)
         peer.state = PeerState::kLeft;  // also before it falls silent
-  status_line_.update(
-      status_text(robot_.dataset_time_s(), record, peers, traffic, process_usage().resident_bytes));
+  status_line_.update(status_text(robot_.records().progress().input_s(), record, peers, traffic,
+                                  process_usage().resident_bytes));
 }
 
 // A peer whose last status announced that it leaves, and that is silent now, has left.
@@ -154,7 +156,7 @@ std::map<RobotId, Absentees::Known> Watch::known_peers() const {
   std::map<RobotId, Absentees::Known> known;
   for (const Peer& peer : robot_.bridge().peers().list())
     known[peer.identity.robot] = {peer.identity.name, peer.state};
-  for (const RobotStatus& status : robot_.status_node().peers()) {
+  for (const RobotStatus& status : robot_.records().statuses().peers()) {
     const auto peer = known.find(status.robot);
     if (status.phase == RobotPhase::kLeaving && peer != known.end() &&
         peer->second.state == PeerState::kLost)
@@ -168,7 +170,7 @@ std::map<RobotId, Absentees::Known> Watch::known_peers() const {
 // former process.
 std::map<RobotId, Departure::Present> Watch::present_peers() const {
   std::map<TeamPeer, Departure::Present> reported;
-  for (const RobotStatus& status : robot_.status_node().peers())
+  for (const RobotStatus& status : robot_.records().statuses().peers())
     reported[{status.robot, status.boot}] = {status.phase, status.settled_links};
   std::map<RobotId, Departure::Present> present;
   for (const auto& [identity, state, addresses] : robot_.bridge().peers().list())
@@ -179,7 +181,7 @@ std::map<RobotId, Departure::Present> Watch::present_peers() const {
 
 void Watch::sample(double now_s) {
   sampled_s_ = now_s;
-  robot_.publish_sample();
+  robot_.records().publish_sample();
 }
 
 void Watch::write(double now_s, const TrafficSnapshot& traffic) {

@@ -8,11 +8,11 @@
 #include <vector>
 
 #include "apps/result_writer.hpp"
+#include "apps/robot/assemblies/robot.hpp"
 #include "apps/robot/growing_files.hpp"
 #include "apps/robot/run_end.hpp"
 #include "apps/robot/status.hpp"
 #include "apps/robot/unmet_peers.hpp"
-#include "apps/robot/wiring.hpp"
 
 namespace km {
 

@@ -29,7 +29,7 @@
 namespace km {
 namespace {
 
-// The counterpart of all topics of a robot (Robot::add_network), with no modules behind it.
+// The counterpart of all topics of a robot (BackEnd, Mapping), with no modules behind it.
 struct FloodPeer {
   // If `make_seal` is empty, messages are not encrypted.
   FloodPeer(const std::shared_ptr<const DdsDomain>& domain, const RobotIdentity& identity,
