@@ -30,6 +30,10 @@ std::size_t index_of(SensorRole role) {
   return static_cast<std::size_t>(role);
 }
 
+bool is_inertial(SensorRole role) {
+  return role == SensorRole::kImu || role == SensorRole::kGyro || role == SensorRole::kAccel;
+}
+
 // " /a, /b", or " none".
 std::string names_of(const std::vector<BagChannel>& channels, const SensorKind& kind) {
   std::string names;
@@ -211,6 +215,8 @@ bool BagDataset::read_message() {
   auto message = bag_->next();
   if (!message) {
     ended_ = true;
+    for (std::size_t k = 0; k < doubtful_.size(); ++k)
+      for (const Doubtful& one : doubtful_[k]) reject(static_cast<SensorRole>(k), one);
     joiner_.finish();
     return false;
   }
@@ -223,31 +229,44 @@ bool BagDataset::read_message() {
   return true;
 }
 
+void BagDataset::reject(SensorRole role, const Doubtful& one) {
+  const ReaderFault fault = fault_of(one.verdict);
+  report_.add(is_inertial(role) ? fault_of_samples(fault) : fault,
+              place_of(one.message) + ": stamp " + std::to_string(one.stated));
+}
+
 void BagDataset::take(SensorRole role, BagMessage message) {
-  const bool is_inertial =
-      role == SensorRole::kImu || role == SensorRole::kGyro || role == SensorRole::kAccel;
-  const auto count = [&](ReaderFault fault, const std::string& why) {
-    report_.add(is_inertial ? fault_of_samples(fault) : fault, place_of(message) + why);
-  };
   const auto header =
       decode_ros<RosHeader>(bag_->channels()[message.channel].encoding, message.bytes);
-  if (!header.value) {
-    count(ReaderFault::kMalformedMessage, std::string(": ") + header.refusal);
-    return;
-  }
+  if (!header.value)
+    return report_.add(
+        is_inertial(role) ? ReaderFault::kMalformedSample : ReaderFault::kMalformedMessage,
+        place_of(message) + ": " + header.refusal);
   const Stamp stated = header.value->stamp;
-  Stamp stamp = time_.of(index_of(role), stated);
+  const Stamp stamp = time_.of(index_of(role), stated);
   if (time_.step_s() > 0.0)
     report_.add(ReaderFault::kClockSetBack,
                 place_of(message) + ": the clock went back " + fixed(time_.step_s(), 1) + " s to " +
                     std::to_string(stated) + ": later stamps continue the time before");
   const StampVerdict verdict = order_[index_of(role)].judge(stamp);
+  auto& doubtful = doubtful_[index_of(role)];
   if (verdict != StampVerdict::kGood) {
-    count(fault_of(verdict), ": stamp " + std::to_string(stated));
-    return;
+    doubtful.push_back({stated, verdict, std::move(message)});
+    if (doubtful.size() < StampOrder::kNewTimes) return;
+    reject(role, doubtful.front());
+    return doubtful.pop_front();
   }
+  for (Doubtful& one : std::exchange(doubtful, {}))
+    if (const auto time = time_.between(index_of(role), one.stated, stamp))
+      take_stamped(role, *time, std::move(one.message));
+    else
+      reject(role, one);
+  take_stamped(role, stamp, std::move(message));
+}
+
+void BagDataset::take_stamped(SensorRole role, Stamp stamp, BagMessage message) {
   time_.accept(index_of(role), stamp);
-  if (is_inertial) {
+  if (is_inertial(role)) {
     take_imu(role, stamp, message);
     return;
   }
@@ -357,7 +376,9 @@ std::optional<StereoFrame> BagDataset::decode(const JoinedFrame& joined, FrameUs
 
 std::optional<SensorPacket> BagDataset::read_packet(const ChooseUse& choose) {
   while (const auto joined = next_frame()) {
-    if (!start_) start_ = joined->stamp;
+    if (!start_) start_ = last_ = joined->stamp;
+    const Stamp step = joined->stamp - std::exchange(last_, joined->stamp);
+    if (1e-9 * static_cast<double>(step) > kLongestPause_s) *start_ += step;  // the clock was set
     const double t_s = seconds_between(*start_, joined->stamp);
     if (t_s >= window_.to_s) return std::nullopt;
     if (t_s < window_.from_s || (window_.not_before && joined->stamp < *window_.not_before)) {

@@ -119,7 +119,16 @@ class BagDataset final : public DatasetReader {
   void find_topics();
   void assign(const SensorTopic& wanted);
   [[nodiscard]] bool read_message();
+  // A message whose stamp is not good: wrong, or among the first ones of a clock that was set. The
+  // next good stamp of its stream decides.
+  struct Doubtful {
+    Stamp stated = 0;
+    StampVerdict verdict = StampVerdict::kJump;
+    BagMessage message;
+  };
+  void reject(SensorRole role, const Doubtful& one);
   void take(SensorRole role, BagMessage message);
+  void take_stamped(SensorRole role, Stamp stamp, BagMessage message);
   void take_imu(SensorRole role, Stamp stamp, const BagMessage& message);
   void take_pose(Stamp stamp, const BagMessage& message);
   [[nodiscard]] std::optional<JoinedFrame> next_frame();
@@ -136,6 +145,7 @@ class BagDataset final : public DatasetReader {
   std::vector<const SensorKind*> kind_of_;  // by channel; null: not read
   ContinuousTime time_{kSensorKinds.size()};
   std::array<StampOrder, kSensorKinds.size()> order_;
+  std::array<std::deque<Doubtful>, kSensorKinds.size()> doubtful_;  // at most kNewTimes
   std::array<MissingImages, kSensorKinds.size()> missing_;
   std::array<std::size_t, kSensorKinds.size()> taken_ = {};  // number of messages
   FrameJoiner joiner_;
@@ -144,7 +154,8 @@ class BagDataset final : public DatasetReader {
   PoseStream poses_;
   ReaderReport report_;
   std::size_t pair_count_ = 0;
-  std::optional<Stamp> start_;  // stamp of the first frame of the recording
+  std::optional<Stamp> start_;  // stamp of the first frame of the recording, by the present clock
+  Stamp last_ = 0;              // stamp of the last frame
   Stamp newest_log_time_ = 0;
   bool ended_ = false;                 // the bag has ended
   bool is_over_ = false;               // the window has ended

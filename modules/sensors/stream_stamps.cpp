@@ -101,18 +101,24 @@ StampVerdict StampOrder::judge(Stamp stamp) {
   return StampVerdict::kGood;
 }
 
-Stamp ContinuousTime::of(std::size_t stream, Stamp stamp) {
-  Stream& own = streams_.at(stream);
-  step_s_ = 0.0;
+// Moves a stamp by the last step or the one before, whichever is nearer to the present.
+Stamp ContinuousTime::moved(Stamp stamp) const {
   // Arbitrary numbers: sums may overflow a Stamp.
-  const auto moved = [stamp](Stamp by) {
-    return static_cast<Stamp>(static_cast<std::uint64_t>(stamp) + static_cast<std::uint64_t>(by));
+  const auto by = [stamp](Stamp offset) {
+    return static_cast<Stamp>(static_cast<std::uint64_t>(stamp) +
+                              static_cast<std::uint64_t>(offset));
   };
   const auto distance = [this](Stamp time) {
     return std::abs(static_cast<double>(time) - static_cast<double>(newest_));
   };
-  const Stamp here = moved(offset_), before = moved(former_);
-  const Stamp time = distance(before) < distance(here) ? before : here;
+  const Stamp here = by(offset_), before = by(former_);
+  return distance(before) < distance(here) ? before : here;
+}
+
+Stamp ContinuousTime::of(std::size_t stream, Stamp stamp) {
+  Stream& own = streams_.at(stream);
+  step_s_ = 0.0;
+  const Stamp time = moved(stamp);
   const bool is_back =
       own.good == kNewTimes && stamp > 0 &&
       static_cast<double>(time) < static_cast<double>(*own.last) - 1e9 * kLeastStep_s;
@@ -126,7 +132,13 @@ Stamp ContinuousTime::of(std::size_t stream, Stamp stamp) {
   former_ = offset_;
   offset_ = newest_ - own.first_back + (stamp - own.first_back) / (kNewTimes - 1);
   own.back = 0;
-  return moved(offset_);
+  return stamp + offset_;
+}
+
+std::optional<Stamp> ContinuousTime::between(std::size_t stream, Stamp stamp, Stamp next) const {
+  const std::optional<Stamp>& last = streams_.at(stream).last;
+  const Stamp time = moved(stamp);
+  return last && *last < time && time < next ? std::optional(time) : std::nullopt;
 }
 
 void ContinuousTime::accept(std::size_t stream, Stamp continuous) {
@@ -148,6 +160,7 @@ ImageGap MissingImages::before(Stamp stamp) {
     std::ranges::nth_element(sorted, middle);
     const double share = static_cast<double>(interval) / static_cast<double>(*middle);
     const double interval_s = seconds_between(*last, stamp);
+    if (interval_s > kLongestPause_s) return gap;  // the clock was set
     if (share > kGap && interval_s > kPause_s)
       gap.pause_s = interval_s;
     else if (share > kGap)

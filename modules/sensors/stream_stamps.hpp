@@ -60,6 +60,10 @@ class ContinuousTime {
   /// The stamp in continuous time, of a clock that `stream` uses.
   [[nodiscard]] Stamp of(std::size_t stream, Stamp stamp);
 
+  /// The continuous time of a stamp of `stream` that was not good, if it is between the last
+  /// accepted time and `next`: then the clock was set before it. Otherwise nullopt.
+  [[nodiscard]] std::optional<Stamp> between(std::size_t stream, Stamp stamp, Stamp next) const;
+
   /// Notes that a stamp of of() is good.
   void accept(std::size_t stream, Stamp continuous);
 
@@ -73,6 +77,8 @@ class ContinuousTime {
     int back = 0;               // stamps in a row before the last good stamp
     Stamp first_back = 0, last_back = 0;
   };
+
+  [[nodiscard]] Stamp moved(Stamp stamp) const;
 
   std::vector<Stream> streams_;
   Stamp offset_ = 0, former_ = 0;  // added to stamps; before the last step

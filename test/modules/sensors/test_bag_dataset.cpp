@@ -467,8 +467,10 @@ TEST_CASE("Compressed depth is decoded by the format that its message states") {
   CHECK_THAT(depth_of(c.bytes.size(), "h264").problem, Contains("states the format 'h264'"));
 }
 
-TEST_CASE("A recording continues after its clock was set back") {
-  constexpr Stamp kStep = 10'000'000'000;  // longer than the recording before it
+TEST_CASE("A recording continues after its clock was set") {
+  // Back by more than the recording before it, or forward by years.
+  const Stamp kStep = GENERATE(10'000'000'000, -1'600'000'000'000'000'000);
+  CAPTURE(kStep);
   auto whole = recording({.frames = 80});
   auto bag = std::make_unique<ListedBag>();
   while (const auto message = whole->next()) {
@@ -483,18 +485,17 @@ TEST_CASE("A recording continues after its clock was set back") {
       bag->add(channel.topic, picture, 1e-9 * static_cast<double>(by));
     }
   }
-  BagDataset dataset("test.bag", std::move(bag), small_rig());
+  BagDataset dataset("test.bag", std::move(bag), small_rig(), {.to_s = 60.0});
   const auto packets = packets_of(dataset);
-  CHECK(packets.size() >= 79);
+  CHECK(packets.size() == 80);
   for (std::size_t k = 1; k < packets.size(); ++k) {
     const double step_s = seconds_between(packets[k - 1].frame->stamp, packets[k].frame->stamp);
-    CHECK(step_s == Approx(0.05).margin(0.051));
+    CHECK((k == 41 && kStep < 0 ? step_s > 1e9 : step_s == Approx(0.05)));
     CHECK(packets[k].imu.back().stamp == packets[k].frame->stamp);
   }
-  const ReaderReport report = dataset.report();
-  CHECK(report.count(ReaderFault::kClockSetBack) == 1);
-  CHECK(report.count(ReaderFault::kUnorderedSample) == 2);
-  CHECK_THAT(to_string(report), Contains("the clock went back 10.0 s"));
+  const std::string report = to_string(dataset.report());
+  CHECK(dataset.report().entries().size() == (kStep < 0 ? 0 : 1));
+  if (kStep > 0) CHECK_THAT(report, Contains("the clock went back 10.0 s"));
 }
 
 }  // namespace
