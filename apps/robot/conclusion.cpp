@@ -200,8 +200,11 @@ void add_reports(RunSummary& summary, const StoppedRun& run, const RunEnd& end,
   if (const SensorsNode* sensors = robot.sensing().sensors()) {
     summary.paused_s = sensors->paused_s();
     const ReaderReport faults = sensors->faults();
-    for (const auto& [fault, entry] : faults.entries())
+    for (const auto& [fault, entry] : faults.entries()) {
       summary.sensor_faults[to_string(fault)] = entry.count;
+      if (fault == ReaderFault::kClockSetBack)
+        summary.noticed.push_back(finding_of(fault, entry, static_cast<double>(summary.frames)));
+    }
     for (const Doubt& doubt : sensors->doubts()) summary.noticed.push_back(finding_of(doubt));
   }
   summary.traffic = robot.records().sent_bytes();

@@ -7,6 +7,7 @@
 
 #include "modules/core/geometry.hpp"
 #include "modules/core/text_table.hpp"
+#include "modules/sensors/stream_stamps.hpp"
 
 namespace km {
 namespace {
@@ -320,6 +321,12 @@ class FindingsOfRun {
           "the log names the times: avoid blank walls, darkness and motion blur there");
     if (!run_.holes) return;
     const HolesSummary& holes = *run_.holes;
+    if (holes.longest_s > kLongestPause_s)
+      return add(kWarning, "frames.clock",
+                 "stamps jump by " + fixed(holes.longest_s, 1) + " s, " +
+                     fixed(holes.longest_from_s, 1) + " s after the first pose: the clock was set",
+                 "odometry started again there, and charts show a gap",
+                 "set the clock before the run, or choose a part by --from and --to");
     add(kWarning, "trajectory.hole",
         "no pose for " + fixed(holes.longest_s, 1) + " s, from " + fixed(holes.longest_from_s, 1) +
             " s on" +

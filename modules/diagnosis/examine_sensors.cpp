@@ -25,22 +25,6 @@ namespace {
 
 using enum Severity;
 
-void examine_fault(ReaderFault fault, const ReaderReport::Entry& entry, double of,
-                   Examination& result) {
-  constexpr double kFew = 0.01, kHalf = 0.5;
-  const double share = static_cast<double>(entry.count) / std::max(of, 1.0);
-  std::string id = std::string("recording.") + to_string(fault);  // "recording.missing_images"
-  std::ranges::replace(id, ' ', '_');
-  result.add(share > kHalf  ? kError
-             : share > kFew ? kWarning
-                            : kNote,
-             std::move(id),
-             std::to_string(entry.count) + ' ' + to_string(fault) + ", " + percent(share) +
-                 ", first: " + entry.first,
-             "the affected parts are skipped",
-             "repair the recording, or record again if there are many");
-}
-
 // Number of items of the kind that a fault counts, with the `faulty` ones. Images are counted per
 // camera, lost messages per topic.
 double item_count(ReaderFault fault, double faulty, const SensorSample& sample) {
@@ -307,6 +291,37 @@ void examine_acceleration(const SensorSample& sample, const StereoRig& rig,
 
 }  // namespace
 
+Finding finding_of(ReaderFault fault, const ReaderReport::Entry& entry, double of) {
+  using enum ReaderFault;
+  constexpr double kFew = 0.01, kHalf = 0.5, kNearlyAll = 0.95;
+  const double share = static_cast<double>(entry.count) / std::max(of, 1.0);
+  std::string id = std::string("recording.") + to_string(fault);  // "recording.missing_images"
+  std::ranges::replace(id, ' ', '_');
+  Finding finding{.id = std::move(id),
+                  .severity = share > kHalf  ? kError
+                              : share > kFew ? kWarning
+                                             : kNote,
+                  .what = std::to_string(entry.count) + ' ' + to_string(fault) + ", " +
+                          percent(share) + ", first: " + entry.first,
+                  .means = "the affected parts are skipped",
+                  .to_do = "repair the recording, or record again if there are many"};
+  // imu.rate judges the other samples.
+  if ((fault == kUnorderedSample || fault == kRepeatedSample) && share < kNearlyAll) {
+    finding.severity = std::min(finding.severity, kWarning);
+    finding.means = fault == kUnorderedSample
+                        ? "samples behind a later one are skipped: odometry uses the others"
+                        : "odometry uses the first sample of each stamp";
+    finding.to_do =
+        "set the driver to write each sample in order, with the time of its measurement";
+  }
+  if (fault == kClockSetBack) {
+    finding.severity = kWarning;
+    finding.means = "poses from there on have stamps that true poses, fixes and programs lack";
+    finding.to_do = "set the clock before the recording";
+  }
+  return finding;
+}
+
 Examination examine_streams(const SensorSample& sample, const ReaderReport& report) {
   Examination result;
   if (sample.frames.empty())
@@ -314,8 +329,8 @@ Examination examine_streams(const SensorSample& sample, const ReaderReport& repo
                "there are no images to estimate motion from",
                "the other findings state the skipped parts");
   for (const auto& [fault, entry] : report.entries())
-    examine_fault(fault, entry, item_count(fault, static_cast<double>(entry.count), sample),
-                  result);
+    result.findings.push_back(
+        finding_of(fault, entry, item_count(fault, static_cast<double>(entry.count), sample)));
   const Stamp start = sample.frames.empty() ? 0 : sample.frames.front();
   constexpr double kFrames_hz = 8.0, kFrameGap_s = 0.25, kSamples_hz = 80.0, kSampleGap_s = 0.05;
   if (sample.frames.size() > 1)

@@ -15,8 +15,14 @@ namespace km {
 // that sound recordings keep by a wide margin. If motion or images do not determine a quantity,
 // there is no finding, and a figure states the reason.
 
-/// Examines rates, gaps and faults of the reader. Ids: frames.rate, frames.gap, frames.stamps,
-/// imu.rate, imu.gap, imu.stamps, recording.no_frames, `recording.<fault>`.
+/// The finding on a fault that a reader met, by its share of the items, whose number is `of`.
+/// A clock that was set is a warning, and so are inertial samples out of order or with equal stamps
+/// while others remain.
+[[nodiscard]] Finding finding_of(ReaderFault fault, const ReaderReport::Entry& entry, double of);
+
+/// Examines rates, gaps and faults of the reader. Ids: frames.rate, frames.gap,
+/// frames.clock, frames.stamps, imu.rate, imu.gap, imu.clock, imu.stamps, recording.no_frames,
+/// `recording.<fault>`.
 [[nodiscard]] Examination examine_streams(const SensorSample& sample, const ReaderReport& report);
 
 /// Examines exposure, blur and corners. Ids: images.dark, images.bright, images.blurred,

@@ -207,6 +207,8 @@ TEST_CASE("A finding on a run is reported with its severity and its number") {
        of([=](auto& s) { s.holes = hole; })},
       {"trajectory.hole", kWarning, "the longest of 3 holes of 9.0 s in all",
        of([=](auto& s) { s.holes = holes; })},
+      {"frames.clock", kWarning, "jump by 1403636484.9 s, 12.1 s after the first pose",
+       of([=](auto& s) { (s.holes = hole)->longest_s = 1403636484.9; })},
       {"closures.rejected", kNote, "2 of 10 verified",
        [](RunFacts& run) { run.closures[2].rejected = 2; }},
       {"closures.rejected", kWarning, "5 of 10 verified",

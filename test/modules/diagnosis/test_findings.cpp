@@ -123,6 +123,13 @@ TEST_CASE("Faults of a reader become findings by their share") {
   of_samples.add(ReaderFault::kWrongImageFormat, "depth0/1.png", 100);
   const Examination found = examine_streams(sample, of_samples);
   CHECK_THAT(found.findings.at(0).what, StartsWith("2000 inertial samples out of order, 50 %"));
+  CHECK(finding_of(ReaderFault::kUnorderedSample, {715, "here"}, 1401).severity ==
+        Severity::kWarning);
+  CHECK_THAT(finding_of(ReaderFault::kRepeatedSample, {1072, "here"}, 1430).means,
+             Contains("uses the first sample of each stamp"));
+  CHECK(finding_of(ReaderFault::kRepeatedSample, {1429, "here"}, 1430).severity ==
+        Severity::kError);
+  CHECK(finding_of(ReaderFault::kClockSetBack, {1, "here"}, 1400).severity == Severity::kWarning);
   CHECK_THAT(found.findings.at(1).what, StartsWith("100 images of the wrong format, 50 %"));
   SensorSample stereo = sample;
   stereo.right_size = {752, 480};
