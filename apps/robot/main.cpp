@@ -130,8 +130,9 @@ void add_input(CLI::App& app, RobotOptions& options) {
          "calibration of its camera; or the name of a shipped one, such as d455")
       ->transform(named_file("rigs"));
   app.add_option("--odometry", options.odometry,
-                 "Poses of the body (TUM: t[s] x y z qx qy qz qw) that replace the robot's visual-"
-                 "inertial odometry; images still give features and depth");
+                 "Poses of the body, in any format of kimera_multi_evaluate trajectory, that "
+                 "replace the robot's visual-inertial odometry; images still give features and "
+                 "depth");
   app.add_option("--from", options.from_s, "Start of the part to play [s since the first image]");
   app.add_option("--to", options.to_s, "End of the part to play [s since the first image]");
   app.add_option_function<std::string>(

@@ -10,6 +10,7 @@
 #include "apps/result_files.hpp"
 #include "modules/core/input_file.hpp"
 #include "modules/core/text_table.hpp"
+#include "modules/evaluation/trajectory_file.hpp"
 #include "modules/mesh/map_file.hpp"
 #include "modules/recordings/open_bag.hpp"
 #include "modules/recordings/ros_messages.hpp"
@@ -390,7 +391,10 @@ std::unique_ptr<DatasetReader> with_poses(const RobotOptions& options, const Rig
         ": a file of poses is of a recording; --live receives an odometry on "
         "a topic: odometry: {topic: ...} in " +
         options.rig.string());
-  return std::make_unique<PoseFileReader>(std::move(reader), file);
+  ReaderReport faults;
+  const UncertainTrajectory poses = read_uncertain_trajectory(
+      file, [&](const std::string& fault) { faults.add(ReaderFault::kMalformedRow, fault); });
+  return std::make_unique<PoseFileReader>(std::move(reader), file, poses, faults);
 }
 
 // Converts the restored camera calibration so that it is relative to the rig as corrected now.

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <vector>
+
 #include "modules/core/geometry.hpp"
 #include "modules/core/stamp.hpp"
 
@@ -9,6 +11,13 @@ namespace km {
 struct StampedPose {
   Stamp stamp = 0;
   SE3 T = SE3::Identity();
+};
+
+/// Poses of a file with their covariances, see core/covariance.hpp.
+struct UncertainTrajectory {
+  std::vector<StampedPose> poses;
+  std::vector<Matrix6> covariances;  ///< Zero: unknown.
+  std::vector<int> lines;            ///< Their lines in the file.
 };
 
 }  // namespace km

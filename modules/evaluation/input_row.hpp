@@ -24,6 +24,7 @@ class InputRow {
   [[noreturn]] void fail(const std::string& why) const;
 
   [[nodiscard]] std::size_t size() const { return row_.fields.size(); }
+  [[nodiscard]] int line() const { return row_.line; }
 
   // Precondition of the functions below: the fields exist.
 

@@ -181,8 +181,10 @@ Matrix6 covariance_of(const InputRow& row, const SE3& T) {
   return from_fixed_axes(T, along_axes);
 }
 
-// Calls use(row, pose) for every row, except for rows with the stamp of the row before.
-void for_each_pose(std::string_view text, const std::string& name, const auto& use) {
+// Calls use(row, pose) for every row, except for rows with the stamp of the row before. For `skip`
+// see read_uncertain_trajectory().
+void for_each_pose(std::string_view text, const std::string& name, const auto& use,
+                   const std::function<void(const std::string&)>& skip = nullptr) {
   std::vector<TextRow> rows = split_rows(text);
   if (!rows.empty() && !rows.front().fields.front().empty() &&
       std::isalpha(static_cast<unsigned char>(rows.front().fields.front().front())) != 0)
@@ -190,13 +192,16 @@ void for_each_pose(std::string_view text, const std::string& name, const auto& u
   if (rows.empty()) throw InputFileError(name + ": holds no pose");
   const Columns columns = columns_of(text, rows.front(), name);
   std::optional<Stamp> last;
-  for (const TextRow& fields : rows) {
-    const InputRow row(name, fields);
-    const StampedPose pose = pose_of(row, columns);
-    if (last && pose.stamp < *last) row.fail("the stamp is before the last one");
-    if (last != pose.stamp) use(row, pose);
-    last = pose.stamp;
-  }
+  for (const TextRow& fields : rows) try {
+      const InputRow row(name, fields);
+      const StampedPose pose = pose_of(row, columns);
+      if (last && pose.stamp < *last && !skip) row.fail("the stamp is before the last one");
+      if (last != pose.stamp) use(row, pose);
+      last = pose.stamp;
+    } catch (const InputFileError& error) {
+      if (!skip) throw;
+      skip(error.what());
+    }
 }
 
 // Calls use(text, name) with the content and the name of the file at `place`.
@@ -245,13 +250,27 @@ std::vector<StampedPose> read_trajectory(const std::filesystem::path& place) {
   });
 }
 
-UncertainTrajectory read_uncertain_trajectory(const std::filesystem::path& place) {
-  return with_file(place, [](const std::string& text, const std::string& name) {
+UncertainTrajectory read_uncertain_trajectory(const std::filesystem::path& place,
+                                              const std::function<void(const std::string&)>& skip) {
+  return with_file(place, [&](const std::string& text, const std::string& name) {
     UncertainTrajectory result;
-    for_each_pose(text, name, [&](const InputRow& row, const StampedPose& pose) {
+    const auto add = [&](const StampedPose& pose, const Matrix6& Sigma, int line) {
       result.poses.push_back(pose);
-      result.covariances.push_back(covariance_of(row, pose.T));
-    });
+      result.covariances.push_back(Sigma);
+      result.lines.push_back(line);
+    };
+    const std::vector<TextRow> rows = split_rows(text);
+    if (skip && !rows.empty() && matrix_in(rows.front()))
+      for (const StampedPose& pose : read_kitti(rows, name))
+        add(pose, Matrix6::Zero(), static_cast<int>(result.lines.size()) + 1);
+    else
+      for_each_pose(
+          text, name,
+          [&](const InputRow& row, const StampedPose& pose) {
+            const bool is_bare = skip && row.size() != kFields + 36;
+            add(pose, is_bare ? Matrix6::Zero() : covariance_of(row, pose.T), row.line());
+          },
+          skip);
     return result;
   });
 }

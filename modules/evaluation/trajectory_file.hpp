@@ -1,7 +1,9 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -30,15 +32,13 @@ namespace km {
 /// - a stamp beyond 146 years, or before the last one; more than 5000 poses a second.
 [[nodiscard]] std::vector<StampedPose> read_trajectory(const std::filesystem::path& file);
 
-/// Poses with covariances, in the order of their stamps.
-struct UncertainTrajectory {
-  std::vector<StampedPose> poses;
-  std::vector<Matrix6> covariances;  ///< See core/covariance.hpp.
-};
-
-/// A TUM file as read_trajectory() reads it, whose rows also have the 36 numbers of
-/// geometry_msgs/PoseWithCovariance. Throws InputFileError also for a row without them.
-[[nodiscard]] UncertainTrajectory read_uncertain_trajectory(const std::filesystem::path& file);
+/// A file as read_trajectory() reads it, with the covariances of rows of TUM's format that also
+/// have the 36 numbers of geometry_msgs/PoseWithCovariance. Throws InputFileError also for a row
+/// without them. With `skip` a row needs none, a faulty row is left out after skip("FILE line N:
+/// FAULT"), and stamps are in any order.
+[[nodiscard]] UncertainTrajectory read_uncertain_trajectory(
+    const std::filesystem::path& file,
+    const std::function<void(const std::string&)>& skip = nullptr);
 
 /// Parses the text of a file; `name` replaces the file name in messages.
 [[nodiscard]] std::vector<StampedPose> parse_trajectory(std::string_view text,

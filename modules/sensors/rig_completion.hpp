@@ -105,7 +105,7 @@ struct PartialRig {
   std::string body_frame;
   /// Correction of the complete rig, see CameraCalibration; not applied here.
   SE3 T_body_rig = SE3::Identity();
-  std::filesystem::path pose_file;  ///< Poses of an external odometry, see read_pose_file().
+  std::filesystem::path pose_file;  ///< Poses of an external odometry, see PoseFileReader.
 
   [[nodiscard]] bool checks_depth() const { return !rig.topics.depth.empty() && !is_depth_aligned; }
   [[nodiscard]] bool is_complete() const {

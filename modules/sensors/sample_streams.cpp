@@ -4,7 +4,6 @@
 #include <cmath>
 #include <iterator>
 #include <utility>
-#include <variant>
 
 #include "modules/core/covariance.hpp"
 #include "modules/core/lie.hpp"
@@ -14,31 +13,6 @@
 
 namespace km {
 namespace {
-
-constexpr std::size_t kPose = 8, kPoseWithCovariance = 8 + 36;
-constexpr double kMaxRounding = 0.01;  // norm of a quaternion in rounded text
-
-std::variant<MeasuredPose, RowFault> parse_pose(const TextRow& row) {
-  const std::size_t count = row.fields.size();
-  if (count != kPose && count != kPoseWithCovariance)
-    return RowFault{ReaderFault::kMalformedRow,
-                    "has " + std::to_string(count) + " fields, not 8 or 44"};
-  std::vector<double> values;
-  for (std::size_t i = 1; i < count; ++i) {
-    const auto value = parse_double(row.fields[i]);
-    if (!value || !std::isfinite(*value))
-      return RowFault{ReaderFault::kMalformedRow, std::string(row.fields[i]) + " is not a number"};
-    values.push_back(*value);
-  }
-  const Eigen::Quaterniond q(values[6], values[3], values[4], values[5]);
-  if (!(std::abs(q.norm() - 1.0) < kMaxRounding))
-    return RowFault{ReaderFault::kMalformedRow, "the quaternion's norm is not 1"};
-  Matrix6 covariance = Matrix6::Zero();
-  if (count == kPoseWithCovariance) covariance = Eigen::Map<const Matrix6>(values.data() + 7);
-  return measured_pose(
-      make_pose(q.normalized().toRotationMatrix(), {values[0], values[1], values[2]}), covariance,
-      SE3::Identity());
-}
 
 // See ImuStream::why_not(). `first`, `last`: stamps of a stream.
 std::string why_not_between(std::optional<Stamp> first, Stamp last, Stamp stamp) {
@@ -175,17 +149,20 @@ std::optional<MeasuredPose> measured_pose(const RosOdometry& message, const SE3&
                        Eigen::Map<const Matrix6>(message.pose.covariance.data()), T_child_body);
 }
 
-PoseStream read_pose_file(const std::filesystem::path& file, ReaderReport& report) {
-  PoseStream poses;
-  for (const auto& row : read_ordered_rows<MeasuredPose>(
-           file, 1, "no pose in it: t[s] x y z qx qy qz qw", report, parse_pose, stamp_of_seconds))
-    poses.add(row.stamp, row.value);
-  return poses;
-}
-
 PoseFileReader::PoseFileReader(std::unique_ptr<DatasetReader> reader,
-                               const std::filesystem::path& file)
-    : reader_(std::move(reader)), name_(file.string()), poses_(read_pose_file(file, report_)) {}
+                               const std::filesystem::path& file, const UncertainTrajectory& poses,
+                               const ReaderReport& faults)
+    : reader_(std::move(reader)), name_(file.string()), report_(faults) {
+  std::vector<Stamp> stamps;
+  for (const StampedPose& pose : poses.poses) stamps.push_back(pose.stamp);
+  const std::vector<bool> counts = in_order(stamps, poses.lines, file, report_);
+  for (std::size_t k = 0; k < stamps.size(); ++k) {
+    const Matrix6& Sigma = poses.covariances[k];
+    if (counts[k])
+      poses_.add(stamps[k], {poses.poses[k].T, is_covariance(Sigma) ? Sigma : Matrix6::Zero()});
+  }
+  if (stamps.empty()) refuse_list(file, "no pose in it", faults);
+}
 
 std::optional<SensorPacket> PoseFileReader::next(const ChooseUse& choose) {
   while (auto packet = reader_->next(choose)) {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "modules/core/frame.hpp"
+#include "modules/core/stamped_pose.hpp"
 #include "modules/recordings/ros_messages.hpp"
 #include "modules/sensors/dataset_reader.hpp"
 
@@ -134,19 +135,14 @@ class PoseStream {
 [[nodiscard]] std::optional<MeasuredPose> measured_pose(const RosOdometry& message,
                                                         const SE3& T_child_body);
 
-/// Reads the body poses of an odometry from a text file of TUM's format:
-/// `t[s] x y z qx qy qz qw`. Each
-/// row may also have the 36 numbers of its covariance, row by row, as in
-/// geometry_msgs/PoseWithCovariance. Faulty rows are skipped and counted in `report`. Throws
-/// DatasetError if there is no row.
-[[nodiscard]] PoseStream read_pose_file(const std::filesystem::path& file, ReaderReport& report);
-
 /// The packets of another reader with the poses of a file. Frames without a pose in the file are
 /// skipped and counted.
 class PoseFileReader final : public DatasetReader {
  public:
-  /// Throws DatasetError for a file without a pose.
-  PoseFileReader(std::unique_ptr<DatasetReader> reader, const std::filesystem::path& file);
+  /// `poses`: of the body, in `file`, whose other rows have `faults`. Stamps out of order are
+  /// skipped and counted. Throws DatasetError if there is no pose.
+  PoseFileReader(std::unique_ptr<DatasetReader> reader, const std::filesystem::path& file,
+                 const UncertainTrajectory& poses, const ReaderReport& faults);
 
   [[nodiscard]] const SensorRig& rig() const override { return reader_->rig(); }
   using DatasetReader::next;

@@ -84,6 +84,37 @@ TEST_CASE("Stamps in microseconds are refused where nanoseconds are expected") {
                     "microseconds, milliseconds or seconds?");
 }
 
+TEST_CASE("Faulty rows of an odometry are skipped, and covariances may be absent") {
+  const TemporaryFolder folder;
+  std::string covariance;
+  for (int k = 0; k < 36; ++k) covariance += k % 7 == 0 ? " 0.5" : " 0";
+  std::string faults;
+  const auto read = [&](const std::string& text) {
+    return read_uncertain_trajectory(folder.write("poses.tum", text),
+                                     [&](const std::string& fault) { faults += fault + '\n'; });
+  };
+  const UncertainTrajectory poses =
+      read("# t x y z qx qy qz qw\n10.0 1 2 3 0 0 0 1\n10.5 1 2 4 0 0 0 1" + covariance +
+           "\n10.6 1 2 4 0 0 0 7\n"
+           "10.7 1 2 4 0 0 0\n"
+           "10.2 1 2 4 0 0 0 1\n"
+           "x 1 2 4 0 0 0 1\n"
+           "11.0 1 2 5 0 0 0 1 0.5\n"
+           "11.0 1 2 6 0 0 1 0\n");
+  CHECK(poses.lines == std::vector{2, 3, 6, 8});
+  CHECK(poses.poses[3].T.translation().z() == 5.0);
+  CHECK(poses.covariances[0].isZero());
+  CHECK(poses.covariances[1].isApprox(0.5 * Matrix6::Identity()));
+  CHECK(std::ranges::count(faults, '\n') == 3);
+  CHECK_THAT(faults, Contains("poses.tum line 4: the quaternion's norm is 7"));
+  CHECK(read("1403636579758555392,1,2,3,0.8,0,0,0.6,9,9,9\n").poses[0].stamp ==
+        1403636579758555392);
+  folder.write("times.txt", "0.5\n0.6\n");
+  CHECK(
+      read("1 0 0 1 0 1 0 2 0 0 1 3\n1 0 0 1 0 1 0 2 0 0 1 4\n").poses.at(1).T.translation().z() ==
+      4.0);
+}
+
 TEST_CASE("Poses of KITTI have their stamps in times.txt, and a bag is no trajectory") {
   const TemporaryFolder folder;
   folder.write("poses/07.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n0 -1 0 4 1 0 0 5 0 0 1 6\n");

@@ -213,55 +213,39 @@ TEST_CASE("A message of an odometry without a valid pose is refused") {
   CHECK(!measured_pose(message, SE3::Identity()));
 }
 
-TEST_CASE("A file of poses is read row by row") {
-  const TemporaryFolder folder;
-  std::string covariance, negative;
-  for (int k = 0; k < 36; ++k) covariance += k % 7 == 0 ? " 0.5" : " 0";
-  for (int k = 0; k < 36; ++k) negative += k % 7 == 0 ? " -0.5" : " 0";
-  ReaderReport report;
-  PoseStream poses = read_pose_file(folder.write("poses.tum",
-                                                 "# t x y z qx qy qz qw\n"
-                                                 "10.0 1 2 3 0 0 0 1\n"
-                                                 "10.5 1 2 4 0 0 0 1" +
-                                                     covariance +
-                                                     "\n"
-                                                     "10.6 1 2 4 0 0 0 7\n"
-                                                     "10.7 1 2 4 0 0 0\n"
-                                                     "10.2 1 2 4 0 0 0 1\n"
-                                                     "x 1 2 4 0 0 0 1\n"
-                                                     "11.0 1 2 5 0 0 0 1 0.5\n"
-                                                     "11.0 1 2 5 0 0 1 0\n"
-                                                     "12.0 1 2 5 0 0 1 0" +
-                                                     negative + '\n'),
-                                    report);
-  const auto at = poses.at(nanoseconds(10.25));
-  REQUIRE(at);
-  CHECK(at->T_odom_body.translation().isApprox(Eigen::Vector3d(1, 2, 3.5)));
-  CHECK(at->covariance.isApprox(0.25 * Matrix6::Identity()));
-  CHECK(poses.at(nanoseconds(11.0))->T_odom_body.translation().z() == 5.0);
-  CHECK(poses.at(nanoseconds(12.0))->covariance.isZero());  // negative variances are unknown
-  CHECK(report.count(ReaderFault::kMalformedRow) == 4);
-  CHECK(report.count(ReaderFault::kUnorderedStamp) == 1);
-  CHECK_THAT(report.entries().at(ReaderFault::kMalformedRow).first,
-             Contains("poses.tum line 4: the quaternion's norm is not 1"));
-  CHECK_THROWS_WITH(read_pose_file(folder.write("none.tum", "1 2 3\n"), report),
-                    Contains("none.tum: no pose in it: t[s] x y z qx qy qz qw; ") &&
-                        EndsWith("none.tum line 1: has 3 fields, not 8 or 44"));
-}
-
 TEST_CASE("Packets get the poses of a file and frames without one are counted") {
   const EurocFolder folder;  // eight frames from 10 s on, at 20 Hz
-  folder.write("poses.tum", "10.025 0 0 0 0 0 0 1\n10.075 1 0 0 0 0 0 1\n10.225 4 0 0 0 0 0 1\n");
-  PoseFileReader reader(std::make_unique<FolderReader>(open_folder(folder.root())),
-                        folder.mav0() / "poses.tum");
+  UncertainTrajectory poses;
+  const auto add = [&poses](double t_s, double x, double variance) {
+    poses.poses.push_back({nanoseconds(t_s), SE3(Eigen::Translation3d(x, 0, 0))});
+    poses.covariances.emplace_back(variance * Matrix6::Identity());
+    poses.lines.push_back(static_cast<int>(poses.lines.size()) + 1);
+  };
+  add(10.025, 0, 0);
+  add(10.075, 1, 0.5);
+  add(10.06, 7, 0);      // out of order
+  add(10.225, 4, -0.5);  // negative variances are unknown
+  const auto reader_of = [&](const ReaderReport& faults) {
+    return PoseFileReader(std::make_unique<FolderReader>(open_folder(folder.root())),
+                          folder.mav0() / "poses.tum", poses, faults);
+  };
+  PoseFileReader reader = reader_of({});
   CHECK(reader.gives_poses());
-  std::vector<double> x;
-  while (const auto packet = reader.next())
-    x.push_back(packet->pose->T_odom_body.translation().x());
-  REQUIRE(x.size() == 4);
-  CHECK(x[0] == Approx(0.5));
-  CHECK(x[3] == Approx(3.5));
+  std::vector<MeasuredPose> read;
+  while (const auto packet = reader.next()) read.push_back(*packet->pose);
+  REQUIRE(read.size() == 4);
+  CHECK(read[0].T_odom_body.translation().x() == Approx(0.5));
+  CHECK(read[0].covariance.isApprox(0.25 * Matrix6::Identity()));
+  CHECK(read[3].T_odom_body.translation().x() == Approx(3.5));
+  CHECK(read[3].covariance.isApprox(0.5 / 6.0 * Matrix6::Identity()));
   CHECK(reader.report().count(ReaderFault::kFrameWithoutPose) == 4);
+  CHECK_THAT(reader.report().entries().at(ReaderFault::kUnorderedStamp).first,
+             Contains("poses.tum line 3: "));
+  poses = {};
+  ReaderReport faults;
+  faults.add(ReaderFault::kMalformedRow, "poses.tum line 1: 3 fields, expected 8");
+  CHECK_THROWS_WITH(reader_of(faults), Contains("poses.tum: no pose in it; ") &&
+                                           EndsWith("line 1: 3 fields, expected 8"));
 }
 
 TEST_CASE("Numbers of sensors outside the usual range are named by their confusions") {
