@@ -10,6 +10,7 @@ void UnmetPeers::update(double now_s, std::span<const Peer> met,
                         std::map<std::string, std::string> unmet) {
   // A participant that was named stays while a new one of its program is discovered.
   constexpr double kUnmet_s = 5.0, kKept_s = 10.0;
+  constexpr std::size_t kMostKept = 100;  // bound on those that were logged
   is_alone_ = met.empty();
   if (met.empty() && unmet.empty())
     for (const std::string& host : hosts_)
@@ -22,9 +23,10 @@ void UnmetPeers::update(double now_s, std::span<const Peer> met,
     if (now_s - known.since_s >= kUnmet_s && !std::exchange(known.is_logged, true))
       log::warn("peers") << name << " is not met: " << why;
   }
-  std::erase_if(unmet_, [now_s](const auto& entry) {
-    const double gone_s = now_s - entry.second.last_s;
-    return gone_s > (entry.first.ends_with(')') ? kKept_s : 0.0);
+  std::erase_if(unmet_, [now_s, is_room = unmet_.size() <= kMostKept](const auto& entry) {
+    const auto& [name, one] = entry;
+    const bool is_kept = name.ends_with(')');
+    return now_s - one.last_s > (is_kept ? kKept_s : 0.0) && !(is_kept && one.is_logged && is_room);
   });
   for (const Peer& peer : met) unmet_.erase(to_string(peer.identity));
 }

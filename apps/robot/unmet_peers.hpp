@@ -11,8 +11,8 @@
 namespace km {
 
 /// Programs that are noticed on the network and cannot be met, with the reasons. Logs each once
-/// that stays unmet for some time, because discovery takes less. Time is an argument [s], from the
-/// start of the robot. Not thread-safe.
+/// that stays unmet for some time, because discovery takes less, and keeps it. Time is an argument
+/// [s], from the start of the robot. Not thread-safe.
 class UnmetPeers {
  public:
   /// `hosts`: other hosts in dds.peers.

@@ -271,6 +271,11 @@ TEST_CASE("A robot that is noticed is unmet, and awaited for a time, until it is
     unmet.update(13.0, {{bob}}, {});
     CHECK(unmet.reasons().empty());
   }
+  SECTION("a robot that has ended stays if it was unmet for some time") {
+    for (const double now_s : {2.0, 8.0}) alone.update(now_s, {}, noticed);
+    alone.update(19.0, {}, {});
+    CHECK(alone.reasons() == noticed);
+  }
 }
 
 }  // namespace
