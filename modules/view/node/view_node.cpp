@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "modules/mesh/mesh_file.hpp"
 #include "modules/view/view_content.hpp"
 #include "runtime/clock.hpp"
 #include "runtime/log.hpp"
@@ -163,7 +164,10 @@ void ViewNode::cut_mesh(double now_s) {
   const double begin_s = steady_now_s();
   is_cut_ = true;
   try {
-    schedule_.update(split_mesh(*mesh_.mesh, self_, mesh_.anchor, ChunkGrid()).chunks);
+    std::vector<std::string> notes;
+    const LabelledMesh shown = without_far_vertices(*mesh_.mesh, "the mesh", notes);
+    for (const std::string& note : notes) log::limited(log::Level::kWarn, name(), "far") << note;
+    schedule_.update(split_mesh(shown, self_, mesh_.anchor, ChunkGrid()).chunks);
   } catch (const std::invalid_argument& error) {
     log::limited(log::Level::kWarn, name(), "mesh") << "a mesh is not sent: " << error.what();
   }
