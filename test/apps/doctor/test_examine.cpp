@@ -1,8 +1,11 @@
 #include <nlohmann/json.hpp>
+#include <regex>
+#include <set>
 
 #include "apps/doctor/examine.hpp"
 #include "apps/doctor/network_facts.hpp"
 #include "apps/robot/run_findings.hpp"
+#include "modules/core/input_file.hpp"
 #include "modules/diagnosis/finding.hpp"
 #include "test/support/process.hpp"
 #include "test/support/temporary_folder.hpp"
@@ -19,7 +22,31 @@ Finding the_finding(const Examination& result) {
   return result.findings[0];
 }
 
+// The ids in `text` by a pattern of their two parts. A first part that is empty is that of the id
+// before.
+std::set<std::string> ids_in(const std::string& text, const char* pattern) {
+  const std::regex id(pattern);
+  std::set<std::string> ids;
+  std::string first;
+  for (std::sregex_iterator at(text.begin(), text.end(), id), end; at != end; ++at) {
+    if ((*at)[1].length() > 0) first = (*at)[1];
+    ids.insert(first + '.' + (*at)[2].str());
+  }
+  return ids;
+}
+
 }  // namespace
+
+TEST_CASE("The doctor's README lists the ids of all findings") {
+  const auto listed = ids_in(read_input_file("apps/doctor/README.md"), R"(`([a-z]*)\.([a-z_]+)`)");
+  for (const char* file :
+       {"apps/robot/run_findings.cpp", "apps/doctor/network_facts.cpp",
+        "modules/diagnosis/examine_sensors.cpp", "modules/sensors/usual_numbers.cpp"})
+    for (const std::string& id : ids_in(read_input_file(file), R"re("([a-z]+)\.([a-z_]+)")re")) {
+      CAPTURE(file, id);
+      CHECK((listed.contains(id) || id.starts_with("vio.") || id == "recording.missing_images"));
+    }
+}
 
 TEST_CASE("Live topics that are received are sound") {
   const std::vector<TopicPublisher> publishers = {{"/left", kImage}, {"/imu", kImu}};
