@@ -4,7 +4,8 @@ foreach(program ${programs})
   string(REPLACE "\\" "\\e" text "${text}")
   string(REPLACE "-" "\\-" text "${text}")
   string(REGEX REPLACE "(^|\n)([.'])" "\\1\\\\&\\2" text "${text}")
-  string(REGEX MATCH "^[^\n]*" about "${text}")
+  string(REGEX MATCH "^[^.]*" about "${text}")  # the first sentence
+  string(REPLACE "\n" " " about "${about}")
   file(WRITE "$ENV{DESTDIR}${CMAKE_INSTALL_PREFIX}/share/man/man1/${program}.1"
        ".TH ${program} 1\n.SH NAME\n${program} \\- ${about}\n.SH DESCRIPTION\n.nf\n${text}.fi\n")
 endforeach()

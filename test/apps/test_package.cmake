@@ -24,3 +24,7 @@ foreach(file share/bash-completion/completions/kimera_multi_team share/doc/kimer
         share/man/man1/kimera_multi_robot.1)
   file(SIZE ${root}/${file} bytes)
 endforeach()
+file(READ ${root}/share/man/man1/kimera_multi_keys.1 page)
+check("${page}" "\n.SH NAME\nkimera_multi_keys .- Keys of a team\n")
+file(READ ${root}/share/man/man1/kimera_multi_pgo.1 page)
+check("${page}" " in one process, or shows what keeps false loop closures out\n.SH")
