@@ -4,6 +4,7 @@
 #include <iostream>
 
 #include "apps/program_version.hpp"
+#include "apps/shipped_file.hpp"
 
 namespace km {
 

@@ -8,10 +8,10 @@
 #include <thread>
 #include <variant>
 
-#include "apps/program_version.hpp"
 #include "apps/result_files.hpp"
 #include "apps/robot/robot_input.hpp"
 #include "apps/robot/run_findings.hpp"
+#include "apps/shipped_file.hpp"
 #include "modules/core/input_file.hpp"
 #include "modules/core/text_table.hpp"
 #include "modules/diagnosis/doubt_finding.hpp"

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <type_traits>
 
-#include "apps/program_version.hpp"
+#include "apps/shipped_file.hpp"
 #include "runtime/config_layers.hpp"
 #include "runtime/dds/participant.hpp"
 #include "runtime/yaml_config.hpp"

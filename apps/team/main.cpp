@@ -8,9 +8,9 @@
 
 #include "apps/output_file.hpp"
 #include "apps/program_options.hpp"
-#include "apps/program_version.hpp"
 #include "apps/result_files.hpp"
 #include "apps/result_writer.hpp"
+#include "apps/shipped_file.hpp"
 #include "apps/team/links_file.hpp"
 #include "apps/team/report_page.hpp"
 #include "apps/team/run_team.hpp"

@@ -1,8 +1,8 @@
 #include <type_traits>
 
-#include "apps/program_version.hpp"
 #include "apps/robot/robot_config.hpp"
 #include "apps/robot/robot_input.hpp"
+#include "apps/shipped_file.hpp"
 #include "runtime/config_text.hpp"
 #include "test/support/temporary_folder.hpp"
 #include "test/support/test.hpp"

@@ -1,5 +1,5 @@
-#include "apps/program_version.hpp"
 #include "apps/robot/robot_config.hpp"
+#include "apps/shipped_file.hpp"
 #include "modules/loop_closure/node/loop_closure_codec.hpp"
 #include "modules/mesh/node/mesh_codec.hpp"
 #include "modules/mesh/team_mesh.hpp"

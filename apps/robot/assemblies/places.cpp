@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "apps/program_version.hpp"
+#include "apps/shipped_file.hpp"
 #include "modules/loop_closure/node/loop_closure_node.hpp"
 #include "modules/place_recognition/node/place_recognition_node.hpp"
 #include "modules/place_recognition/vocabulary_file.hpp"

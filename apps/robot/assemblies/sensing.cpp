@@ -3,7 +3,7 @@
 #include <string>
 #include <utility>
 
-#include "apps/program_version.hpp"
+#include "apps/shipped_file.hpp"
 #include "modules/loop_closure/node/keyframe_features_node.hpp"
 #include "modules/recorded_graph/node/graph_playback_node.hpp"
 
