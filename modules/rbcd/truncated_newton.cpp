@@ -82,8 +82,7 @@ TruncatedNewtonResult minimise(const QuadraticProblem& problem, LiftedPoses X,
   result.initial_gradient_norm = result.gradient_norm = gradient.norm();
   // In the norm of the preconditioner, a full Newton step of a least-squares cost has a length of
   // about sqrt(2 cost) at most, if the quadratic model is exact. The first radius is larger.
-  double radius = options.initial_radius > 0.0 ? options.initial_radius
-                                               : 10.0 * std::sqrt(std::max(result.cost, 1e-12));
+  double radius = 10.0 * std::sqrt(std::max(result.cost, 1e-12));
   bool last = false;
   int rejected = 0;
   while (result.iterations < options.max_iterations && rejected < kMaxRejections && !last &&
@@ -104,7 +103,6 @@ TruncatedNewtonResult minimise(const QuadraticProblem& problem, LiftedPoses X,
     }
     rejected = 0;
     ++result.iterations;
-    last = result.cost - cost <= options.relative_decrease_tolerance * result.cost;
     X = std::move(candidate);
     result.cost = cost;
     euclidean = problem.euclidean_gradient(X);

@@ -13,8 +13,6 @@ struct TruncatedNewtonOptions {
   int max_cg_iterations = 50;        ///< Hessian products per step.
   double cg_tolerance = 0.1;         ///< Residual of the Newton system over its right-hand side.
   double gradient_tolerance = 1e-6;  ///< Riemannian gradient norm at convergence.
-  double relative_decrease_tolerance = 0.0;  ///< Relative decrease of the cost in the last step.
-  double initial_radius = 0.0;               ///< 0: so large that it limits no exact Newton step.
 };
 
 struct [[nodiscard]] TruncatedNewtonResult {

@@ -143,7 +143,7 @@ constexpr double kMostPrecise = 4.0;
 constexpr double kBestOdometry = 1.25;
 constexpr std::size_t kMajority = 3;
 
-// Of kappa and of tau, independently. Precondition: `values` is not empty.
+// The medians of kappa and of tau are independent. Precondition: `values` is not empty.
 Precision lower_median(std::span<const Precision> values) {
   const auto of = [&](double Precision::*weight) {
     std::vector<double> weights;

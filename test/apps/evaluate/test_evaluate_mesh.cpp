@@ -1,6 +1,7 @@
 #include <Eigen/Geometry>
 #include <opencv2/core.hpp>
 
+#include "modules/images/image_codec.hpp"
 #include "modules/mesh/mesh_file.hpp"
 #include "test/modules/evaluation/mesh/shapes.hpp"
 #include "test/support/command.hpp"
