@@ -74,7 +74,7 @@ struct ViewObjects {
   std::uint32_t left_out = 0;  ///< Number of smaller objects for which there was no room.
 };
 
-/// The 2D map in `world`; the newest counts. Where several cells become one, the smallest value
+/// The 2D map in `world`; the newest counts. If several cells become one, the smallest value
 /// remains.
 struct ViewRaster {
   static constexpr std::uint8_t kOccupied = 0;

@@ -17,7 +17,7 @@ std::shared_ptr<const OccupancyGrid> map_of(std::int8_t cell) {
 }  // namespace
 
 TEST_CASE("The newest objects and maps are sent once, in turn, and again to a new viewer") {
-  ViewLayers layers(3, 1.0);
+  ViewLayers layers(1.0);
   CHECK_FALSE(layers.next(0.0));
   layers.add(chair_at(1));
   layers.add(chair_at(2));
