@@ -8,8 +8,8 @@
 #include <stdexcept>
 #include <system_error>
 
-#include "modules/core/json.hpp"
-#include "modules/core/write_file.hpp"
+#include "modules/core/io/json.hpp"
+#include "modules/core/io/write_file.hpp"
 
 namespace km {
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "modules/core/input_file.hpp"
+#include "modules/core/io/input_file.hpp"
 
 namespace km {
 

@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "modules/core/config.hpp"
-#include "modules/core/input_file.hpp"
+#include "modules/core/io/input_file.hpp"
 
 namespace km {
 namespace {

@@ -23,7 +23,7 @@ install(EXPORT kimera_multiTargets NAMESPACE kimera_multi:: DESTINATION ${config
 # below are those of the runtime and the programs that have a use outside robots.
 foreach(module ${modules})
   file(GLOB module_headers CONFIGURE_DEPENDS RELATIVE ${PROJECT_SOURCE_DIR} modules/${module}/*.hpp
-       modules/${module}/node/*.hpp)
+       modules/${module}/*/*.hpp)
   foreach(header ${module_headers})
     file(STRINGS ${header} of_runtime REGEX "^#include \"runtime/")
     if(NOT of_runtime)

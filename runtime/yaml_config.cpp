@@ -4,8 +4,8 @@
 #include <numeric>
 #include <sstream>
 
-#include "modules/core/input_file.hpp"
-#include "modules/core/text_rows.hpp"
+#include "modules/core/io/input_file.hpp"
+#include "modules/core/io/text_rows.hpp"
 
 namespace km {
 namespace {

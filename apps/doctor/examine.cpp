@@ -12,15 +12,15 @@
 #include "apps/robot/robot_input.hpp"
 #include "apps/robot/run_findings.hpp"
 #include "apps/shipped_file.hpp"
-#include "modules/core/input_file.hpp"
-#include "modules/core/text_table.hpp"
+#include "modules/core/io/input_file.hpp"
+#include "modules/core/io/text_table.hpp"
 #include "modules/diagnosis/doubt_finding.hpp"
 #include "modules/diagnosis/examine_sensors.hpp"
 #include "modules/evaluation/closure_truth.hpp"
 #include "modules/place_recognition/vocabulary_file.hpp"
 #include "modules/recordings/ros_messages.hpp"
 #include "runtime/clock.hpp"
-#include "runtime/dds/ros_subscription.hpp"
+#include "runtime/ros/ros_subscription.hpp"
 
 namespace km {
 namespace {

@@ -10,8 +10,8 @@
 #include "modules/diagnosis/finding.hpp"
 #include "modules/sensors/dataset_reader.hpp"
 #include "modules/sensors/rig_completion.hpp"
-#include "runtime/dds/ros_config.hpp"
-#include "runtime/dds/ros_discovery.hpp"
+#include "runtime/ros/ros_config.hpp"
+#include "runtime/ros/ros_discovery.hpp"
 
 namespace km {
 

@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "modules/core/text_table.hpp"
+#include "modules/core/io/text_table.hpp"
 
 namespace km {
 namespace {

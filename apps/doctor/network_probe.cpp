@@ -8,14 +8,14 @@
 
 #include "apps/doctor/network_facts.hpp"
 #include "apps/robot/datagram_socket.hpp"
-#include "modules/core/input_file.hpp"
-#include "modules/core/text_rows.hpp"
+#include "modules/core/io/input_file.hpp"
+#include "modules/core/io/text_rows.hpp"
 #include "runtime/clock.hpp"
 #include "runtime/dds/entity.hpp"
 #include "runtime/dds/participant.hpp"
 #include "runtime/dds/qos.hpp"
 #include "runtime/dds/robot_status.hpp"
-#include "runtime/dds/ros_discovery.hpp"
+#include "runtime/ros/ros_discovery.hpp"
 
 namespace km {
 namespace {

@@ -10,7 +10,7 @@
 #include "apps/evaluate/commands.hpp"
 #include "apps/evaluate/inputs.hpp"
 #include "apps/output_file.hpp"
-#include "modules/core/json.hpp"
+#include "modules/core/io/json.hpp"
 #include "modules/evaluation/association.hpp"
 #include "modules/evaluation/closure_truth.hpp"
 #include "modules/evaluation/report.hpp"

@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "modules/core/write_file.hpp"
+#include "modules/core/io/write_file.hpp"
 
 namespace km {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <filesystem>
 
-#include "modules/core/label_palette.hpp"
+#include "modules/core/map/label_palette.hpp"
 #include "modules/mesh/labelled_mesh.hpp"
 
 namespace km {

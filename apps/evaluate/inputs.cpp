@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "apps/output_file.hpp"
-#include "modules/core/input_file.hpp"
+#include "modules/core/io/input_file.hpp"
 #include "modules/evaluation/trajectory_error.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
 #include "modules/images/image_codec.hpp"

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "modules/core/label_palette.hpp"
-#include "modules/core/stamped_pose.hpp"
+#include "modules/core/data/stamped_pose.hpp"
+#include "modules/core/map/label_palette.hpp"
 #include "modules/evaluation/mesh/mesh_error.hpp"
 
 namespace km {

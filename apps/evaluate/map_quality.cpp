@@ -9,9 +9,9 @@
 #include <nlohmann/json.hpp>
 #include <unordered_map>
 
-#include "modules/core/geometry.hpp"
+#include "modules/core/geometry/geometry.hpp"
+#include "modules/core/io/text_table.hpp"
 #include "modules/core/quantile.hpp"
-#include "modules/core/text_table.hpp"
 #include "modules/evaluation/mesh/sampled_surface.hpp"
 #include "modules/evaluation/report.hpp"
 

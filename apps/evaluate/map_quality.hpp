@@ -6,8 +6,8 @@
 #include <span>
 #include <string>
 
-#include "modules/core/json.hpp"
-#include "modules/core/label_palette.hpp"
+#include "modules/core/io/json.hpp"
+#include "modules/core/map/label_palette.hpp"
 #include "modules/mesh/labelled_mesh.hpp"
 
 namespace km {

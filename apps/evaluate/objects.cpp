@@ -6,7 +6,7 @@
 #include "apps/evaluate/commands.hpp"
 #include "apps/evaluate/inputs.hpp"
 #include "apps/output_file.hpp"
-#include "modules/core/text_table.hpp"
+#include "modules/core/io/text_table.hpp"
 #include "modules/evaluation/objects/object_error.hpp"
 
 namespace km {

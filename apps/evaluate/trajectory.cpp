@@ -11,7 +11,7 @@
 #include "apps/evaluate/inputs.hpp"
 #include "apps/output_file.hpp"
 #include "modules/charts/chart_page.hpp"
-#include "modules/core/text_table.hpp"
+#include "modules/core/io/text_table.hpp"
 #include "modules/evaluation/trajectory_error.hpp"
 
 namespace km {

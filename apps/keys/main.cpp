@@ -12,7 +12,7 @@
 
 #include "apps/program_options.hpp"
 #include "modules/core/config.hpp"
-#include "modules/core/text_table.hpp"
+#include "modules/core/io/text_table.hpp"
 #include "modules/security/key_file.hpp"
 #include "modules/security/key_folder.hpp"
 #include "modules/security/team_folder.hpp"

@@ -5,8 +5,8 @@
 #include <stdexcept>
 #include <utility>
 
-#include "modules/core/bytes.hpp"
-#include "modules/core/text_rows.hpp"
+#include "modules/core/io/bytes.hpp"
+#include "modules/core/io/text_rows.hpp"
 #include "modules/recordings/ros_messages.hpp"
 #include "modules/sensors/sensor_messages.hpp"
 

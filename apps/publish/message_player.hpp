@@ -7,11 +7,11 @@
 #include <string>
 #include <vector>
 
-#include "modules/core/received_fix.hpp"
+#include "modules/core/data/received_fix.hpp"
 #include "modules/recordings/bag_reader.hpp"
 #include "modules/sensors/dataset_reader.hpp"
 #include "runtime/clock.hpp"
-#include "runtime/dds/ros_publisher.hpp"
+#include "runtime/ros/ros_publisher.hpp"
 
 namespace km {
 

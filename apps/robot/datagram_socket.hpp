@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "modules/core/descriptor.hpp"
+#include "modules/core/io/descriptor.hpp"
 
 namespace km {
 

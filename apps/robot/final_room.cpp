@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "apps/result_files.hpp"
-#include "modules/core/descriptor.hpp"
+#include "modules/core/io/descriptor.hpp"
 #include "runtime/log.hpp"
 
 namespace km {

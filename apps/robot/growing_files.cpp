@@ -7,9 +7,9 @@
 #include <fstream>
 #include <stdexcept>
 
-#include "modules/core/input_file.hpp"
-#include "modules/core/text_rows.hpp"
-#include "modules/core/write_file.hpp"
+#include "modules/core/io/input_file.hpp"
+#include "modules/core/io/text_rows.hpp"
+#include "modules/core/io/write_file.hpp"
 
 namespace km {
 

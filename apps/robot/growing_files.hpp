@@ -12,7 +12,7 @@
 
 #include "apps/result_writer.hpp"
 #include "apps/robot/run_summary.hpp"
-#include "modules/core/pose_graph.hpp"
+#include "modules/core/data/pose_graph.hpp"
 
 namespace km {
 

@@ -12,10 +12,10 @@
 #include <utility>
 
 #include "modules/absolute_fixes/fix_reader.hpp"
-#include "modules/core/input_file.hpp"
-#include "modules/core/text_rows.hpp"
-#include "modules/core/text_table.hpp"
-#include "modules/core/write_file.hpp"
+#include "modules/core/io/input_file.hpp"
+#include "modules/core/io/text_rows.hpp"
+#include "modules/core/io/text_table.hpp"
+#include "modules/core/io/write_file.hpp"
 #include "modules/recordings/open_bag.hpp"
 #include "modules/recordings/ros_messages.hpp"
 #include "modules/ros_dds/node/live_topics.hpp"
@@ -23,8 +23,8 @@
 #include "modules/sensors/rig_completion.hpp"
 #include "modules/sensors/sensor_messages.hpp"
 #include "runtime/clock.hpp"
-#include "runtime/dds/ros_discovery.hpp"
 #include "runtime/log.hpp"
+#include "runtime/ros/ros_discovery.hpp"
 
 namespace km {
 namespace {

@@ -6,7 +6,7 @@
 
 #include "modules/recordings/bag_summary.hpp"
 #include "modules/sensors/node/rig_file.hpp"
-#include "runtime/dds/ros_config.hpp"
+#include "runtime/ros/ros_config.hpp"
 
 namespace km {
 

@@ -4,7 +4,7 @@
 #include <limits>
 #include <stdexcept>
 
-#include "modules/core/input_file.hpp"
+#include "modules/core/io/input_file.hpp"
 #include "runtime/clock.hpp"
 #include "runtime/log.hpp"
 

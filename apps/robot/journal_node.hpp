@@ -12,9 +12,9 @@
 #include <vector>
 
 #include "apps/result_writer.hpp"
-#include "modules/core/keyframe.hpp"
-#include "modules/core/odometry.hpp"
-#include "modules/core/pose_graph.hpp"
+#include "modules/core/data/keyframe.hpp"
+#include "modules/core/data/odometry.hpp"
+#include "modules/core/data/pose_graph.hpp"
 #include "modules/journal/journal_file.hpp"
 #include "modules/journal/restored_run.hpp"
 #include "runtime/dds/peer_table.hpp"

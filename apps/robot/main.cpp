@@ -7,7 +7,7 @@
 #include "apps/robot/inspect.hpp"
 #include "apps/robot/robot_config.hpp"
 #include "apps/robot/run.hpp"
-#include "modules/core/input_file.hpp"
+#include "modules/core/io/input_file.hpp"
 #include "runtime/log.hpp"
 #include "runtime/unblocked_output.hpp"
 #include "runtime/yaml_config.hpp"

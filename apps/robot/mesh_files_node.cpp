@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "apps/result_files.hpp"
-#include "modules/core/write_file.hpp"
+#include "modules/core/io/write_file.hpp"
 #include "modules/map_2d/map_2d.hpp"
 #include "modules/map_2d/map_server_files.hpp"
 #include "modules/mesh/map_file.hpp"

@@ -5,9 +5,9 @@
 #include <optional>
 
 #include "apps/result_writer.hpp"
-#include "modules/core/occupancy_grid.hpp"
-#include "modules/core/odometry.hpp"
-#include "modules/core/pose_graph.hpp"
+#include "modules/core/data/odometry.hpp"
+#include "modules/core/data/pose_graph.hpp"
+#include "modules/core/map/occupancy_grid.hpp"
 #include "modules/map_2d/map_2d_config.hpp"
 #include "modules/mesh/map_mesh.hpp"
 #include "modules/mesh_deformation/mesh_corrector.hpp"

@@ -10,9 +10,9 @@
 
 #include "apps/output_file.hpp"
 #include "apps/result_files.hpp"
-#include "modules/core/covariance.hpp"
-#include "modules/core/lie.hpp"
-#include "modules/core/text_table.hpp"
+#include "modules/core/data/covariance.hpp"
+#include "modules/core/geometry/lie.hpp"
+#include "modules/core/io/text_table.hpp"
 #include "modules/recorded_graph/g2o_io.hpp"
 
 namespace km {

@@ -26,7 +26,7 @@
 #include "modules/vio/tracker_config.hpp"
 #include "modules/vio/vio_config.hpp"
 #include "runtime/dds/dds_config.hpp"
-#include "runtime/dds/ros_config.hpp"
+#include "runtime/ros/ros_config.hpp"
 
 namespace km {
 

@@ -8,8 +8,8 @@
 #include <utility>
 
 #include "apps/result_files.hpp"
-#include "modules/core/input_file.hpp"
-#include "modules/core/text_table.hpp"
+#include "modules/core/io/input_file.hpp"
+#include "modules/core/io/text_table.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
 #include "modules/mesh/map_file.hpp"
 #include "modules/recordings/open_bag.hpp"

@@ -9,9 +9,9 @@
 
 #include "apps/robot/robot_config.hpp"
 #include "modules/absolute_fixes/node/fixes_node.hpp"
-#include "modules/core/camera.hpp"
-#include "modules/core/camera_calibration.hpp"
-#include "modules/core/label_palette.hpp"
+#include "modules/core/camera/camera.hpp"
+#include "modules/core/camera/camera_calibration.hpp"
+#include "modules/core/map/label_palette.hpp"
 #include "modules/dense_sensing/dense_sensor.hpp"
 #include "modules/journal/restored_run.hpp"
 #include "modules/localization/map_matcher.hpp"
@@ -20,8 +20,8 @@
 #include "modules/sensors/bag_dataset.hpp"
 #include "modules/sensors/dataset_reader.hpp"
 #include "modules/sensors/rig_completion.hpp"
-#include "runtime/dds/ros_network.hpp"
-#include "runtime/dds/ros_subscription.hpp"
+#include "runtime/ros/ros_network.hpp"
+#include "runtime/ros/ros_subscription.hpp"
 #include "runtime/signal_watch.hpp"
 
 namespace km {

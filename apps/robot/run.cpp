@@ -20,7 +20,7 @@
 #include "apps/robot/conclusion.hpp"
 #include "apps/robot/final_room.hpp"
 #include "apps/robot/watch.hpp"
-#include "modules/core/write_file.hpp"
+#include "modules/core/io/write_file.hpp"
 #include "modules/sensors/node/rig_file.hpp"
 #include "runtime/log.hpp"
 #include "runtime/thread.hpp"

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "modules/core/text_table.hpp"
+#include "modules/core/io/text_table.hpp"
 
 namespace km {
 namespace {

@@ -5,8 +5,8 @@
 #include <set>
 #include <utility>
 
-#include "modules/core/geometry.hpp"
-#include "modules/core/text_table.hpp"
+#include "modules/core/geometry/geometry.hpp"
+#include "modules/core/io/text_table.hpp"
 #include "modules/sensors/stream_stamps.hpp"
 
 namespace km {

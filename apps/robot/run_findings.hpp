@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "apps/robot/run_summary.hpp"
-#include "modules/core/pose_graph.hpp"
+#include "modules/core/data/pose_graph.hpp"
 #include "modules/diagnosis/finding.hpp"
 #include "modules/outlier_rejection/pcm_config.hpp"
 

@@ -4,8 +4,8 @@
 #include <iterator>
 #include <utility>
 
-#include "modules/core/median_depth.hpp"
-#include "modules/core/odometry_correction.hpp"
+#include "modules/core/data/median_depth.hpp"
+#include "modules/core/data/odometry_correction.hpp"
 #include "modules/mesh/mesh_chunks.hpp"
 #include "modules/session/own_graph.hpp"
 #include "modules/tree_newton/pose_edge.hpp"

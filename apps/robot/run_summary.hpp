@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
+#include "modules/core/data/pose_graph.hpp"
+#include "modules/core/data/stamped_pose.hpp"
 #include "modules/core/ids.hpp"
-#include "modules/core/json.hpp"
-#include "modules/core/pose_graph.hpp"
-#include "modules/core/stamped_pose.hpp"
+#include "modules/core/io/json.hpp"
 #include "modules/diagnosis/finding.hpp"
 #include "modules/vio/vio_statistics.hpp"
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <array>
 
-#include "modules/core/text_table.hpp"
+#include "modules/core/io/text_table.hpp"
 #include "runtime/clock.hpp"
 
 namespace km {

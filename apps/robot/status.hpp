@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "apps/robot/run_record.hpp"
-#include "modules/core/pose_graph.hpp"
+#include "modules/core/data/pose_graph.hpp"
 #include "modules/recordings/ros_messages.hpp"
 #include "modules/sensors/dataset_reader.hpp"
 #include "runtime/dds/bridge.hpp"

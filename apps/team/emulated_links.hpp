@@ -5,7 +5,7 @@
 #include <mutex>
 #include <vector>
 
-#include "modules/core/descriptor.hpp"
+#include "modules/core/io/descriptor.hpp"
 #include "modules/link_emulation/link_emulator.hpp"
 #include "runtime/guarded_thread.hpp"
 

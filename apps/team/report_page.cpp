@@ -18,8 +18,8 @@
 #include "apps/team/closure_images.hpp"
 #include "apps/team/team_report.hpp"
 #include "modules/charts/html_page.hpp"
-#include "modules/core/input_file.hpp"
-#include "modules/core/text_rows.hpp"
+#include "modules/core/io/input_file.hpp"
+#include "modules/core/io/text_rows.hpp"
 #include "modules/images/image_codec.hpp"
 
 namespace km {

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "apps/team/team_results.hpp"
-#include "modules/core/json.hpp"
+#include "modules/core/io/json.hpp"
 
 namespace km {
 

@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "modules/core/descriptor.hpp"
+#include "modules/core/io/descriptor.hpp"
 
 namespace km {
 

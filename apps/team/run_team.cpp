@@ -13,7 +13,7 @@
 #include <utility>
 
 #include "apps/result_files.hpp"
-#include "modules/core/text_table.hpp"
+#include "modules/core/io/text_table.hpp"
 #include "runtime/unblocked_output.hpp"
 
 namespace km {

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "modules/core/config.hpp"
-#include "modules/core/folder_name.hpp"
 #include "modules/core/ids.hpp"
+#include "modules/core/io/folder_name.hpp"
 #include "modules/evaluation/closure_truth.hpp"
 
 namespace km {

@@ -7,7 +7,7 @@
 #include <set>
 #include <sstream>
 
-#include "modules/core/text_table.hpp"
+#include "modules/core/io/text_table.hpp"
 #include "modules/evaluation/mesh/mesh_report.hpp"
 
 namespace km {

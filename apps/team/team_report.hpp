@@ -3,7 +3,7 @@
 #include <string>
 
 #include "apps/team/team_results.hpp"
-#include "modules/core/json.hpp"
+#include "modules/core/io/json.hpp"
 
 namespace km {
 

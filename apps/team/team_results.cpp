@@ -9,7 +9,7 @@
 #include <system_error>
 #include <utility>
 
-#include "modules/core/input_file.hpp"
+#include "modules/core/io/input_file.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
 #include "modules/mesh/mesh_file.hpp"
 #include "modules/sensors/node/open_folder.hpp"

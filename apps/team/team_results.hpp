@@ -7,7 +7,7 @@
 #include "apps/robot/run_summary.hpp"
 #include "apps/team/run_team.hpp"
 #include "apps/team/team_file.hpp"
-#include "modules/core/geometry.hpp"
+#include "modules/core/geometry/geometry.hpp"
 #include "modules/evaluation/closure_truth.hpp"
 #include "modules/evaluation/mesh/mesh_error.hpp"
 #include "modules/evaluation/trajectory_error.hpp"

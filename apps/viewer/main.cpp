@@ -11,7 +11,7 @@
 #include "apps/viewer/page_server.hpp"
 #include "apps/viewer/run_playback.hpp"
 #include "apps/viewer/view_store.hpp"
-#include "modules/core/input_file.hpp"
+#include "modules/core/io/input_file.hpp"
 #include "modules/view/node/view_listener_node.hpp"
 #include "runtime/clock.hpp"
 #include "runtime/dds/dds_config.hpp"

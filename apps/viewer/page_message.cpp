@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "modules/core/json.hpp"
+#include "modules/core/io/json.hpp"
 
 namespace km {
 namespace {

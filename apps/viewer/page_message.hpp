@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <string>
 
-#include "modules/core/label_palette.hpp"
+#include "modules/core/map/label_palette.hpp"
 #include "modules/view/view_update.hpp"
 
 namespace km {

@@ -13,7 +13,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "modules/core/json.hpp"
+#include "modules/core/io/json.hpp"
 #include "runtime/clock.hpp"
 #include "runtime/dds/participant.hpp"
 

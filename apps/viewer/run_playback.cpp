@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "apps/result_files.hpp"
-#include "modules/core/input_file.hpp"
+#include "modules/core/io/input_file.hpp"
 #include "modules/core/robot_identity.hpp"
 #include "modules/journal/restored_run.hpp"
 #include "modules/map_2d/map_server_files.hpp"

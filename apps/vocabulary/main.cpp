@@ -11,9 +11,9 @@
 
 #include "apps/output_file.hpp"
 #include "apps/program_options.hpp"
-#include "modules/core/input_file.hpp"
-#include "modules/core/keyframe.hpp"
-#include "modules/core/text_rows.hpp"
+#include "modules/core/data/keyframe.hpp"
+#include "modules/core/io/input_file.hpp"
+#include "modules/core/io/text_rows.hpp"
 #include "modules/images/image_codec.hpp"
 #include "modules/images/keypoint_extractor.hpp"
 #include "modules/place_recognition/vocabulary_file.hpp"

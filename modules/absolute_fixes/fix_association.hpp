@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "modules/absolute_fixes/fix_reader.hpp"
-#include "modules/core/odometry.hpp"
-#include "modules/core/position_fix.hpp"
-#include "modules/core/stamped_pose.hpp"
+#include "modules/core/data/odometry.hpp"
+#include "modules/core/data/position_fix.hpp"
+#include "modules/core/data/stamped_pose.hpp"
 
 namespace km {
 

@@ -3,10 +3,10 @@
 #include <bit>
 #include <cmath>
 
-#include "modules/core/bytes.hpp"
-#include "modules/core/input_file.hpp"
-#include "modules/core/measurement_limits.hpp"
-#include "modules/core/text_rows.hpp"
+#include "modules/core/data/measurement_limits.hpp"
+#include "modules/core/io/bytes.hpp"
+#include "modules/core/io/input_file.hpp"
+#include "modules/core/io/text_rows.hpp"
 #include "modules/recordings/ros_messages.hpp"
 
 namespace km {

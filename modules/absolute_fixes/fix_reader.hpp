@@ -7,7 +7,7 @@
 
 #include "modules/absolute_fixes/absolute_fixes_config.hpp"
 #include "modules/absolute_fixes/geodetic.hpp"
-#include "modules/core/received_fix.hpp"
+#include "modules/core/data/received_fix.hpp"
 #include "modules/core/stamp.hpp"
 #include "modules/recordings/bag_reader.hpp"
 

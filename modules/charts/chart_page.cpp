@@ -6,8 +6,8 @@
 #include <nlohmann/json.hpp>
 
 #include "modules/charts/html_page.hpp"
-#include "modules/core/text_table.hpp"
-#include "modules/core/xml_text.hpp"
+#include "modules/core/io/text_table.hpp"
+#include "modules/core/io/xml_text.hpp"
 
 namespace km {
 namespace {

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "modules/core/json.hpp"
+#include "modules/core/io/json.hpp"
 
 namespace km {
 

@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
-#include "modules/core/xml_text.hpp"
+#include "modules/core/io/xml_text.hpp"
 
 namespace km {
 

@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-#include "modules/core/json.hpp"
+#include "modules/core/io/json.hpp"
 
 namespace km {
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "modules/constellations/landmark.hpp"
-#include "modules/core/covariance.hpp"
+#include "modules/core/data/covariance.hpp"
 
 namespace km {
 

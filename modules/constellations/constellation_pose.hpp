@@ -3,7 +3,7 @@
 #include <span>
 
 #include "modules/constellations/landmark.hpp"
-#include "modules/core/covariance.hpp"
+#include "modules/core/data/covariance.hpp"
 
 namespace km {
 
@@ -13,8 +13,8 @@ namespace km {
 /// planar case of Umeyama, "Least-Squares Estimation of Transformation Parameters Between Two Point
 /// Patterns", PAMI 1991, without scale.
 ///
-/// The covariance (see modules/core/covariance.hpp) has three parts, with the Jacobians J of the
-/// distances by yaw and translation, the weights w, and A = sum w J^T J:
+/// The covariance (see modules/core/data/covariance.hpp) has three parts, with the Jacobians J of
+/// the distances by yaw and translation, the weights w, and A = sum w J^T J:
 ///
 ///     Sigma = A^-1 + G_a G_a^T + G_b G_b^T,   G = A^-1 sum w s J^T                             (1)
 ///

@@ -8,7 +8,7 @@
 
 #include "modules/constellations/constellation_match.hpp"
 #include "modules/constellations/object_stretches.hpp"
-#include "modules/core/pose_graph.hpp"
+#include "modules/core/data/pose_graph.hpp"
 
 namespace km {
 

@@ -2,7 +2,7 @@
 
 #include <Eigen/Core>
 
-#include "modules/core/label_palette.hpp"
+#include "modules/core/map/label_palette.hpp"
 
 namespace km {
 

@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "modules/core/depth_lookup.hpp"
+#include "modules/core/camera/depth_lookup.hpp"
 
 namespace km {
 namespace {

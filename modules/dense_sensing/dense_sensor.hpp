@@ -5,9 +5,9 @@
 #include <memory>
 #include <optional>
 
-#include "modules/core/camera.hpp"
-#include "modules/core/color_image.hpp"
-#include "modules/core/frame.hpp"
+#include "modules/core/camera/camera.hpp"
+#include "modules/core/camera/color_image.hpp"
+#include "modules/core/camera/frame.hpp"
 #include "modules/dense_sensing/segmentation_network.hpp"
 #include "modules/dense_sensing/stereo_depth.hpp"
 

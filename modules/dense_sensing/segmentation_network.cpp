@@ -7,7 +7,7 @@
 #include <optional>
 #include <string>
 
-#include "modules/core/text_rows.hpp"
+#include "modules/core/io/text_rows.hpp"
 #include "modules/images/configured_network.hpp"
 #include "modules/images/image_view.hpp"
 

@@ -3,8 +3,8 @@
 #include <cstddef>
 #include <memory>
 
-#include "modules/core/frame.hpp"
-#include "modules/core/label_palette.hpp"
+#include "modules/core/camera/frame.hpp"
+#include "modules/core/map/label_palette.hpp"
 #include "modules/dense_sensing/segmentation_config.hpp"
 
 namespace km {

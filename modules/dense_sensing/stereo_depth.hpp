@@ -5,8 +5,8 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "modules/core/camera.hpp"
-#include "modules/core/frame.hpp"
+#include "modules/core/camera/camera.hpp"
+#include "modules/core/camera/frame.hpp"
 #include "modules/dense_sensing/stereo_depth_config.hpp"
 #include "modules/images/rectification.hpp"
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "modules/core/quantile.hpp"
 
 namespace km {

@@ -4,8 +4,8 @@
 #include <optional>
 #include <span>
 
-#include "modules/core/frame.hpp"
-#include "modules/core/geometry.hpp"
+#include "modules/core/camera/frame.hpp"
+#include "modules/core/geometry/geometry.hpp"
 #include "modules/diagnosis/inertial_fit.hpp"
 
 namespace km {

@@ -6,9 +6,9 @@
 #include <optional>
 #include <utility>
 
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
+#include "modules/core/io/text_table.hpp"
 #include "modules/core/quantile.hpp"
-#include "modules/core/text_table.hpp"
 #include "modules/diagnosis/acceleration_fit.hpp"
 #include "modules/diagnosis/doubt_finding.hpp"
 #include "modules/diagnosis/focal_fit.hpp"

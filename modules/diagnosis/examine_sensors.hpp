@@ -3,7 +3,7 @@
 #include <span>
 #include <vector>
 
-#include "modules/core/camera.hpp"
+#include "modules/core/camera/camera.hpp"
 #include "modules/diagnosis/finding.hpp"
 #include "modules/diagnosis/sensor_sample.hpp"
 #include "modules/place_recognition/vocabulary.hpp"

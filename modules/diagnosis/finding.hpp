@@ -6,8 +6,8 @@
 #include <utility>
 #include <vector>
 
-#include "modules/core/json.hpp"
-#include "modules/core/text_table.hpp"
+#include "modules/core/io/json.hpp"
+#include "modules/core/io/text_table.hpp"
 
 namespace km {
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <vector>
 
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "modules/diagnosis/stereo_fit.hpp"
 
 namespace km {

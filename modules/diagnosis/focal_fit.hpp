@@ -3,7 +3,7 @@
 #include <optional>
 #include <span>
 
-#include "modules/core/camera.hpp"
+#include "modules/core/camera/camera.hpp"
 #include "modules/diagnosis/inertial_fit.hpp"
 #include "modules/diagnosis/sensor_sample.hpp"
 

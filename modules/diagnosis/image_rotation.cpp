@@ -7,7 +7,7 @@
 #include <limits>
 #include <random>
 
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "modules/diagnosis/stereo_fit.hpp"
 #include "modules/vio/track_motion.hpp"
 

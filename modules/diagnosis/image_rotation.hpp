@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "modules/core/camera.hpp"
+#include "modules/core/camera/camera.hpp"
 #include "modules/diagnosis/inertial_fit.hpp"
 #include "modules/diagnosis/sensor_sample.hpp"
 

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "modules/core/frame.hpp"
+#include "modules/core/camera/frame.hpp"
 
 namespace km {
 

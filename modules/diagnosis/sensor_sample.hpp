@@ -5,9 +5,9 @@
 #include <optional>
 #include <vector>
 
-#include "modules/core/frame.hpp"
-#include "modules/core/image_size.hpp"
-#include "modules/core/keyframe.hpp"
+#include "modules/core/camera/frame.hpp"
+#include "modules/core/camera/image_size.hpp"
+#include "modules/core/data/keyframe.hpp"
 
 namespace km {
 

@@ -6,7 +6,7 @@
 #include <limits>
 #include <utility>
 
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "modules/core/quantile.hpp"
 
 namespace km {

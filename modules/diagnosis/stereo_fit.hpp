@@ -4,7 +4,7 @@
 #include <optional>
 #include <span>
 
-#include "modules/core/camera.hpp"
+#include "modules/core/camera/camera.hpp"
 #include "modules/diagnosis/sensor_sample.hpp"
 
 namespace km {

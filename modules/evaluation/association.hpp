@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "modules/core/stamped_pose.hpp"
+#include "modules/core/data/stamped_pose.hpp"
 
 namespace km {
 

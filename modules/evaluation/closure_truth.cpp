@@ -8,8 +8,8 @@
 #include <utility>
 
 #include "modules/core/config.hpp"
-#include "modules/core/input_file.hpp"
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
+#include "modules/core/io/input_file.hpp"
 #include "modules/evaluation/association.hpp"
 #include "modules/evaluation/input_row.hpp"
 #include "modules/evaluation/report.hpp"

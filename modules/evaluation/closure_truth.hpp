@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
-#include "modules/core/camera.hpp"
-#include "modules/core/json.hpp"
-#include "modules/core/pose_graph.hpp"
-#include "modules/core/stamped_pose.hpp"
+#include "modules/core/camera/camera.hpp"
+#include "modules/core/data/pose_graph.hpp"
+#include "modules/core/data/stamped_pose.hpp"
+#include "modules/core/io/json.hpp"
 #include "modules/evaluation/statistics.hpp"
 
 namespace km {
@@ -31,7 +31,7 @@ struct ClosureRecord {
   int matches = 0;               ///< Descriptor matches.
   int inliers = 0;               ///< Correspondences that support the pose.
   std::string reason = {};       ///< Reason for its rejection; empty if it was not rejected.
-  /// Standard deviations of the pose, see core/covariance.hpp [rad, m]; 0: unknown.
+  /// Standard deviations of the pose, see core/data/covariance.hpp [rad, m]; 0: unknown.
   Vector6 sigma = Vector6::Zero();
 };
 

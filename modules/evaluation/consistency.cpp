@@ -6,7 +6,7 @@
 #include <limits>
 #include <stdexcept>
 
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "modules/evaluation/association.hpp"
 #include "modules/evaluation/statistics.hpp"
 

@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "modules/core/geometry.hpp"
-#include "modules/core/pose_graph.hpp"
-#include "modules/core/stamped_pose.hpp"
+#include "modules/core/data/pose_graph.hpp"
+#include "modules/core/data/stamped_pose.hpp"
+#include "modules/core/geometry/geometry.hpp"
 
 namespace km {
 
@@ -17,7 +17,7 @@ struct ConsistencyInput {
   std::string name;
   std::span<const StampedPose> truth;
   std::span<const StampedPose> estimate;
-  std::span<const Matrix6> covariances;  ///< By pose of the estimate, see core/covariance.hpp.
+  std::span<const Matrix6> covariances;  ///< By pose of the estimate, see core/data/covariance.hpp.
 };
 
 /// The normalised estimation error squared (NEES; Bar-Shalom, Li, Kirubarajan, "Estimation with

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "modules/core/config.hpp"
-#include "modules/core/input_file.hpp"
+#include "modules/core/io/input_file.hpp"
 
 namespace km {
 

@@ -5,8 +5,8 @@
 #include <string>
 #include <string_view>
 
-#include "modules/core/geometry.hpp"
-#include "modules/core/text_rows.hpp"
+#include "modules/core/geometry/geometry.hpp"
+#include "modules/core/io/text_rows.hpp"
 
 namespace km {
 

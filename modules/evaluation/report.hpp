@@ -3,8 +3,8 @@
 #include <span>
 #include <string>
 
-#include "modules/core/geometry.hpp"
-#include "modules/core/json.hpp"
+#include "modules/core/geometry/geometry.hpp"
+#include "modules/core/io/json.hpp"
 #include "modules/evaluation/statistics.hpp"
 
 namespace km {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "modules/core/json.hpp"
+#include "modules/core/io/json.hpp"
 #include "modules/evaluation/association.hpp"
 #include "modules/evaluation/statistics.hpp"
 

@@ -7,9 +7,9 @@
 #include <limits>
 #include <string>
 
-#include "modules/core/calibration_limits.hpp"
-#include "modules/core/covariance.hpp"
-#include "modules/core/input_file.hpp"
+#include "modules/core/camera/calibration_limits.hpp"
+#include "modules/core/data/covariance.hpp"
+#include "modules/core/io/input_file.hpp"
 #include "modules/evaluation/input_row.hpp"
 
 namespace km {

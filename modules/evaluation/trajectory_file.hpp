@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "modules/core/stamped_pose.hpp"
+#include "modules/core/data/stamped_pose.hpp"
 
 namespace km {
 

@@ -6,9 +6,9 @@
 #include <utility>
 #include <vector>
 
-#include "modules/core/bytes.hpp"
 #include "modules/core/config.hpp"
-#include "modules/core/input_file.hpp"
+#include "modules/core/io/bytes.hpp"
+#include "modules/core/io/input_file.hpp"
 
 namespace km {
 namespace {

@@ -3,7 +3,7 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "modules/core/frame.hpp"
+#include "modules/core/camera/frame.hpp"
 
 namespace km {
 

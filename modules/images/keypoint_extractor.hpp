@@ -2,7 +2,7 @@
 
 #include <opencv2/features2d.hpp>
 
-#include "modules/core/keyframe.hpp"
+#include "modules/core/data/keyframe.hpp"
 
 namespace km {
 

@@ -4,7 +4,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "modules/core/depth_lookup.hpp"
+#include "modules/core/camera/depth_lookup.hpp"
 #include "modules/images/image_view.hpp"
 
 namespace km {

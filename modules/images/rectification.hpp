@@ -4,8 +4,8 @@
 #include <opencv2/core.hpp>
 #include <optional>
 
-#include "modules/core/camera.hpp"
-#include "modules/core/frame.hpp"
+#include "modules/core/camera/camera.hpp"
+#include "modules/core/camera/frame.hpp"
 
 namespace km {
 

@@ -3,7 +3,7 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "modules/core/keyframe.hpp"
+#include "modules/core/data/keyframe.hpp"
 
 namespace km {
 

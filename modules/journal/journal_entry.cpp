@@ -2,8 +2,8 @@
 
 #include <utility>
 
-#include "modules/core/byte_archive.hpp"
-#include "modules/core/covariance.hpp"
+#include "modules/core/data/byte_archive.hpp"
+#include "modules/core/data/covariance.hpp"
 
 namespace km {
 namespace {

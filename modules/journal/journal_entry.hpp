@@ -7,15 +7,15 @@
 #include <variant>
 #include <vector>
 
-#include "modules/core/closure_verdicts.hpp"
+#include "modules/core/data/closure_verdicts.hpp"
+#include "modules/core/data/keyframe.hpp"
+#include "modules/core/data/odometry.hpp"
+#include "modules/core/data/pose_changes.hpp"
+#include "modules/core/data/pose_graph.hpp"
+#include "modules/core/data/received_fix.hpp"
+#include "modules/core/data/robot_sample.hpp"
 #include "modules/core/decoded.hpp"
-#include "modules/core/keyframe.hpp"
-#include "modules/core/mesh_cells.hpp"
-#include "modules/core/odometry.hpp"
-#include "modules/core/pose_changes.hpp"
-#include "modules/core/pose_graph.hpp"
-#include "modules/core/received_fix.hpp"
-#include "modules/core/robot_sample.hpp"
+#include "modules/core/map/mesh_cells.hpp"
 
 namespace km {
 

@@ -5,9 +5,9 @@
 #include <string_view>
 #include <utility>
 
-#include "modules/core/bytes.hpp"
-#include "modules/core/input_file.hpp"
-#include "modules/core/write_file.hpp"
+#include "modules/core/io/bytes.hpp"
+#include "modules/core/io/input_file.hpp"
+#include "modules/core/io/write_file.hpp"
 
 namespace km {
 namespace {

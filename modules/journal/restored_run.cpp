@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "modules/core/input_file.hpp"
+#include "modules/core/io/input_file.hpp"
 #include "modules/core/robot_identity.hpp"
 
 namespace km {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "modules/core/team_solution.hpp"
+#include "modules/core/data/team_solution.hpp"
 #include "modules/journal/journal_entry.hpp"
 #include "modules/journal/journal_file.hpp"
 

@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "modules/core/bytes.hpp"
+#include "modules/core/io/bytes.hpp"
 
 namespace km {
 

@@ -6,8 +6,8 @@
 #include <optional>
 #include <vector>
 
-#include "modules/core/keyframe.hpp"
-#include "modules/core/pose_graph.hpp"
+#include "modules/core/data/keyframe.hpp"
+#include "modules/core/data/pose_graph.hpp"
 #include "modules/loop_closure/verifier.hpp"
 #include "modules/place_recognition/place_database.hpp"
 #include "modules/place_recognition/vocabulary.hpp"

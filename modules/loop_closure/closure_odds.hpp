@@ -2,7 +2,7 @@
 
 #include <map>
 
-#include "modules/core/pose_graph.hpp"
+#include "modules/core/data/pose_graph.hpp"
 
 namespace km {
 

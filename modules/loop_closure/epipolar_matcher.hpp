@@ -4,8 +4,8 @@
 #include <span>
 #include <vector>
 
-#include "modules/core/camera.hpp"
-#include "modules/core/frame.hpp"
+#include "modules/core/camera/camera.hpp"
+#include "modules/core/camera/frame.hpp"
 #include "modules/images/rectification.hpp"
 #include "modules/loop_closure/keyframe_features_config.hpp"
 

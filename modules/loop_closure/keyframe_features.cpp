@@ -4,7 +4,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "modules/core/depth_lookup.hpp"
+#include "modules/core/camera/depth_lookup.hpp"
 #include "modules/images/image_view.hpp"
 #include "modules/images/spread_keypoints.hpp"
 

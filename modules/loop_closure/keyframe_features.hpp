@@ -5,10 +5,10 @@
 #include <span>
 #include <vector>
 
-#include "modules/core/camera.hpp"
-#include "modules/core/frame.hpp"
-#include "modules/core/geometry.hpp"
-#include "modules/core/keyframe.hpp"
+#include "modules/core/camera/camera.hpp"
+#include "modules/core/camera/frame.hpp"
+#include "modules/core/data/keyframe.hpp"
+#include "modules/core/geometry/geometry.hpp"
 #include "modules/loop_closure/epipolar_matcher.hpp"
 #include "modules/loop_closure/keyframe_features_config.hpp"
 #include "modules/loop_closure/keypoint_describer.hpp"

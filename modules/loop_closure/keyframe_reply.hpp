@@ -5,7 +5,7 @@
 #include <optional>
 #include <span>
 
-#include "modules/core/keyframe.hpp"
+#include "modules/core/data/keyframe.hpp"
 #include "modules/loop_closure/keyframe_requests.hpp"
 #include "modules/loop_closure/word_points.hpp"
 #include "modules/place_recognition/vocabulary.hpp"

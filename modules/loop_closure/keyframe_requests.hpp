@@ -10,8 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include "modules/core/data/keyframe.hpp"
 #include "modules/core/ids.hpp"
-#include "modules/core/keyframe.hpp"
 #include "modules/loop_closure/word_points.hpp"
 
 namespace km {

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "modules/core/keyframe.hpp"
+#include "modules/core/data/keyframe.hpp"
 #include "modules/loop_closure/relative_pose.hpp"
 
 namespace km {

@@ -9,7 +9,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "modules/images/keypoint_extractor.hpp"
 
 namespace km {

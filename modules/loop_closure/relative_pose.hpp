@@ -8,8 +8,8 @@
 #include <span>
 #include <vector>
 
-#include "modules/core/geometry.hpp"
-#include "modules/core/keyframe.hpp"
+#include "modules/core/data/keyframe.hpp"
+#include "modules/core/geometry/geometry.hpp"
 
 namespace km {
 

@@ -4,7 +4,7 @@
 #include <set>
 #include <utility>
 
-#include "modules/core/pose_graph.hpp"
+#include "modules/core/data/pose_graph.hpp"
 #include "modules/loop_closure/closure_odds.hpp"
 #include "modules/loop_closure/loop_closure_config.hpp"
 

@@ -8,8 +8,8 @@
 #include <random>
 #include <vector>
 
-#include "modules/core/covariance.hpp"
-#include "modules/core/lie.hpp"
+#include "modules/core/data/covariance.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "modules/loop_closure/matching.hpp"
 #include "modules/loop_closure/relative_pose.hpp"
 

@@ -1,7 +1,7 @@
 #pragma once
 
-#include "modules/core/geometry.hpp"
-#include "modules/core/keyframe.hpp"
+#include "modules/core/data/keyframe.hpp"
+#include "modules/core/geometry/geometry.hpp"
 #include "modules/loop_closure/loop_closure_config.hpp"
 
 namespace km {
@@ -25,7 +25,7 @@ struct Verification {
   VerificationStatus status = VerificationStatus::kTooFewMatches;
   SE3 T_from_to = SE3::Identity();           ///< Relative pose of the bodies, if accepted.
   Matrix6 covariance = Matrix6::Identity();  ///< Covariance of T_from_to, see
-                                             ///< modules/core/covariance.hpp.
+                                             ///< modules/core/data/covariance.hpp.
   int matches = 0;     ///< Pairs of similar keypoints, at least one with depth.
   int consensus = 0;   ///< Matches that agree with the best sampled pose.
   int iterations = 0;  ///< Number of samples drawn.

@@ -2,9 +2,9 @@
 
 #include <span>
 
-#include "modules/core/geometry.hpp"
-#include "modules/core/label_palette.hpp"
-#include "modules/core/occupancy_grid.hpp"
+#include "modules/core/geometry/geometry.hpp"
+#include "modules/core/map/label_palette.hpp"
+#include "modules/core/map/occupancy_grid.hpp"
 #include "modules/map_2d/map_2d_config.hpp"
 #include "modules/map_2d/view_rays.hpp"
 #include "modules/mesh/labelled_mesh.hpp"

@@ -3,7 +3,7 @@
 #include <string>
 #include <string_view>
 
-#include "modules/core/occupancy_grid.hpp"
+#include "modules/core/map/occupancy_grid.hpp"
 
 namespace km {
 

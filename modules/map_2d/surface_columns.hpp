@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "modules/core/label_palette.hpp"
+#include "modules/core/map/label_palette.hpp"
 #include "modules/mesh/labelled_mesh.hpp"
 
 namespace km {

@@ -4,11 +4,11 @@
 #include <optional>
 #include <vector>
 
-#include "modules/core/camera.hpp"
-#include "modules/core/dense_frame.hpp"
-#include "modules/core/geometry.hpp"
+#include "modules/core/camera/camera.hpp"
+#include "modules/core/geometry/geometry.hpp"
+#include "modules/core/geometry/pose_spacing.hpp"
 #include "modules/core/ids.hpp"
-#include "modules/core/pose_spacing.hpp"
+#include "modules/core/map/dense_frame.hpp"
 
 namespace km {
 

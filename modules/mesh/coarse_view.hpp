@@ -6,11 +6,11 @@
 #include <memory>
 #include <vector>
 
-#include "modules/core/camera.hpp"
-#include "modules/core/frame.hpp"
-#include "modules/core/geometry.hpp"
+#include "modules/core/camera/camera.hpp"
+#include "modules/core/camera/frame.hpp"
+#include "modules/core/geometry/geometry.hpp"
+#include "modules/core/geometry/pose_spacing.hpp"
 #include "modules/core/ids.hpp"
-#include "modules/core/pose_spacing.hpp"
 
 namespace km {
 

@@ -6,8 +6,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "modules/core/geometry.hpp"
-#include "modules/core/label_palette.hpp"
+#include "modules/core/geometry/geometry.hpp"
+#include "modules/core/map/label_palette.hpp"
 
 namespace km {
 

@@ -6,9 +6,9 @@
 #include <string>
 #include <string_view>
 
-#include "modules/core/byte_archive.hpp"
-#include "modules/core/input_file.hpp"
-#include "modules/core/write_file.hpp"
+#include "modules/core/data/byte_archive.hpp"
+#include "modules/core/io/input_file.hpp"
+#include "modules/core/io/write_file.hpp"
 
 namespace km {
 namespace {

@@ -6,10 +6,10 @@
 #include <cstdint>
 #include <vector>
 
+#include "modules/core/data/keyframe.hpp"
 #include "modules/core/ids.hpp"
-#include "modules/core/keyframe.hpp"
-#include "modules/core/label_palette.hpp"
-#include "modules/core/mesh_cells.hpp"
+#include "modules/core/map/label_palette.hpp"
+#include "modules/core/map/mesh_cells.hpp"
 #include "modules/mesh/labelled_mesh.hpp"
 #include "modules/mesh/mesh_origin.hpp"
 #include "modules/mesh/mesh_poses.hpp"

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "modules/core/geometry.hpp"
+#include "modules/core/geometry/geometry.hpp"
 #include "modules/core/ids.hpp"
 
 namespace km {

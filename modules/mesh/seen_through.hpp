@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "modules/core/geometry.hpp"
+#include "modules/core/geometry/geometry.hpp"
 #include "modules/mesh/coarse_view.hpp"
 #include "modules/mesh/labelled_mesh.hpp"
 

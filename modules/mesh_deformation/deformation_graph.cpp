@@ -10,7 +10,7 @@
 #include <memory>
 #include <utility>
 
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 
 namespace km {
 namespace {

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "modules/core/geometry.hpp"
+#include "modules/core/geometry/geometry.hpp"
 #include "modules/mesh/map_mesh.hpp"
 #include "modules/mesh_deformation/deformation_graph.hpp"
 #include "modules/mesh_deformation/mesh_deformation_config.hpp"

@@ -6,9 +6,9 @@
 #include <span>
 #include <vector>
 
-#include "modules/core/geometry.hpp"
+#include "modules/core/data/pose_graph.hpp"
+#include "modules/core/geometry/geometry.hpp"
 #include "modules/core/ids.hpp"
-#include "modules/core/pose_graph.hpp"
 #include "modules/mesh/labelled_mesh.hpp"
 #include "modules/mesh/map_mesh.hpp"
 #include "modules/mesh/mesh_origin.hpp"

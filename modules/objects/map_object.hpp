@@ -3,10 +3,10 @@
 #include <cstdint>
 #include <vector>
 
-#include "modules/core/geometry.hpp"
+#include "modules/core/data/surface_keyframe.hpp"
+#include "modules/core/geometry/geometry.hpp"
 #include "modules/core/ids.hpp"
-#include "modules/core/label_palette.hpp"
-#include "modules/core/surface_keyframe.hpp"
+#include "modules/core/map/label_palette.hpp"
 #include "modules/objects/object_box.hpp"
 
 namespace km {

@@ -4,7 +4,7 @@
 #include <array>
 #include <span>
 
-#include "modules/core/geometry.hpp"
+#include "modules/core/geometry/geometry.hpp"
 
 namespace km {
 

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "modules/core/label_palette.hpp"
+#include "modules/core/map/label_palette.hpp"
 #include "modules/mesh/labelled_mesh.hpp"
 #include "modules/objects/map_object.hpp"
 #include "modules/objects/objects_config.hpp"

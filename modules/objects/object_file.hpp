@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "modules/core/label_palette.hpp"
+#include "modules/core/map/label_palette.hpp"
 #include "modules/objects/map_object.hpp"
 
 namespace km {

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "modules/core/pose_graph.hpp"
+#include "modules/core/data/pose_graph.hpp"
 #include "modules/objects/map_object.hpp"
 #include "modules/objects/objects_config.hpp"
 

@@ -4,10 +4,10 @@
 #include <span>
 #include <vector>
 
-#include "modules/core/covariance.hpp"
-#include "modules/core/geometry.hpp"
-#include "modules/core/lie.hpp"
-#include "modules/core/pose_graph.hpp"
+#include "modules/core/data/covariance.hpp"
+#include "modules/core/data/pose_graph.hpp"
+#include "modules/core/geometry/geometry.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "modules/outlier_rejection/pcm_config.hpp"
 
 namespace km {

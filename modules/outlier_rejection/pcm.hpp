@@ -4,7 +4,7 @@
 #include <set>
 #include <vector>
 
-#include "modules/core/pose_graph.hpp"
+#include "modules/core/data/pose_graph.hpp"
 #include "modules/outlier_rejection/cycle_test.hpp"
 #include "modules/outlier_rejection/max_clique.hpp"
 #include "modules/outlier_rejection/pcm_config.hpp"

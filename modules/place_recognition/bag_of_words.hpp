@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "modules/core/data/keyframe.hpp"
 #include "modules/core/ids.hpp"
-#include "modules/core/keyframe.hpp"
 #include "modules/core/stamp.hpp"
 
 namespace km {

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "modules/core/keyframe.hpp"
+#include "modules/core/data/keyframe.hpp"
 
 namespace km {
 

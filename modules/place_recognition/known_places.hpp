@@ -4,8 +4,8 @@
 #include <optional>
 #include <span>
 
-#include "modules/core/covariance.hpp"
-#include "modules/core/pose_graph.hpp"
+#include "modules/core/data/covariance.hpp"
+#include "modules/core/data/pose_graph.hpp"
 
 namespace km {
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "modules/core/keyframe.hpp"
+#include "modules/core/data/keyframe.hpp"
 #include "modules/place_recognition/bag_of_words.hpp"
 #include "modules/place_recognition/hamming.hpp"
 

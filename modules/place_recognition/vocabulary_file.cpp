@@ -7,7 +7,7 @@
 #include <fstream>
 #include <stdexcept>
 
-#include "modules/core/input_file.hpp"
+#include "modules/core/io/input_file.hpp"
 
 namespace km {
 namespace {

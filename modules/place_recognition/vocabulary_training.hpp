@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "modules/core/config.hpp"
-#include "modules/core/keyframe.hpp"
+#include "modules/core/data/keyframe.hpp"
 #include "modules/place_recognition/vocabulary.hpp"
 
 namespace km {

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "modules/core/bytes.hpp"
+#include "modules/core/io/bytes.hpp"
 #include "modules/rbcd/quadratic_problem.hpp"
 #include "modules/robust/member_solver.hpp"
 #include "modules/robust/session_graph.hpp"

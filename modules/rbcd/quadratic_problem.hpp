@@ -4,7 +4,7 @@
 #include <memory>
 #include <vector>
 
-#include "modules/core/geometry.hpp"
+#include "modules/core/geometry/geometry.hpp"
 #include "modules/rbcd/block_cholesky.hpp"
 #include "modules/rbcd/stiefel.hpp"
 #include "modules/tree_newton/chordal.hpp"

@@ -2,7 +2,7 @@
 
 #include <Eigen/Eigenvalues>
 
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "modules/rbcd/rank_dispatch.hpp"
 
 namespace km {

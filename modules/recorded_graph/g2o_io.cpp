@@ -8,10 +8,10 @@
 #include <stdexcept>
 #include <unordered_set>
 
-#include "modules/core/input_file.hpp"
-#include "modules/core/lie.hpp"
-#include "modules/core/measurement_limits.hpp"
-#include "modules/core/write_file.hpp"
+#include "modules/core/data/measurement_limits.hpp"
+#include "modules/core/geometry/lie.hpp"
+#include "modules/core/io/input_file.hpp"
+#include "modules/core/io/write_file.hpp"
 #include "modules/recorded_graph/text_fields.hpp"
 
 namespace km {

@@ -12,9 +12,9 @@
 #include <stdexcept>
 #include <utility>
 
-#include "modules/core/input_file.hpp"
-#include "modules/core/measurement_limits.hpp"
-#include "modules/core/text_rows.hpp"
+#include "modules/core/data/measurement_limits.hpp"
+#include "modules/core/io/input_file.hpp"
+#include "modules/core/io/text_rows.hpp"
 #include "modules/recorded_graph/g2o_io.hpp"
 #include "modules/recorded_graph/text_fields.hpp"
 

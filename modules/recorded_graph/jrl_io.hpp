@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "modules/core/pose_graph.hpp"
+#include "modules/core/data/pose_graph.hpp"
 #include "modules/core/stamp.hpp"
 #include "modules/recorded_graph/recorded_graph.hpp"
 

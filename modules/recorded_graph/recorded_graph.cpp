@@ -6,11 +6,11 @@
 #include <set>
 #include <stdexcept>
 
-#include "modules/core/covariance.hpp"
-#include "modules/core/input_file.hpp"
-#include "modules/core/lie.hpp"
-#include "modules/core/measurement_limits.hpp"
-#include "modules/core/precision.hpp"
+#include "modules/core/data/covariance.hpp"
+#include "modules/core/data/measurement_limits.hpp"
+#include "modules/core/geometry/lie.hpp"
+#include "modules/core/geometry/precision.hpp"
+#include "modules/core/io/input_file.hpp"
 #include "modules/recorded_graph/g2o_io.hpp"
 #include "modules/recorded_graph/jrl_io.hpp"
 #include "modules/recorded_graph/text_fields.hpp"

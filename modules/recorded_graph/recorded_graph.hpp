@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "modules/core/odometry.hpp"
-#include "modules/core/pose_graph.hpp"
+#include "modules/core/data/odometry.hpp"
+#include "modules/core/data/pose_graph.hpp"
 #include "modules/core/stamp.hpp"
 
 namespace km {

@@ -10,8 +10,8 @@
 #include <string_view>
 
 #include "modules/core/config.hpp"
-#include "modules/core/measurement_limits.hpp"
-#include "modules/core/text_rows.hpp"
+#include "modules/core/data/measurement_limits.hpp"
+#include "modules/core/io/text_rows.hpp"
 
 namespace km {
 

@@ -8,7 +8,7 @@
 #include <tuple>
 #include <vector>
 
-#include "modules/core/fault_report.hpp"
+#include "modules/core/data/fault_report.hpp"
 #include "modules/core/stamp.hpp"
 
 namespace km {

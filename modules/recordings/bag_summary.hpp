@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "modules/core/image_size.hpp"
+#include "modules/core/camera/image_size.hpp"
 #include "modules/core/stamp.hpp"
 #include "modules/recordings/bag_reader.hpp"
 

@@ -11,7 +11,7 @@
 #include <system_error>
 #include <tuple>
 
-#include "modules/core/input_file.hpp"
+#include "modules/core/io/input_file.hpp"
 
 namespace km {
 namespace {

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "modules/core/decoded.hpp"
-#include "modules/core/descriptor.hpp"
+#include "modules/core/io/descriptor.hpp"
 #include "modules/recordings/bag_reader.hpp"
 
 namespace km {

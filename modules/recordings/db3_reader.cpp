@@ -6,7 +6,7 @@
 #include <string_view>
 #include <utility>
 
-#include "modules/core/input_file.hpp"
+#include "modules/core/io/input_file.hpp"
 #include "modules/recordings/chunked_file.hpp"
 #include "modules/recordings/open_bag.hpp"
 

@@ -3,8 +3,8 @@
 #include <memory>
 #include <utility>
 
-#include "modules/core/bytes.hpp"
-#include "modules/core/input_file.hpp"
+#include "modules/core/io/bytes.hpp"
+#include "modules/core/io/input_file.hpp"
 #include "modules/recordings/chunked_file.hpp"
 #include "modules/recordings/mcap_records.hpp"
 #include "modules/recordings/open_bag.hpp"

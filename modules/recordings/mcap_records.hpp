@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "modules/core/bytes.hpp"
+#include "modules/core/io/bytes.hpp"
 #include "modules/core/stamp.hpp"
 
 namespace km {

@@ -4,7 +4,7 @@
 #include <string_view>
 #include <utility>
 
-#include "modules/core/input_file.hpp"
+#include "modules/core/io/input_file.hpp"
 #include "modules/recordings/chunked_file.hpp"
 #include "modules/recordings/mcap_records.hpp"
 

@@ -5,8 +5,8 @@
 #include <string_view>
 #include <utility>
 
-#include "modules/core/bytes.hpp"
-#include "modules/core/input_file.hpp"
+#include "modules/core/io/bytes.hpp"
+#include "modules/core/io/input_file.hpp"
 #include "modules/recordings/chunked_file.hpp"
 #include "modules/recordings/open_bag.hpp"
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "modules/core/calibration_limits.hpp"
+#include "modules/core/camera/calibration_limits.hpp"
 
 namespace km {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <optional>
 
-#include "modules/core/camera.hpp"
+#include "modules/core/camera/camera.hpp"
 #include "modules/recordings/ros_messages.hpp"
 
 namespace km {

@@ -13,8 +13,8 @@
 #include <utility>
 #include <vector>
 
-#include "modules/core/bytes.hpp"
 #include "modules/core/decoded.hpp"
+#include "modules/core/io/bytes.hpp"
 #include "modules/core/stamp.hpp"
 #include "modules/recordings/bag_reader.hpp"
 #include "modules/recordings/ros_types.hpp"

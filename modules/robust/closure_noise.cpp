@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "modules/core/symmetric_eigen.hpp"
+#include "modules/core/geometry/symmetric_eigen.hpp"
 #include "modules/robust/cycle_mixture.hpp"
 
 namespace km {

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "modules/core/geometry.hpp"
+#include "modules/core/geometry/geometry.hpp"
 #include "modules/core/ids.hpp"
 #include "modules/robust/noise_histogram.hpp"
 

@@ -6,8 +6,8 @@
 #include <utility>
 #include <vector>
 
-#include "modules/core/geometry.hpp"
-#include "modules/core/pose_graph.hpp"
+#include "modules/core/data/pose_graph.hpp"
+#include "modules/core/geometry/geometry.hpp"
 #include "modules/tree_newton/pose_edge.hpp"
 
 namespace km {

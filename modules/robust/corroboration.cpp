@@ -6,8 +6,8 @@
 #include <limits>
 #include <numbers>
 
-#include "modules/core/covariance.hpp"
-#include "modules/core/lie.hpp"
+#include "modules/core/data/covariance.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "modules/outlier_rejection/chi_squared.hpp"
 #include "modules/robust/closure_places.hpp"
 #include "modules/robust/cycle_mixture.hpp"

@@ -6,7 +6,7 @@
 #include <map>
 #include <optional>
 
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "modules/robust/cycle_mixture.hpp"
 #include "modules/robust/odometry_cycles.hpp"
 #include "modules/robust/robust_schedule.hpp"

@@ -3,8 +3,8 @@
 #include <span>
 #include <vector>
 
-#include "modules/core/geometry.hpp"
-#include "modules/core/position_fix.hpp"
+#include "modules/core/data/position_fix.hpp"
+#include "modules/core/geometry/geometry.hpp"
 #include "modules/tree_newton/pose_edge.hpp"
 
 namespace km {

@@ -6,7 +6,7 @@
 #include <numeric>
 #include <stdexcept>
 
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 
 namespace km {
 namespace {

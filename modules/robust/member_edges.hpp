@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "modules/core/closure_verdicts.hpp"
+#include "modules/core/data/closure_verdicts.hpp"
 #include "modules/robust/corroboration.hpp"
 #include "modules/robust/edge_weights.hpp"
 #include "modules/robust/session_graph.hpp"

@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "modules/core/closure_verdicts.hpp"
-#include "modules/core/geometry.hpp"
+#include "modules/core/data/closure_verdicts.hpp"
+#include "modules/core/geometry/geometry.hpp"
 #include "modules/core/ids.hpp"
 #include "modules/robust/closure_noise.hpp"
 
@@ -51,7 +51,7 @@ class MemberSolver {
   /// Own poses in the frame of the session, as the team has last accepted them; at first the start.
   [[nodiscard]] virtual const std::vector<SE3>& poses() const = 0;
   /// Covariances of poses() relative to the origin of the session, once it is done, as tangent
-  /// vectors [rotation; translation] at the pose (see core/covariance.hpp). Empty if the solver
+  /// vectors [rotation; translation] at the pose (see core/data/covariance.hpp). Empty if the solver
   /// computes none.
   [[nodiscard]] virtual std::vector<Matrix6> covariances() const { return {}; }
   [[nodiscard]] virtual SolverState state() const = 0;

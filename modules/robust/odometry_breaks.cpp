@@ -6,7 +6,7 @@
 #include <set>
 #include <utility>
 
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "modules/outlier_rejection/chi_squared.hpp"
 #include "modules/robust/closure_places.hpp"
 #include "modules/robust/odometry_cycles.hpp"

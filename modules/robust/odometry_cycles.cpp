@@ -6,7 +6,7 @@
 #include <numbers>
 #include <type_traits>
 
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 
 namespace km {
 namespace {

@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
-#include "modules/core/covariance.hpp"
-#include "modules/core/geometry.hpp"
+#include "modules/core/data/covariance.hpp"
+#include "modules/core/geometry/geometry.hpp"
 #include "modules/tree_newton/pose_edge.hpp"
 
 namespace km {

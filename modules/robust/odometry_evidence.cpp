@@ -10,7 +10,7 @@
 #include <set>
 #include <utility>
 
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "modules/robust/closure_places.hpp"
 #include "modules/robust/corroboration.hpp"
 #include "modules/robust/cycle_mixture.hpp"

@@ -6,7 +6,7 @@
 #include <set>
 #include <tuple>
 
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "modules/robust/closure_places.hpp"
 #include "modules/robust/frame_alignment.hpp"
 

@@ -7,10 +7,10 @@
 #include <optional>
 #include <span>
 
-#include "modules/core/geometry.hpp"
+#include "modules/core/data/single_pose.hpp"
+#include "modules/core/geometry/geometry.hpp"
+#include "modules/core/geometry/precision.hpp"
 #include "modules/core/ids.hpp"
-#include "modules/core/precision.hpp"
-#include "modules/core/single_pose.hpp"
 #include "modules/robust/session_graph.hpp"
 #include "modules/tree_newton/pose_edge.hpp"
 

@@ -5,9 +5,9 @@
 #include <optional>
 #include <vector>
 
-#include "modules/core/geometry.hpp"
+#include "modules/core/data/pose_graph.hpp"
+#include "modules/core/geometry/geometry.hpp"
 #include "modules/core/ids.hpp"
-#include "modules/core/pose_graph.hpp"
 #include "modules/robust/closure_noise.hpp"
 #include "modules/tree_newton/pose_edge.hpp"
 #include "modules/tree_newton/vertical_prior.hpp"

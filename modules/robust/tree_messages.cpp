@@ -4,7 +4,7 @@
 #include <functional>
 #include <iterator>
 
-#include "modules/core/byte_archive.hpp"
+#include "modules/core/data/byte_archive.hpp"
 #include "modules/robust/odometry_evidence.hpp"
 
 namespace km {

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "modules/core/bytes.hpp"
+#include "modules/core/io/bytes.hpp"
 #include "modules/objects/object_file.hpp"
 
 namespace km {

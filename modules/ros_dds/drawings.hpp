@@ -5,8 +5,8 @@
 #include <optional>
 #include <span>
 
-#include "modules/core/closure_verdicts.hpp"
-#include "modules/core/label_palette.hpp"
+#include "modules/core/data/closure_verdicts.hpp"
+#include "modules/core/map/label_palette.hpp"
 #include "modules/mesh/labelled_mesh.hpp"
 #include "modules/objects/map_object.hpp"
 #include "modules/recordings/ros_messages.hpp"

@@ -4,7 +4,7 @@
 #include <exception>
 #include <utility>
 
-#include "modules/core/write_file.hpp"
+#include "modules/core/io/write_file.hpp"
 #include "modules/recordings/ros_messages.hpp"
 
 namespace km {

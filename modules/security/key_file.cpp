@@ -8,8 +8,8 @@
 #include <cstdio>
 #include <stdexcept>
 
-#include "modules/core/input_file.hpp"
-#include "modules/core/write_file.hpp"
+#include "modules/core/io/input_file.hpp"
+#include "modules/core/io/write_file.hpp"
 
 namespace km {
 namespace {

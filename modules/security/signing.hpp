@@ -2,7 +2,7 @@
 
 #include <string_view>
 
-#include "modules/core/bytes.hpp"
+#include "modules/core/io/bytes.hpp"
 #include "modules/security/key_types.hpp"
 
 namespace km {

@@ -5,7 +5,7 @@
 #include <tuple>
 
 #include "modules/core/config.hpp"
-#include "modules/core/folder_name.hpp"
+#include "modules/core/io/folder_name.hpp"
 #include "modules/security/key_file.hpp"
 #include "modules/security/signing.hpp"
 

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "modules/core/geometry.hpp"
+#include "modules/core/geometry/geometry.hpp"
 #include "modules/core/ids.hpp"
 #include "modules/semantic_mapping/block_map.hpp"
 #include "modules/semantic_mapping/depth_view.hpp"

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "modules/core/color_image.hpp"
+#include "modules/core/camera/color_image.hpp"
 #include "modules/core/ids.hpp"
 #include "modules/semantic_mapping/voxel_labels.hpp"
 

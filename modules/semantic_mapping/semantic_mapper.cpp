@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "modules/core/measurement_limits.hpp"
+#include "modules/core/data/measurement_limits.hpp"
 #include "modules/mesh/coarse_view.hpp"
 #include "modules/semantic_mapping/block_fusion.hpp"
 #include "modules/semantic_mapping/block_map.hpp"

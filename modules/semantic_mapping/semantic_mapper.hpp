@@ -4,12 +4,12 @@
 #include <cstdint>
 #include <memory>
 
-#include "modules/core/camera.hpp"
-#include "modules/core/color_image.hpp"
-#include "modules/core/frame.hpp"
-#include "modules/core/geometry.hpp"
+#include "modules/core/camera/camera.hpp"
+#include "modules/core/camera/color_image.hpp"
+#include "modules/core/camera/frame.hpp"
+#include "modules/core/geometry/geometry.hpp"
 #include "modules/core/ids.hpp"
-#include "modules/core/label_palette.hpp"
+#include "modules/core/map/label_palette.hpp"
 #include "modules/mesh/map_mesh.hpp"
 #include "modules/semantic_mapping/incremental_mesh.hpp"
 #include "modules/semantic_mapping/semantic_mapping_config.hpp"

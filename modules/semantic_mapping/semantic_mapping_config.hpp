@@ -4,8 +4,8 @@
 #include <optional>
 #include <span>
 
+#include "modules/core/camera/frame.hpp"
 #include "modules/core/config.hpp"
-#include "modules/core/frame.hpp"
 #include "modules/semantic_mapping/block_map.hpp"
 
 namespace km {

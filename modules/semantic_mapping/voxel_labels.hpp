@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "modules/core/label_palette.hpp"
+#include "modules/core/map/label_palette.hpp"
 
 namespace km {
 

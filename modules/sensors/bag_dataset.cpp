@@ -5,9 +5,9 @@
 #include <sstream>
 #include <utility>
 
-#include "modules/core/imu_limits.hpp"
-#include "modules/core/text_rows.hpp"
-#include "modules/core/text_table.hpp"
+#include "modules/core/data/imu_limits.hpp"
+#include "modules/core/io/text_rows.hpp"
+#include "modules/core/io/text_table.hpp"
 #include "modules/recordings/ros_messages.hpp"
 
 namespace km {

@@ -2,7 +2,7 @@
 
 #include <array>
 
-#include "modules/core/text_table.hpp"
+#include "modules/core/io/text_table.hpp"
 
 namespace km {
 

@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "modules/core/camera.hpp"
-#include "modules/core/fault_report.hpp"
-#include "modules/core/frame.hpp"
+#include "modules/core/camera/camera.hpp"
+#include "modules/core/camera/frame.hpp"
+#include "modules/core/data/fault_report.hpp"
 #include "modules/sensors/load_shedding.hpp"
 
 namespace km {

@@ -10,11 +10,11 @@
 #include <utility>
 #include <variant>
 
-#include "modules/core/calibration_limits.hpp"
-#include "modules/core/image_size.hpp"
-#include "modules/core/imu_limits.hpp"
-#include "modules/core/input_file.hpp"
-#include "modules/core/text_table.hpp"
+#include "modules/core/camera/calibration_limits.hpp"
+#include "modules/core/camera/image_size.hpp"
+#include "modules/core/data/imu_limits.hpp"
+#include "modules/core/io/input_file.hpp"
+#include "modules/core/io/text_table.hpp"
 #include "modules/sensors/text_file.hpp"
 
 namespace km {

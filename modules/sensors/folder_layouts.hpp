@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "modules/core/camera.hpp"
-#include "modules/core/camera_calibration.hpp"
-#include "modules/core/frame.hpp"
-#include "modules/core/label_palette.hpp"
+#include "modules/core/camera/camera.hpp"
+#include "modules/core/camera/camera_calibration.hpp"
+#include "modules/core/camera/frame.hpp"
+#include "modules/core/map/label_palette.hpp"
 #include "modules/sensors/dataset_reader.hpp"
 #include "modules/sensors/image_file.hpp"
 #include "modules/sensors/sample_streams.hpp"

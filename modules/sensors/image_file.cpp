@@ -6,8 +6,8 @@
 #include <cstdint>
 #include <utility>
 
-#include "modules/core/image_size.hpp"
-#include "modules/core/input_file.hpp"
+#include "modules/core/camera/image_size.hpp"
+#include "modules/core/io/input_file.hpp"
 
 namespace km {
 namespace {

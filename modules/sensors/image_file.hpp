@@ -7,10 +7,10 @@
 #include <string>
 #include <string_view>
 
-#include "modules/core/camera.hpp"
-#include "modules/core/color_image.hpp"
-#include "modules/core/frame.hpp"
-#include "modules/core/label_palette.hpp"
+#include "modules/core/camera/camera.hpp"
+#include "modules/core/camera/color_image.hpp"
+#include "modules/core/camera/frame.hpp"
+#include "modules/core/map/label_palette.hpp"
 #include "modules/images/image_codec.hpp"
 #include "modules/sensors/dataset_reader.hpp"
 

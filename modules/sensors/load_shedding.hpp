@@ -3,7 +3,7 @@
 #include <deque>
 #include <optional>
 
-#include "modules/core/processing_load.hpp"
+#include "modules/core/data/processing_load.hpp"
 #include "modules/core/stamp.hpp"
 
 namespace km {

@@ -6,10 +6,10 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "modules/core/calibration_limits.hpp"
-#include "modules/core/lie.hpp"
-#include "modules/core/text_rows.hpp"
-#include "modules/core/text_table.hpp"
+#include "modules/core/camera/calibration_limits.hpp"
+#include "modules/core/geometry/lie.hpp"
+#include "modules/core/io/text_rows.hpp"
+#include "modules/core/io/text_table.hpp"
 #include "modules/sensors/sensor_messages.hpp"
 
 namespace km {

@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "modules/core/geometry.hpp"
+#include "modules/core/geometry/geometry.hpp"
 #include "modules/recordings/bag_summary.hpp"
 #include "modules/recordings/ros_camera.hpp"
 #include "modules/recordings/ros_messages.hpp"

@@ -5,10 +5,10 @@
 #include <iterator>
 #include <utility>
 
-#include "modules/core/covariance.hpp"
-#include "modules/core/lie.hpp"
+#include "modules/core/data/covariance.hpp"
+#include "modules/core/geometry/lie.hpp"
+#include "modules/core/io/text_table.hpp"
 #include "modules/core/quantile.hpp"
-#include "modules/core/text_table.hpp"
 #include "modules/sensors/text_file.hpp"
 
 namespace km {

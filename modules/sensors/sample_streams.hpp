@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "modules/core/frame.hpp"
-#include "modules/core/stamped_pose.hpp"
+#include "modules/core/camera/frame.hpp"
+#include "modules/core/data/stamped_pose.hpp"
 #include "modules/recordings/ros_messages.hpp"
 #include "modules/sensors/dataset_reader.hpp"
 

@@ -9,8 +9,8 @@
 #include <optional>
 #include <utility>
 
-#include "modules/core/image_size.hpp"
-#include "modules/core/text_rows.hpp"
+#include "modules/core/camera/image_size.hpp"
+#include "modules/core/io/text_rows.hpp"
 
 namespace km {
 namespace {

@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-#include "modules/core/camera.hpp"
+#include "modules/core/camera/camera.hpp"
 #include "modules/recordings/bag_reader.hpp"
 #include "modules/recordings/ros_messages.hpp"
 #include "modules/sensors/image_file.hpp"

@@ -6,8 +6,8 @@
 #include <iterator>
 #include <utility>
 
+#include "modules/core/io/text_table.hpp"
 #include "modules/core/quantile.hpp"
-#include "modules/core/text_table.hpp"
 #include "modules/recordings/bag_summary.hpp"
 
 namespace km {

@@ -3,7 +3,7 @@
 #include <cctype>
 #include <sstream>
 
-#include "modules/core/input_file.hpp"
+#include "modules/core/io/input_file.hpp"
 #include "modules/sensors/stream_stamps.hpp"
 
 namespace km {

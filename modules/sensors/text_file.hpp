@@ -7,8 +7,8 @@
 #include <variant>
 #include <vector>
 
+#include "modules/core/io/text_rows.hpp"
 #include "modules/core/stamp.hpp"
-#include "modules/core/text_rows.hpp"
 #include "modules/sensors/dataset_reader.hpp"
 
 namespace km {

@@ -9,8 +9,8 @@
 #include <utility>
 
 #include "modules/core/config.hpp"
+#include "modules/core/io/text_table.hpp"
 #include "modules/core/quantile.hpp"
-#include "modules/core/text_table.hpp"
 #include "modules/recordings/bag_summary.hpp"
 
 namespace km {

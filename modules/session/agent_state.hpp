@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "modules/core/closure_verdicts.hpp"
-#include "modules/core/team_links.hpp"
-#include "modules/core/team_solution.hpp"
+#include "modules/core/data/closure_verdicts.hpp"
+#include "modules/core/data/team_links.hpp"
+#include "modules/core/data/team_solution.hpp"
 #include "modules/robust/fix_placement.hpp"
 #include "modules/robust/lone_solution.hpp"
 #include "modules/session/closure_decisions.hpp"

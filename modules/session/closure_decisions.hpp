@@ -5,7 +5,7 @@
 #include <span>
 #include <utility>
 
-#include "modules/core/closure_verdicts.hpp"
+#include "modules/core/data/closure_verdicts.hpp"
 #include "modules/core/ids.hpp"
 #include "modules/robust/closure_places.hpp"
 #include "modules/session/team_messages.hpp"

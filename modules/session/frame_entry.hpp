@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "modules/core/geometry.hpp"
+#include "modules/core/geometry/geometry.hpp"
 #include "modules/core/ids.hpp"
 #include "modules/robust/frame_alignment.hpp"
 #include "modules/tree_newton/pose_edge.hpp"

@@ -6,9 +6,9 @@
 #include <optional>
 #include <stdexcept>
 
-#include "modules/core/bytes.hpp"
 #include "modules/core/config.hpp"
-#include "modules/core/measurement_limits.hpp"
+#include "modules/core/data/measurement_limits.hpp"
+#include "modules/core/io/bytes.hpp"
 
 namespace km {
 namespace {

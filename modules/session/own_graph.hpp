@@ -5,9 +5,9 @@
 #include <span>
 #include <vector>
 
-#include "modules/core/odometry.hpp"
-#include "modules/core/pose_graph.hpp"
-#include "modules/core/position_fix.hpp"
+#include "modules/core/data/odometry.hpp"
+#include "modules/core/data/pose_graph.hpp"
+#include "modules/core/data/position_fix.hpp"
 #include "modules/robust/closure_places.hpp"
 #include "modules/robust/odometry_noise.hpp"
 #include "modules/session/team_messages.hpp"

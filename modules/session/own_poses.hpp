@@ -3,7 +3,7 @@
 #include <utility>
 #include <vector>
 
-#include "modules/core/geometry.hpp"
+#include "modules/core/geometry/geometry.hpp"
 #include "modules/core/ids.hpp"
 #include "modules/session/own_graph.hpp"
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "modules/core/team_solution.hpp"
+#include "modules/core/data/team_solution.hpp"
 #include "modules/session/agent_state.hpp"
 
 namespace km {

@@ -5,8 +5,8 @@
 #include <limits>
 #include <utility>
 
-#include "modules/core/byte_archive.hpp"
-#include "modules/core/team_links.hpp"
+#include "modules/core/data/byte_archive.hpp"
+#include "modules/core/data/team_links.hpp"
 #include "modules/session/team_plan.hpp"
 
 namespace km {

@@ -9,12 +9,12 @@
 #include <variant>
 #include <vector>
 
-#include "modules/core/closure_verdicts.hpp"
-#include "modules/core/geometry.hpp"
+#include "modules/core/data/closure_verdicts.hpp"
+#include "modules/core/data/single_pose.hpp"
+#include "modules/core/geometry/geometry.hpp"
+#include "modules/core/geometry/precision.hpp"
 #include "modules/core/ids.hpp"
-#include "modules/core/precision.hpp"
 #include "modules/core/robot_identity.hpp"
-#include "modules/core/single_pose.hpp"
 #include "modules/session/pgo_method.hpp"
 
 namespace km {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <iterator>
 
-#include "modules/core/text_table.hpp"
+#include "modules/core/io/text_table.hpp"
 #include "modules/session/team_message_bytes.hpp"
 
 namespace km {

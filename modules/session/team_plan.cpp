@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-#include "modules/core/precision.hpp"
+#include "modules/core/geometry/precision.hpp"
 #include "modules/session/team_tree.hpp"
 
 namespace km {

@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "modules/core/team_links.hpp"
+#include "modules/core/data/team_links.hpp"
 #include "modules/robust/session_graph.hpp"
 #include "modules/session/team_messages.hpp"
 #include "modules/tree_newton/pose_edge.hpp"

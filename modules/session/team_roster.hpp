@@ -5,7 +5,7 @@
 #include <optional>
 #include <set>
 
-#include "modules/core/team_links.hpp"
+#include "modules/core/data/team_links.hpp"
 #include "modules/session/pgo_method.hpp"
 #include "modules/session/team_messages.hpp"
 

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "modules/core/team_links.hpp"
+#include "modules/core/data/team_links.hpp"
 
 namespace km {
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "modules/core/ids.hpp"
-#include "modules/core/label_palette.hpp"
+#include "modules/core/map/label_palette.hpp"
 #include "modules/mesh/labelled_mesh.hpp"
 #include "modules/semantic_mapping/marching_cubes.hpp"
 

@@ -4,7 +4,7 @@
 #include <Eigen/SparseCore>
 #include <stdexcept>
 
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 
 namespace km {
 namespace {

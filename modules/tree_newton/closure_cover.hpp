@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "modules/core/pose_graph.hpp"
+#include "modules/core/data/pose_graph.hpp"
 
 namespace km {
 

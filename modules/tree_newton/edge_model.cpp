@@ -1,6 +1,6 @@
 #include "modules/tree_newton/edge_model.hpp"
 
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 
 namespace km {
 namespace {

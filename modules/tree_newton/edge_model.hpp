@@ -1,7 +1,7 @@
 #pragma once
 
-#include "modules/core/geometry.hpp"
-#include "modules/core/precision.hpp"
+#include "modules/core/geometry/geometry.hpp"
+#include "modules/core/geometry/precision.hpp"
 #include "modules/tree_newton/vertical_prior.hpp"
 
 namespace km {

@@ -5,7 +5,7 @@
 
 #include <tuple>
 
-#include "modules/core/measurement_limits.hpp"
+#include "modules/core/data/measurement_limits.hpp"
 
 namespace km {
 namespace {

@@ -5,9 +5,9 @@
 #include <span>
 #include <vector>
 
-#include "modules/core/geometry.hpp"
-#include "modules/core/pose_graph.hpp"
-#include "modules/core/precision.hpp"
+#include "modules/core/data/pose_graph.hpp"
+#include "modules/core/geometry/geometry.hpp"
+#include "modules/core/geometry/precision.hpp"
 
 namespace km {
 

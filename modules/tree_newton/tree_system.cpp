@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "modules/core/precision.hpp"
+#include "modules/core/geometry/precision.hpp"
 
 namespace km {
 namespace {

@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
+#include "modules/core/data/single_pose.hpp"
 #include "modules/core/ids.hpp"
-#include "modules/core/single_pose.hpp"
 #include "modules/tree_newton/block_matrix.hpp"
 #include "modules/tree_newton/edge_model.hpp"
 

@@ -2,9 +2,9 @@
 
 #include <optional>
 
-#include "modules/core/camera.hpp"
-#include "modules/core/occupancy_grid.hpp"
-#include "modules/core/tracked_image.hpp"
+#include "modules/core/camera/camera.hpp"
+#include "modules/core/camera/tracked_image.hpp"
+#include "modules/core/map/occupancy_grid.hpp"
 #include "modules/objects/map_object.hpp"
 #include "modules/view/view_update.hpp"
 

@@ -6,7 +6,7 @@
 #include <utility>
 #include <variant>
 
-#include "modules/core/pending_messages.hpp"
+#include "modules/core/data/pending_messages.hpp"
 #include "modules/view/view_update.hpp"
 
 namespace km {

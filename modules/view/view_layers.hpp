@@ -8,7 +8,7 @@
 #include <optional>
 #include <vector>
 
-#include "modules/core/occupancy_grid.hpp"
+#include "modules/core/map/occupancy_grid.hpp"
 #include "modules/objects/map_object.hpp"
 #include "modules/view/view_update.hpp"
 

@@ -9,13 +9,13 @@
 #include <tuple>
 #include <vector>
 
-#include "modules/core/closure_verdicts.hpp"
-#include "modules/core/geometry.hpp"
+#include "modules/core/data/closure_verdicts.hpp"
+#include "modules/core/data/odometry.hpp"
+#include "modules/core/data/pose_changes.hpp"
+#include "modules/core/data/pose_graph.hpp"
+#include "modules/core/data/robot_sample.hpp"
+#include "modules/core/geometry/geometry.hpp"
 #include "modules/core/ids.hpp"
-#include "modules/core/odometry.hpp"
-#include "modules/core/pose_changes.hpp"
-#include "modules/core/pose_graph.hpp"
-#include "modules/core/robot_sample.hpp"
 #include "modules/view/view_update.hpp"
 
 namespace km {

@@ -3,8 +3,8 @@
 #include <stdexcept>
 #include <utility>
 
-#include "modules/core/byte_archive.hpp"
-#include "modules/core/single_pose.hpp"
+#include "modules/core/data/byte_archive.hpp"
+#include "modules/core/data/single_pose.hpp"
 
 namespace km {
 namespace {

@@ -10,12 +10,12 @@
 #include <variant>
 #include <vector>
 
-#include "modules/core/closure_verdicts.hpp"
-#include "modules/core/geometry.hpp"
+#include "modules/core/data/closure_verdicts.hpp"
+#include "modules/core/data/pose_graph.hpp"
+#include "modules/core/data/robot_sample.hpp"
+#include "modules/core/geometry/geometry.hpp"
 #include "modules/core/ids.hpp"
-#include "modules/core/label_palette.hpp"
-#include "modules/core/pose_graph.hpp"
-#include "modules/core/robot_sample.hpp"
+#include "modules/core/map/label_palette.hpp"
 #include "modules/core/stamp.hpp"
 #include "modules/mesh/mesh_chunks.hpp"
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "modules/core/covariance.hpp"
+#include "modules/core/data/covariance.hpp"
 #include "modules/vio/keyframe_rule.hpp"
 
 namespace km {

@@ -2,9 +2,9 @@
 
 #include <optional>
 
-#include "modules/core/camera.hpp"
-#include "modules/core/frame.hpp"
-#include "modules/core/odometry.hpp"
+#include "modules/core/camera/camera.hpp"
+#include "modules/core/camera/frame.hpp"
+#include "modules/core/data/odometry.hpp"
 #include "modules/vio/vio.hpp"
 #include "modules/vio/vio_config.hpp"
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <utility>
 
-#include "modules/core/depth_lookup.hpp"
+#include "modules/core/camera/depth_lookup.hpp"
 
 namespace km {
 namespace {

@@ -6,8 +6,8 @@
 #include <random>
 #include <vector>
 
-#include "modules/core/camera.hpp"
-#include "modules/core/frame.hpp"
+#include "modules/core/camera/camera.hpp"
+#include "modules/core/camera/frame.hpp"
 #include "modules/vio/feature_detector.hpp"
 #include "modules/vio/image_pyramid.hpp"
 #include "modules/vio/patches.hpp"

@@ -4,8 +4,8 @@
 #include <span>
 #include <vector>
 
-#include "modules/core/camera.hpp"
-#include "modules/core/covariance.hpp"
+#include "modules/core/camera/camera.hpp"
+#include "modules/core/data/covariance.hpp"
 #include "modules/vio/estimate_watch.hpp"
 #include "modules/vio/gyro_noise_scale.hpp"
 #include "modules/vio/motion_prior.hpp"

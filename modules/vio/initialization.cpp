@@ -7,7 +7,7 @@
 #include <optional>
 #include <stdexcept>
 
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "modules/vio/motion_prior.hpp"
 #include "modules/vio/rest_detector.hpp"
 #include "modules/vio/window.hpp"

@@ -3,7 +3,7 @@
 #include <span>
 #include <vector>
 
-#include "modules/core/camera.hpp"
+#include "modules/core/camera/camera.hpp"
 #include "modules/vio/fixed_lag_smoother.hpp"
 
 namespace km {

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "modules/core/covariance.hpp"
-#include "modules/core/measurement_limits.hpp"
+#include "modules/core/data/covariance.hpp"
+#include "modules/core/data/measurement_limits.hpp"
 
 namespace km {
 namespace {

@@ -2,8 +2,8 @@
 
 #include <optional>
 
-#include "modules/core/geometry.hpp"
-#include "modules/core/odometry.hpp"
+#include "modules/core/data/odometry.hpp"
+#include "modules/core/geometry/geometry.hpp"
 #include "modules/vio/vio_config.hpp"
 
 namespace km {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 
 namespace km {
 namespace {

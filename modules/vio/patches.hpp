@@ -4,7 +4,7 @@
 #include <opencv2/core/mat.hpp>
 #include <optional>
 
-#include "modules/core/camera.hpp"
+#include "modules/core/camera/camera.hpp"
 
 namespace km {
 

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 
 namespace km {
 namespace {

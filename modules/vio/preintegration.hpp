@@ -3,10 +3,10 @@
 #include <Eigen/Core>
 #include <span>
 
-#include "modules/core/camera.hpp"
-#include "modules/core/frame.hpp"
-#include "modules/core/geometry.hpp"
-#include "modules/core/odometry.hpp"
+#include "modules/core/camera/camera.hpp"
+#include "modules/core/camera/frame.hpp"
+#include "modules/core/data/odometry.hpp"
+#include "modules/core/geometry/geometry.hpp"
 
 namespace km {
 

@@ -2,9 +2,9 @@
 
 #include <optional>
 
-#include "modules/core/camera.hpp"
-#include "modules/core/geometry.hpp"
-#include "modules/core/odometry.hpp"
+#include "modules/core/camera/camera.hpp"
+#include "modules/core/data/odometry.hpp"
+#include "modules/core/geometry/geometry.hpp"
 #include "modules/vio/preintegration.hpp"
 
 namespace km {

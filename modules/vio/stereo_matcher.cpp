@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "modules/core/depth_lookup.hpp"
+#include "modules/core/camera/depth_lookup.hpp"
 #include "modules/vio/patches.hpp"
 
 namespace km {

@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "modules/core/camera.hpp"
-#include "modules/core/frame.hpp"
+#include "modules/core/camera/camera.hpp"
+#include "modules/core/camera/frame.hpp"
 #include "modules/vio/image_pyramid.hpp"
 #include "modules/vio/tracker_config.hpp"
 

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <limits>
 
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 
 namespace km {
 namespace {

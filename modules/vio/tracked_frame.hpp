@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "modules/core/geometry.hpp"
+#include "modules/core/geometry/geometry.hpp"
 #include "modules/core/stamp.hpp"
 
 namespace km {

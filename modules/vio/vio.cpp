@@ -6,10 +6,10 @@
 #include <limits>
 #include <utility>
 
-#include "modules/core/covariance.hpp"
-#include "modules/core/depth_lookup.hpp"
-#include "modules/core/imu_limits.hpp"
-#include "modules/core/lie.hpp"
+#include "modules/core/camera/depth_lookup.hpp"
+#include "modules/core/data/covariance.hpp"
+#include "modules/core/data/imu_limits.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "modules/vio/keyframe_rule.hpp"
 #include "modules/vio/motion_prior.hpp"
 

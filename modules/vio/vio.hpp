@@ -3,9 +3,9 @@
 #include <optional>
 #include <vector>
 
-#include "modules/core/camera.hpp"
-#include "modules/core/frame.hpp"
-#include "modules/core/odometry.hpp"
+#include "modules/core/camera/camera.hpp"
+#include "modules/core/camera/frame.hpp"
+#include "modules/core/data/odometry.hpp"
 #include "modules/vio/estimate_watch.hpp"
 #include "modules/vio/feature_tracker.hpp"
 #include "modules/vio/fixed_lag_smoother.hpp"

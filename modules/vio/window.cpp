@@ -6,8 +6,8 @@
 #include <iterator>
 #include <utility>
 
-#include "modules/core/lie.hpp"
-#include "modules/core/symmetric_eigen.hpp"
+#include "modules/core/geometry/lie.hpp"
+#include "modules/core/geometry/symmetric_eigen.hpp"
 
 namespace km {
 

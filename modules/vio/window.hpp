@@ -7,10 +7,10 @@
 #include <span>
 #include <vector>
 
-#include "modules/core/camera_calibration.hpp"
-#include "modules/core/frame.hpp"
-#include "modules/core/geometry.hpp"
-#include "modules/core/odometry.hpp"
+#include "modules/core/camera/camera_calibration.hpp"
+#include "modules/core/camera/frame.hpp"
+#include "modules/core/data/odometry.hpp"
+#include "modules/core/geometry/geometry.hpp"
 #include "modules/vio/residuals.hpp"
 #include "modules/vio/tracked_frame.hpp"
 

@@ -9,8 +9,8 @@
 #include <type_traits>
 #include <vector>
 
-#include "modules/core/bytes.hpp"
 #include "modules/core/decoded.hpp"
+#include "modules/core/io/bytes.hpp"
 #include "modules/core/robot_identity.hpp"
 
 namespace km {

@@ -18,7 +18,7 @@
 #include <system_error>
 #include <vector>
 
-#include "modules/core/descriptor.hpp"
+#include "modules/core/io/descriptor.hpp"
 
 namespace km {
 namespace {

@@ -11,7 +11,7 @@
 #include <span>
 #include <string>
 
-#include "modules/core/pending_messages.hpp"
+#include "modules/core/data/pending_messages.hpp"
 #include "runtime/dds/fair_queue.hpp"
 #include "runtime/dds/outgoing_topic.hpp"
 #include "runtime/dds/sequence_tracker.hpp"

@@ -21,8 +21,8 @@
 #include <system_error>
 
 #include "modules/core/config.hpp"
-#include "modules/core/descriptor.hpp"
-#include "modules/core/xml_text.hpp"
+#include "modules/core/io/descriptor.hpp"
+#include "modules/core/io/xml_text.hpp"
 #include "runtime/log.hpp"
 #include "runtime/thread.hpp"
 

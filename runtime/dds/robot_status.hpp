@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "modules/core/data/team_links.hpp"
 #include "modules/core/ids.hpp"
-#include "modules/core/team_links.hpp"
 #include "runtime/dds/codec.hpp"
 #include "runtime/node.hpp"
 #include "runtime/overlay/overlay_message.hpp"

@@ -9,7 +9,7 @@
 #include <string>
 #include <utility>
 
-#include "modules/core/bytes.hpp"
+#include "modules/core/io/bytes.hpp"
 #include "modules/security/team_seal.hpp"
 #include "runtime/dds/entity.hpp"
 

@@ -1,6 +1,6 @@
 #include "runtime/dds/traffic.hpp"
 
-#include "modules/core/text_rows.hpp"
+#include "modules/core/io/text_rows.hpp"
 
 namespace km {
 namespace {

@@ -6,12 +6,12 @@
 #include <cmath>
 #include <optional>
 
-#include "modules/core/covariance.hpp"
-#include "modules/core/covariance_root.hpp"
-#include "modules/core/geometry.hpp"
+#include "modules/core/data/covariance.hpp"
+#include "modules/core/data/keyframe.hpp"
+#include "modules/core/data/measurement_limits.hpp"
+#include "modules/core/geometry/covariance_root.hpp"
+#include "modules/core/geometry/geometry.hpp"
 #include "modules/core/ids.hpp"
-#include "modules/core/keyframe.hpp"
-#include "modules/core/measurement_limits.hpp"
 
 namespace km {
 

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "modules/core/data/team_links.hpp"
 #include "modules/core/robot_identity.hpp"
-#include "modules/core/team_links.hpp"
 #include "runtime/overlay/endorsement.hpp"
 #include "runtime/overlay/overlay_message.hpp"
 

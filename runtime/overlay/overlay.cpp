@@ -4,7 +4,7 @@
 #include <iterator>
 #include <memory>
 
-#include "modules/core/bytes.hpp"
+#include "modules/core/io/bytes.hpp"
 
 namespace km {
 namespace {

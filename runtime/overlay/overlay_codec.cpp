@@ -3,7 +3,7 @@
 #include <memory>
 #include <utility>
 
-#include "modules/core/bytes.hpp"
+#include "modules/core/io/bytes.hpp"
 
 namespace km {
 namespace {

@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "modules/core/team_links.hpp"
+#include "modules/core/data/team_links.hpp"
 #include "runtime/clock.hpp"
 #include "runtime/dds/bridge.hpp"
 #include "runtime/dds/robot_status.hpp"

@@ -1,5 +1,5 @@
 #include "apps/robot/inspect.hpp"
-#include "modules/core/input_file.hpp"
+#include "modules/core/io/input_file.hpp"
 #include "modules/recordings/ros_messages.hpp"
 #include "test/support/corrupted_input.hpp"
 #include "test/support/shared_data.hpp"

@@ -1,5 +1,5 @@
 #include "apps/robot/mesh_files_node.hpp"
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "modules/mesh/mesh_file.hpp"
 #include "test/support/captured_log.hpp"
 #include "test/support/nav2_map.hpp"

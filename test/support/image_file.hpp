@@ -4,7 +4,7 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "modules/core/write_file.hpp"
+#include "modules/core/io/write_file.hpp"
 #include "modules/images/image_codec.hpp"
 
 namespace km {

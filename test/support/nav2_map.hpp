@@ -2,7 +2,7 @@
 
 #include <yaml-cpp/yaml.h>
 
-#include "modules/core/occupancy_grid.hpp"
+#include "modules/core/map/occupancy_grid.hpp"
 #include "test/support/test.hpp"
 
 namespace km {

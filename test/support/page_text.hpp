@@ -3,7 +3,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "modules/core/json.hpp"
+#include "modules/core/io/json.hpp"
 
 namespace km {
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "modules/core/occupancy_grid.hpp"
+#include "modules/core/map/occupancy_grid.hpp"
 #include "test/support/test.hpp"
 
 namespace km {

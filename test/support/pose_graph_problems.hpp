@@ -4,8 +4,8 @@
 #include <random>
 #include <vector>
 
-#include "modules/core/lie.hpp"
-#include "modules/core/precision.hpp"
+#include "modules/core/geometry/lie.hpp"
+#include "modules/core/geometry/precision.hpp"
 #include "modules/rbcd/truncated_newton.hpp"
 #include "modules/recorded_graph/g2o_io.hpp"
 #include "modules/tree_newton/chordal.hpp"

@@ -2,7 +2,7 @@
 
 #include <random>
 
-#include "modules/core/geometry.hpp"
+#include "modules/core/geometry/geometry.hpp"
 
 namespace km {
 

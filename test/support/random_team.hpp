@@ -6,8 +6,8 @@
 #include <utility>
 #include <vector>
 
-#include "modules/core/lie.hpp"
-#include "modules/core/precision.hpp"
+#include "modules/core/geometry/lie.hpp"
+#include "modules/core/geometry/precision.hpp"
 #include "test/support/random_pose.hpp"
 #include "test/support/split_graph.hpp"
 

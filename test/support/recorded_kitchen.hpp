@@ -1,7 +1,7 @@
 #pragma once
 
-#include "modules/core/lie.hpp"
-#include "modules/core/text_rows.hpp"
+#include "modules/core/geometry/lie.hpp"
+#include "modules/core/io/text_rows.hpp"
 #include "modules/sensors/node/open_folder.hpp"
 #include "modules/sensors/text_file.hpp"
 #include "test/support/temporary_folder.hpp"

@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "modules/robust/member_solver.hpp"
 #include "modules/robust/session_graph.hpp"
 #include "modules/session/team_messages.hpp"

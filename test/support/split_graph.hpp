@@ -4,8 +4,8 @@
 #include <map>
 #include <vector>
 
-#include "modules/core/odometry.hpp"
-#include "modules/core/pose_graph.hpp"
+#include "modules/core/data/odometry.hpp"
+#include "modules/core/data/pose_graph.hpp"
 
 namespace km {
 

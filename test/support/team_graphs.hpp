@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "apps/lab/pgo/team_graph_file.hpp"
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "test/support/random_pose.hpp"
 #include "test/support/shared_data.hpp"
 

@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "modules/core/precision.hpp"
+#include "modules/core/geometry/precision.hpp"
 #include "modules/session/node/team_codec.hpp"
 #include "modules/session/team_agent.hpp"
 #include "runtime/overlay/overlay.hpp"

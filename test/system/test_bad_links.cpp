@@ -1,4 +1,4 @@
-#include "modules/core/text_rows.hpp"
+#include "modules/core/io/text_rows.hpp"
 #include "test/support/own_networks.hpp"
 #include "test/support/random_team.hpp"
 #include "test/support/shared_data.hpp"

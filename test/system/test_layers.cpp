@@ -4,7 +4,7 @@
 
 // The layers of the tree, by what files include (the linker checks the rest: a pure module links
 // neither threads nor DDS nor YAML):
-//   modules/core        Eigen, nlohmann-json and the standard library
+//   modules/core        Eigen, nlohmann-json and the standard library; its rooms: those before them
 //   modules/<m>         core, its own folder, and the modules listed below
 //   runtime             core, security
 //   modules/<m>/node    its own module, core, runtime
@@ -42,6 +42,15 @@ const std::map<std::string, std::set<std::string>> kModuleUses = {
     {"objects", {"mesh", "mesh_deformation"}},
     {"view", {"images", "mesh", "objects"}},
 };
+
+// The rooms of modules/core, from the lowest.
+const std::vector<std::string> kCoreRooms = {"", "io", "geometry", "camera", "map", "data"};
+
+// "modules/core/io/json.hpp" -> 1, "modules/core/ids.hpp" -> 0.
+std::ptrdiff_t core_room(const fs::path& path) {
+  const std::string folder = path.parent_path().filename().generic_string();
+  return std::ranges::find(kCoreRooms, folder == "core" ? "" : folder) - kCoreRooms.begin();
+}
 
 std::vector<std::string> includes_of(const fs::path& file) {
   static const std::regex pattern(R"(^\s*#\s*include\s*[<"]([^>"]+)[>"])");
@@ -96,6 +105,7 @@ std::string violation(const fs::path& file, const std::string& header) {
     return joins_runtime(file) ? "" : "only folders node use runtime";
   if (is_process_level(header))
     return joins_runtime(file) ? "" : "algorithms own no threads, DDS, YAML or command lines";
+  if (own == "core" && used == "core" && core_room(header) > core_room(file)) return "a later room";
   if (used.empty() || used == "core" || used == own) return "";
   const auto allowed = kModuleUses.find(own);
   return allowed != kModuleUses.end() && allowed->second.contains(used) ? "" : "another module";
@@ -113,6 +123,18 @@ TEST_CASE("Every include obeys the layers") {
       }
     }
   CHECK(files > 20);  // run from the root of the repository
+}
+
+TEST_CASE("No room has more than 25 headers") {
+  std::map<fs::path, int> headers;
+  for (const char* root : {"modules", "runtime", "apps"})
+    for (const auto& entry : fs::recursive_directory_iterator(root))
+      if (entry.path().extension() == ".hpp") ++headers[entry.path().parent_path()];
+  CHECK(headers.size() > 20);
+  for (const auto& [room, count] : headers) {
+    CAPTURE(room);
+    CHECK(count <= 25);
+  }
 }
 
 TEST_CASE("Only tests and the laboratory include headers of the laboratory") {
@@ -207,6 +229,8 @@ TEST_CASE("The layer rules refuse what they are for") {
   CHECK(violation("apps/lab/simulation/a.cpp", "apps/lab/simulation/b.hpp").empty());
   CHECK(violation("modules/vio/node/vio_node.cpp", "runtime/node.hpp").empty());
   CHECK(violation("runtime/dds/codec.hpp", "modules/core/ids.hpp").empty());
+  CHECK(violation("modules/core/data/odometry.hpp", "modules/core/io/bytes.hpp").empty());
+  CHECK_FALSE(violation("modules/core/io/bytes.hpp", "modules/core/data/odometry.hpp").empty());
 }
 
 }  // namespace

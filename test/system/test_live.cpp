@@ -1,6 +1,6 @@
 #include "modules/recordings/ros_messages.hpp"
 #include "modules/sensors/node/rig_file.hpp"
-#include "runtime/dds/ros_publisher.hpp"
+#include "runtime/ros/ros_publisher.hpp"
 #include "test/modules/sensors/euroc_folder.hpp"
 #include "test/support/process.hpp"
 #include "test/support/shared_data.hpp"

@@ -1,7 +1,7 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/lab/pgo/team_graph_file.hpp"
-#include "modules/core/json.hpp"
+#include "modules/core/io/json.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
 #include "modules/recordings/open_bag.hpp"
 #include "modules/recordings/ros_messages.hpp"

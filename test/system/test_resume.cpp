@@ -1,5 +1,5 @@
-#include "modules/core/input_file.hpp"
-#include "modules/core/text_rows.hpp"
+#include "modules/core/io/input_file.hpp"
+#include "modules/core/io/text_rows.hpp"
 #include "modules/journal/restored_run.hpp"
 #include "modules/mesh/map_file.hpp"
 #include "test/support/process.hpp"

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <numbers>
 
-#include "modules/core/geometry.hpp"
+#include "modules/core/geometry/geometry.hpp"
 #include "modules/recorded_graph/g2o_io.hpp"
 
 namespace km {

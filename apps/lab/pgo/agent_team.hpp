@@ -5,7 +5,7 @@
 
 #include "apps/lab/pgo/round_meter.hpp"
 #include "apps/lab/pgo/team_graph.hpp"
-#include "modules/core/pose_graph.hpp"
+#include "modules/core/data/pose_graph.hpp"
 #include "modules/outlier_rejection/pcm_config.hpp"
 #include "modules/robust/member_solver.hpp"
 #include "modules/session/pose_graph_config.hpp"

@@ -10,9 +10,9 @@
 #include "apps/lab/pgo/outlier_study.hpp"
 #include "apps/lab/pgo/truth_score.hpp"
 #include "apps/stage_progress.hpp"
-#include "modules/core/input_file.hpp"
-#include "modules/core/json.hpp"
-#include "modules/core/text_table.hpp"
+#include "modules/core/io/input_file.hpp"
+#include "modules/core/io/json.hpp"
+#include "modules/core/io/text_table.hpp"
 #include "modules/evaluation/statistics.hpp"
 
 namespace km {

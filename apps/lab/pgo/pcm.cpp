@@ -6,8 +6,8 @@
 #include "apps/lab/pgo/commands.hpp"
 #include "apps/lab/pgo/pcm_run.hpp"
 #include "apps/stage_progress.hpp"
-#include "modules/core/json.hpp"
-#include "modules/core/text_table.hpp"
+#include "modules/core/io/json.hpp"
+#include "modules/core/io/text_table.hpp"
 #include "modules/evaluation/statistics.hpp"
 
 namespace km {

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "modules/core/pose_graph.hpp"
+#include "modules/core/data/pose_graph.hpp"
 #include "modules/outlier_rejection/bit_graph.hpp"
 
 namespace km {

@@ -8,7 +8,7 @@
 #include <set>
 #include <stdexcept>
 
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 
 namespace km {
 namespace {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "apps/lab/pgo/team_graph.hpp"
-#include "modules/core/precision.hpp"
+#include "modules/core/geometry/precision.hpp"
 
 namespace km {
 

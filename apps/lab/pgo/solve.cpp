@@ -11,9 +11,9 @@
 #include "apps/lab/pgo/commands.hpp"
 #include "apps/lab/pgo/solvers.hpp"
 #include "apps/lab/pgo/truth_score.hpp"
-#include "modules/core/json.hpp"
-#include "modules/core/precision.hpp"
-#include "modules/core/text_table.hpp"
+#include "modules/core/geometry/precision.hpp"
+#include "modules/core/io/json.hpp"
+#include "modules/core/io/text_table.hpp"
 #include "modules/recorded_graph/g2o_io.hpp"
 
 namespace km {

@@ -5,7 +5,7 @@
 #include <set>
 #include <stdexcept>
 
-#include "modules/core/input_file.hpp"
+#include "modules/core/io/input_file.hpp"
 #include "modules/recorded_graph/recorded_graph.hpp"
 
 namespace km {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "apps/lab/pgo/team_graph.hpp"
-#include "modules/core/precision.hpp"
+#include "modules/core/geometry/precision.hpp"
 #include "modules/recorded_graph/g2o_io.hpp"
 #include "modules/recorded_graph/jrl_io.hpp"
 

@@ -7,7 +7,7 @@
 
 #include "apps/lab/simulation/dataset/recording.hpp"
 #include "apps/output_file.hpp"
-#include "modules/core/json.hpp"
+#include "modules/core/io/json.hpp"
 
 namespace km {
 namespace {

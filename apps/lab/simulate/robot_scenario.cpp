@@ -13,7 +13,7 @@
 #include "apps/lab/simulation/motion/sensor_errors.hpp"
 #include "apps/lab/simulation/motion/vehicle_trajectory.hpp"
 #include "apps/lab/simulation/world/seeded_random.hpp"
-#include "modules/core/text_rows.hpp"
+#include "modules/core/io/text_rows.hpp"
 #include "modules/evaluation/input_row.hpp"
 
 namespace km {

@@ -11,8 +11,8 @@
 #include "apps/lab/simulation/dataset/recording.hpp"
 #include "apps/lab/simulation/motion/spline_trajectory.hpp"
 #include "apps/lab/simulation/world/world.hpp"
-#include "modules/core/camera.hpp"
-#include "modules/core/frame.hpp"
+#include "modules/core/camera/camera.hpp"
+#include "modules/core/camera/frame.hpp"
 
 namespace km {
 

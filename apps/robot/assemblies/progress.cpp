@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "modules/core/text_table.hpp"
+#include "modules/core/io/text_table.hpp"
 #include "runtime/clock.hpp"
 #include "runtime/log.hpp"
 

@@ -8,7 +8,7 @@
 #include "apps/robot/assemblies/places.hpp"
 #include "apps/robot/assemblies/robot_core.hpp"
 #include "apps/robot/run_end.hpp"
-#include "modules/core/robot_sample.hpp"
+#include "modules/core/data/robot_sample.hpp"
 
 namespace km {
 

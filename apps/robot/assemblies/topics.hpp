@@ -1,11 +1,11 @@
 #pragma once
 
-#include "modules/core/closure_verdicts.hpp"
-#include "modules/core/dense_frame.hpp"
-#include "modules/core/frame.hpp"
-#include "modules/core/occupancy_grid.hpp"
-#include "modules/core/processing_load.hpp"
-#include "modules/core/tracked_image.hpp"
+#include "modules/core/camera/frame.hpp"
+#include "modules/core/camera/tracked_image.hpp"
+#include "modules/core/data/closure_verdicts.hpp"
+#include "modules/core/data/processing_load.hpp"
+#include "modules/core/map/dense_frame.hpp"
+#include "modules/core/map/occupancy_grid.hpp"
 #include "modules/dense_sensing/dense_sensor.hpp"
 #include "modules/loop_closure/keyframe_requests.hpp"
 #include "modules/mesh/map_mesh.hpp"

@@ -4,7 +4,7 @@
 #include <variant>
 
 #include "modules/constellations/constellation_search.hpp"
-#include "modules/core/pose_graph.hpp"
+#include "modules/core/data/pose_graph.hpp"
 #include "modules/objects/map_object.hpp"
 #include "runtime/dds/peer_table.hpp"
 #include "runtime/worker_node.hpp"

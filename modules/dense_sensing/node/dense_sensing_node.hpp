@@ -3,9 +3,9 @@
 #include <atomic>
 #include <optional>
 
-#include "modules/core/dense_frame.hpp"
-#include "modules/core/odometry.hpp"
-#include "modules/core/processing_load.hpp"
+#include "modules/core/data/odometry.hpp"
+#include "modules/core/data/processing_load.hpp"
+#include "modules/core/map/dense_frame.hpp"
 #include "modules/dense_sensing/dense_sensor.hpp"
 #include "runtime/worker_node.hpp"
 

@@ -10,8 +10,8 @@
 #include <utility>
 
 #include "modules/core/config.hpp"
+#include "modules/core/io/text_table.hpp"
 #include "modules/core/quantile.hpp"
-#include "modules/core/text_table.hpp"
 
 namespace km {
 namespace {

@@ -9,8 +9,8 @@
 #include <string_view>
 #include <vector>
 
-#include "modules/core/geometry.hpp"
-#include "modules/core/label_palette.hpp"
+#include "modules/core/geometry/geometry.hpp"
+#include "modules/core/map/label_palette.hpp"
 #include "modules/evaluation/mesh/mesh_registration.hpp"
 #include "modules/evaluation/mesh/sampled_surface.hpp"
 #include "modules/mesh/labelled_mesh.hpp"

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "modules/core/geometry.hpp"
+#include "modules/core/geometry/geometry.hpp"
 #include "modules/evaluation/mesh/sampled_surface.hpp"
 #include "modules/mesh/labelled_mesh.hpp"
 

@@ -3,8 +3,8 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "modules/core/geometry.hpp"
-#include "modules/core/text_table.hpp"
+#include "modules/core/geometry/geometry.hpp"
+#include "modules/core/io/text_table.hpp"
 #include "modules/evaluation/report.hpp"
 
 namespace km {

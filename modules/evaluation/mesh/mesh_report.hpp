@@ -2,8 +2,8 @@
 
 #include <string>
 
-#include "modules/core/json.hpp"
-#include "modules/core/label_palette.hpp"
+#include "modules/core/io/json.hpp"
+#include "modules/core/map/label_palette.hpp"
 #include "modules/evaluation/mesh/mesh_error.hpp"
 
 namespace km {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "modules/core/json.hpp"
+#include "modules/core/io/json.hpp"
 #include "modules/mesh/labelled_mesh.hpp"
 #include "modules/objects/object_file.hpp"
 

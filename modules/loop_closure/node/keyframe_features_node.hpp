@@ -4,8 +4,8 @@
 #include <optional>
 #include <variant>
 
-#include "modules/core/covariance.hpp"
-#include "modules/core/odometry.hpp"
+#include "modules/core/data/covariance.hpp"
+#include "modules/core/data/odometry.hpp"
 #include "modules/loop_closure/keyframe_features.hpp"
 #include "runtime/worker_node.hpp"
 

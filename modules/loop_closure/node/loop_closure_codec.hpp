@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "modules/core/pose_graph.hpp"
+#include "modules/core/data/pose_graph.hpp"
 #include "modules/loop_closure/keyframe_requests.hpp"
 #include "modules/loop_closure/matching.hpp"
 #include "modules/loop_closure/packed_keypoints.hpp"

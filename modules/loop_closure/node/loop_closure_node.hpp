@@ -10,8 +10,8 @@
 #include <variant>
 #include <vector>
 
-#include "modules/core/keyframe.hpp"
-#include "modules/core/pose_graph.hpp"
+#include "modules/core/data/keyframe.hpp"
+#include "modules/core/data/pose_graph.hpp"
 #include "modules/loop_closure/keyframe_requests.hpp"
 #include "modules/loop_closure/peer_words.hpp"
 #include "modules/loop_closure/request_policy.hpp"

@@ -4,9 +4,9 @@
 #include <variant>
 #include <vector>
 
-#include "modules/core/dense_frame.hpp"
-#include "modules/core/label_palette.hpp"
-#include "modules/core/occupancy_grid.hpp"
+#include "modules/core/map/dense_frame.hpp"
+#include "modules/core/map/label_palette.hpp"
+#include "modules/core/map/occupancy_grid.hpp"
 #include "modules/map_2d/map_2d.hpp"
 #include "modules/map_2d/map_2d_config.hpp"
 #include "modules/map_2d/view_rays.hpp"

@@ -6,8 +6,8 @@
 #include <variant>
 #include <vector>
 
-#include "modules/core/odometry.hpp"
-#include "modules/core/pose_graph.hpp"
+#include "modules/core/data/odometry.hpp"
+#include "modules/core/data/pose_graph.hpp"
 #include "modules/mesh_deformation/mesh_corrector.hpp"
 #include "runtime/latest.hpp"
 #include "runtime/metrics.hpp"

@@ -4,7 +4,7 @@
 #include <optional>
 #include <variant>
 
-#include "modules/core/pose_graph.hpp"
+#include "modules/core/data/pose_graph.hpp"
 #include "modules/mesh_deformation/mesh_corrector.hpp"
 #include "modules/objects/object_extraction.hpp"
 #include "modules/objects/team_objects.hpp"

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "modules/core/pose_graph.hpp"
+#include "modules/core/data/pose_graph.hpp"
 #include "runtime/dds/codec.hpp"
 
 namespace km {

@@ -7,8 +7,8 @@
 #include <variant>
 #include <vector>
 
-#include "modules/core/odometry.hpp"
-#include "modules/core/pose_graph.hpp"
+#include "modules/core/data/odometry.hpp"
+#include "modules/core/data/pose_graph.hpp"
 #include "modules/outlier_rejection/pcm.hpp"
 #include "modules/outlier_rejection/witnessed_pair.hpp"
 #include "runtime/dds/peer_table.hpp"

@@ -5,7 +5,7 @@
 #include <string>
 #include <utility>
 
-#include "modules/core/median_depth.hpp"
+#include "modules/core/data/median_depth.hpp"
 #include "runtime/log.hpp"
 
 namespace km {

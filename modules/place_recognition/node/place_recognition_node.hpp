@@ -7,9 +7,9 @@
 #include <variant>
 #include <vector>
 
-#include "modules/core/covariance.hpp"
-#include "modules/core/keyframe.hpp"
-#include "modules/core/pose_graph.hpp"
+#include "modules/core/data/covariance.hpp"
+#include "modules/core/data/keyframe.hpp"
+#include "modules/core/data/pose_graph.hpp"
 #include "modules/place_recognition/bag_of_words.hpp"
 #include "modules/place_recognition/known_places.hpp"
 #include "modules/place_recognition/place_database.hpp"

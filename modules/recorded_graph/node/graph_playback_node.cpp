@@ -7,7 +7,7 @@
 #include <string>
 #include <utility>
 
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "runtime/clock.hpp"
 #include "runtime/log.hpp"
 

@@ -6,10 +6,10 @@
 #include <functional>
 #include <vector>
 
-#include "modules/core/covariance.hpp"
-#include "modules/core/keyframe.hpp"
-#include "modules/core/odometry.hpp"
-#include "modules/core/pose_graph.hpp"
+#include "modules/core/data/covariance.hpp"
+#include "modules/core/data/keyframe.hpp"
+#include "modules/core/data/odometry.hpp"
+#include "modules/core/data/pose_graph.hpp"
 #include "modules/recorded_graph/graph_playback_config.hpp"
 #include "modules/recorded_graph/recorded_graph.hpp"
 #include "runtime/worker_node.hpp"

@@ -6,8 +6,8 @@
 
 #include "modules/recordings/bag_reader.hpp"
 #include "modules/ros_dds/ros_sink.hpp"
-#include "runtime/dds/ros_publisher.hpp"
-#include "runtime/dds/ros_subscription.hpp"
+#include "runtime/ros/ros_publisher.hpp"
+#include "runtime/ros/ros_subscription.hpp"
 
 namespace km {
 

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "modules/core/text_table.hpp"
+#include "modules/core/io/text_table.hpp"
 #include "modules/images/image_codec.hpp"
 #include "modules/images/image_view.hpp"
 #include "runtime/clock.hpp"

@@ -14,9 +14,9 @@
 #include <variant>
 #include <vector>
 
-#include "modules/core/live_frames.hpp"
-#include "modules/core/occupancy_grid.hpp"
-#include "modules/core/stamped_pose.hpp"
+#include "modules/core/data/live_frames.hpp"
+#include "modules/core/data/stamped_pose.hpp"
+#include "modules/core/map/occupancy_grid.hpp"
 #include "modules/mesh/labelled_mesh.hpp"
 #include "modules/objects/map_object.hpp"
 #include "modules/recordings/ros_messages.hpp"

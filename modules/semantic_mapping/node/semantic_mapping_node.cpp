@@ -1,6 +1,6 @@
 #include "modules/semantic_mapping/node/semantic_mapping_node.hpp"
 
-#include "modules/core/text_table.hpp"
+#include "modules/core/io/text_table.hpp"
 #include "runtime/log.hpp"
 
 namespace km {

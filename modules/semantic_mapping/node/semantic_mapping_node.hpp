@@ -4,7 +4,7 @@
 #include <utility>
 #include <vector>
 
-#include "modules/core/dense_frame.hpp"
+#include "modules/core/map/dense_frame.hpp"
 #include "modules/mesh/resumed_map.hpp"
 #include "modules/semantic_mapping/semantic_mapper.hpp"
 #include "runtime/latest.hpp"

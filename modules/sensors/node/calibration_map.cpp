@@ -4,8 +4,8 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "modules/core/calibration_limits.hpp"
-#include "modules/core/text_rows.hpp"
+#include "modules/core/camera/calibration_limits.hpp"
+#include "modules/core/io/text_rows.hpp"
 #include "modules/sensors/text_file.hpp"
 #include "runtime/yaml_config.hpp"
 

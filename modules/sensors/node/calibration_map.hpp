@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "modules/core/camera.hpp"
+#include "modules/core/camera/camera.hpp"
 #include "modules/core/config.hpp"
 
 namespace YAML {

@@ -2,8 +2,8 @@
 
 #include <utility>
 
-#include "modules/core/calibration_limits.hpp"
-#include "modules/core/input_file.hpp"
+#include "modules/core/camera/calibration_limits.hpp"
+#include "modules/core/io/input_file.hpp"
 #include "modules/sensors/node/calibration_map.hpp"
 
 namespace km {

@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <stdexcept>
 
-#include "modules/core/calibration_limits.hpp"
-#include "modules/core/input_file.hpp"
+#include "modules/core/camera/calibration_limits.hpp"
+#include "modules/core/io/input_file.hpp"
 #include "modules/recordings/ros_camera.hpp"
 #include "modules/sensors/dataset_reader.hpp"
 #include "modules/sensors/node/open_folder.hpp"

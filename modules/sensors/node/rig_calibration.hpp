@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "modules/core/camera.hpp"
+#include "modules/core/camera/camera.hpp"
 #include "modules/sensors/node/calibration_map.hpp"
 
 namespace km {

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "modules/core/calibration_limits.hpp"
-#include "modules/core/camera_calibration.hpp"
+#include "modules/core/camera/calibration_limits.hpp"
+#include "modules/core/camera/camera_calibration.hpp"
 #include "modules/core/config.hpp"
 #include "modules/sensors/rig_completion.hpp"
 

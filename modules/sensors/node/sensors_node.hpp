@@ -11,7 +11,7 @@
 #include <variant>
 #include <vector>
 
-#include "modules/core/frame.hpp"
+#include "modules/core/camera/frame.hpp"
 #include "modules/sensors/dataset_reader.hpp"
 #include "modules/sensors/sensors_config.hpp"
 #include "modules/sensors/usual_numbers.hpp"

@@ -3,7 +3,7 @@
 #include <mutex>
 #include <variant>
 
-#include "modules/core/label_palette.hpp"
+#include "modules/core/map/label_palette.hpp"
 #include "modules/mesh/mesh_chunks.hpp"
 #include "modules/mesh/mesh_poses.hpp"
 #include "modules/mesh/team_mesh.hpp"

@@ -7,9 +7,9 @@
 #include <optional>
 #include <variant>
 
-#include "modules/core/camera.hpp"
-#include "modules/core/closure_verdicts.hpp"
-#include "modules/core/tracked_image.hpp"
+#include "modules/core/camera/camera.hpp"
+#include "modules/core/camera/tracked_image.hpp"
+#include "modules/core/data/closure_verdicts.hpp"
 #include "modules/mesh/chunk_schedule.hpp"
 #include "modules/view/node/view_channel_codec.hpp"
 #include "modules/view/view_config.hpp"

@@ -5,7 +5,7 @@
 #include <string>
 #include <utility>
 
-#include "modules/core/text_table.hpp"
+#include "modules/core/io/text_table.hpp"
 #include "runtime/log.hpp"
 
 namespace km {

@@ -3,8 +3,8 @@
 #include <cstddef>
 #include <variant>
 
-#include "modules/core/processing_load.hpp"
-#include "modules/core/tracked_image.hpp"
+#include "modules/core/camera/tracked_image.hpp"
+#include "modules/core/data/processing_load.hpp"
 #include "modules/vio/external_odometry.hpp"
 #include "modules/vio/vio.hpp"
 #include "runtime/worker_node.hpp"

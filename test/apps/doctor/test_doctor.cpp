@@ -1,6 +1,6 @@
 #include <nlohmann/json.hpp>
 
-#include "modules/core/json.hpp"
+#include "modules/core/io/json.hpp"
 #include "modules/recordings/ros_messages.hpp"
 #include "modules/ros_dds/ros_sink.hpp"
 #include "test/modules/sensors/euroc_folder.hpp"

@@ -5,7 +5,7 @@
 #include "apps/doctor/examine.hpp"
 #include "apps/doctor/network_facts.hpp"
 #include "apps/robot/run_findings.hpp"
-#include "modules/core/input_file.hpp"
+#include "modules/core/io/input_file.hpp"
 #include "modules/diagnosis/finding.hpp"
 #include "test/support/process.hpp"
 #include "test/support/temporary_folder.hpp"

@@ -1,6 +1,6 @@
 #include "apps/publish/message_player.hpp"
 #include "modules/recordings/ros_messages.hpp"
-#include "runtime/dds/ros_subscription.hpp"
+#include "runtime/ros/ros_subscription.hpp"
 #include "test/modules/sensors/euroc_folder.hpp"
 #include "test/modules/sensors/listed_bag.hpp"
 #include "test/support/command.hpp"

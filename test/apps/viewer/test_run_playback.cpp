@@ -1,5 +1,5 @@
 #include "apps/viewer/run_playback.hpp"
-#include "modules/core/pose_changes.hpp"
+#include "modules/core/data/pose_changes.hpp"
 #include "test/apps/viewer/small_run.hpp"
 #include "test/support/process.hpp"
 #include "test/support/test.hpp"

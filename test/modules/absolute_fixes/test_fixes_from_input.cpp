@@ -1,7 +1,7 @@
 #include "modules/absolute_fixes/fix_association.hpp"
 #include "modules/absolute_fixes/geodetic.hpp"
 #include "modules/absolute_fixes/node/fixes_node.hpp"
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "modules/recordings/ros_messages.hpp"
 #include "test/support/temporary_folder.hpp"
 #include "test/support/test.hpp"

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "modules/constellations/landmark.hpp"
-#include "modules/core/geometry.hpp"
+#include "modules/core/geometry/geometry.hpp"
 
 namespace km {
 

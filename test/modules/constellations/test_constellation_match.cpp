@@ -1,5 +1,5 @@
 #include "modules/constellations/constellation_match.hpp"
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "test/modules/constellations/scenes.hpp"
 #include "test/support/test.hpp"
 

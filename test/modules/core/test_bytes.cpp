@@ -1,4 +1,4 @@
-#include "modules/core/bytes.hpp"
+#include "modules/core/io/bytes.hpp"
 #include "test/support/test.hpp"
 
 namespace km {

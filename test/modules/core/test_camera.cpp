@@ -1,7 +1,7 @@
-#include "modules/core/camera.hpp"
-#include "modules/core/camera_calibration.hpp"
-#include "modules/core/image_size.hpp"
-#include "modules/core/lie.hpp"
+#include "modules/core/camera/camera.hpp"
+#include "modules/core/camera/camera_calibration.hpp"
+#include "modules/core/camera/image_size.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "test/support/random_pose.hpp"
 #include "test/support/test.hpp"
 

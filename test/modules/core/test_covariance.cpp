@@ -1,10 +1,10 @@
 #include <Eigen/Core>
 
-#include "modules/core/covariance.hpp"
-#include "modules/core/covariance_root.hpp"
-#include "modules/core/lie.hpp"
-#include "modules/core/precision.hpp"
-#include "modules/core/symmetric_eigen.hpp"
+#include "modules/core/data/covariance.hpp"
+#include "modules/core/geometry/covariance_root.hpp"
+#include "modules/core/geometry/lie.hpp"
+#include "modules/core/geometry/precision.hpp"
+#include "modules/core/geometry/symmetric_eigen.hpp"
 #include "test/support/random_pose.hpp"
 #include "test/support/test.hpp"
 

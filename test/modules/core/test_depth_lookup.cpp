@@ -1,4 +1,4 @@
-#include "modules/core/depth_lookup.hpp"
+#include "modules/core/camera/depth_lookup.hpp"
 
 #include "test/support/test.hpp"
 

@@ -1,7 +1,7 @@
 #include <sys/stat.h>
 
-#include "modules/core/input_file.hpp"
-#include "modules/core/text_rows.hpp"
+#include "modules/core/io/input_file.hpp"
+#include "modules/core/io/text_rows.hpp"
 #include "test/support/corrupted_input.hpp"
 #include "test/support/test.hpp"
 

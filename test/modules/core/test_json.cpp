@@ -1,4 +1,4 @@
-#include "modules/core/json.hpp"
+#include "modules/core/io/json.hpp"
 
 #include <nlohmann/json.hpp>
 

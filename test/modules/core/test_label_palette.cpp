@@ -1,4 +1,4 @@
-#include "modules/core/label_palette.hpp"
+#include "modules/core/map/label_palette.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/test.hpp"
 

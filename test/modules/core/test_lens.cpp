@@ -2,7 +2,7 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/ccalib/omnidir.hpp>
 
-#include "modules/core/lens.hpp"
+#include "modules/core/camera/lens.hpp"
 #include "test/support/test.hpp"
 
 namespace km {

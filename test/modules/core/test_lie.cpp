@@ -1,4 +1,4 @@
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "test/support/random_pose.hpp"
 #include "test/support/test.hpp"
 

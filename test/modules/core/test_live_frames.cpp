@@ -1,6 +1,6 @@
-#include "modules/core/lie.hpp"
-#include "modules/core/live_frames.hpp"
-#include "modules/core/odometry_correction.hpp"
+#include "modules/core/data/live_frames.hpp"
+#include "modules/core/data/odometry_correction.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "test/support/random_pose.hpp"
 #include "test/support/test.hpp"
 

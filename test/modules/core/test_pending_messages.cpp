@@ -1,4 +1,4 @@
-#include "modules/core/pending_messages.hpp"
+#include "modules/core/data/pending_messages.hpp"
 #include "test/support/test.hpp"
 
 namespace km {

@@ -1,5 +1,5 @@
-#include "modules/core/lie.hpp"
-#include "modules/core/pose_changes.hpp"
+#include "modules/core/data/pose_changes.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "test/support/test.hpp"
 
 namespace km {

@@ -1,4 +1,4 @@
-#include "modules/core/text_rows.hpp"
+#include "modules/core/io/text_rows.hpp"
 #include "test/support/test.hpp"
 
 namespace km {

@@ -1,4 +1,4 @@
-#include "modules/core/write_file.hpp"
+#include "modules/core/io/write_file.hpp"
 #include "test/support/temporary_folder.hpp"
 #include "test/support/test.hpp"
 

@@ -1,7 +1,7 @@
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
 
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "modules/dense_sensing/stereo_depth.hpp"
 #include "modules/images/image_view.hpp"
 #include "modules/sensors/node/open_folder.hpp"

@@ -1,4 +1,4 @@
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "modules/evaluation/closure_truth.hpp"
 #include "test/support/temporary_folder.hpp"
 #include "test/support/test.hpp"

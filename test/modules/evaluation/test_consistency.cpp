@@ -1,7 +1,7 @@
 #include <Eigen/Cholesky>
 
-#include "modules/core/covariance.hpp"
-#include "modules/core/lie.hpp"
+#include "modules/core/data/covariance.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "modules/evaluation/consistency.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
 #include "test/support/random_pose.hpp"

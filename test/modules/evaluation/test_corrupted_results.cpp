@@ -1,7 +1,7 @@
 #include <nlohmann/json.hpp>
 
-#include "modules/core/input_file.hpp"
-#include "modules/core/json.hpp"
+#include "modules/core/io/input_file.hpp"
+#include "modules/core/io/json.hpp"
 #include "modules/evaluation/closure_truth.hpp"
 #include "modules/evaluation/trajectory_error.hpp"
 #include "modules/evaluation/trajectory_file.hpp"

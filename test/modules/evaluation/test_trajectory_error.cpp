@@ -1,8 +1,8 @@
 #include <nlohmann/json.hpp>
 
-#include "modules/core/lie.hpp"
+#include "modules/core/data/stamped_pose.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "modules/core/quantile.hpp"
-#include "modules/core/stamped_pose.hpp"
 #include "modules/evaluation/association.hpp"
 #include "modules/evaluation/trajectory_error.hpp"
 #include "modules/evaluation/trajectory_file.hpp"

@@ -1,6 +1,6 @@
 #include <sys/resource.h>
 
-#include "modules/core/input_file.hpp"
+#include "modules/core/io/input_file.hpp"
 #include "modules/core/robot_identity.hpp"
 #include "modules/journal/journal_file.hpp"
 #include "modules/journal/restored_run.hpp"

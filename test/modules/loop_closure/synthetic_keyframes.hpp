@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <random>
 
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "modules/loop_closure/relative_pose.hpp"
 #include "test/support/random_pose.hpp"
 

@@ -1,6 +1,6 @@
 #include <Eigen/LU>
 
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "modules/evaluation/association.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
 #include "modules/loop_closure/keyframe_features.hpp"

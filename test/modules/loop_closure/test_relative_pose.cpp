@@ -1,5 +1,5 @@
-#include "modules/core/lie.hpp"
-#include "modules/core/symmetric_eigen.hpp"
+#include "modules/core/geometry/lie.hpp"
+#include "modules/core/geometry/symmetric_eigen.hpp"
 #include "modules/loop_closure/keyframe_features.hpp"
 #include "modules/loop_closure/relative_pose.hpp"
 #include "test/modules/loop_closure/synthetic_keyframes.hpp"

@@ -1,6 +1,6 @@
 #include <Eigen/LU>
 
-#include "modules/core/covariance.hpp"
+#include "modules/core/data/covariance.hpp"
 #include "modules/loop_closure/verifier.hpp"
 #include "test/modules/loop_closure/synthetic_keyframes.hpp"
 #include "test/support/test.hpp"

@@ -1,4 +1,4 @@
-#include "modules/core/input_file.hpp"
+#include "modules/core/io/input_file.hpp"
 #include "modules/mesh/labelled_mesh.hpp"
 #include "modules/mesh/mesh_file.hpp"
 #include "test/support/corrupted_input.hpp"

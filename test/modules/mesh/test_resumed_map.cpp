@@ -1,4 +1,4 @@
-#include "modules/core/input_file.hpp"
+#include "modules/core/io/input_file.hpp"
 #include "modules/mesh/map_file.hpp"
 #include "modules/mesh/resumed_map.hpp"
 #include "test/support/temporary_folder.hpp"

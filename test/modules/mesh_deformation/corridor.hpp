@@ -5,7 +5,7 @@
 #include <limits>
 #include <vector>
 
-#include "modules/core/geometry.hpp"
+#include "modules/core/geometry/geometry.hpp"
 #include "modules/mesh/map_mesh.hpp"
 #include "test/support/grid_mesh.hpp"
 

@@ -1,4 +1,4 @@
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "modules/mesh_deformation/deformation_graph.hpp"
 #include "test/support/numeric_jacobian.hpp"
 #include "test/support/random_pose.hpp"

@@ -1,4 +1,4 @@
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "modules/mesh_deformation/mesh_corrector.hpp"
 #include "modules/semantic_mapping/semantic_mapper.hpp"
 #include "test/modules/semantic_mapping/wall_scene.hpp"

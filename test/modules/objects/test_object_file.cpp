@@ -1,4 +1,4 @@
-#include "modules/core/write_file.hpp"
+#include "modules/core/io/write_file.hpp"
 #include "modules/objects/object_box.hpp"
 #include "modules/objects/object_file.hpp"
 #include "test/support/temporary_folder.hpp"

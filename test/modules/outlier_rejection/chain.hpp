@@ -4,9 +4,9 @@
 #include <random>
 #include <vector>
 
-#include "modules/core/covariance.hpp"
-#include "modules/core/lie.hpp"
-#include "modules/core/pose_graph.hpp"
+#include "modules/core/data/covariance.hpp"
+#include "modules/core/data/pose_graph.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "test/support/random_pose.hpp"
 
 namespace km {

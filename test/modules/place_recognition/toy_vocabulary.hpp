@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <initializer_list>
 
-#include "modules/core/keyframe.hpp"
+#include "modules/core/data/keyframe.hpp"
 #include "modules/place_recognition/vocabulary.hpp"
 
 namespace km {

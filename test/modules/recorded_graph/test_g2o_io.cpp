@@ -1,5 +1,5 @@
-#include "modules/core/covariance.hpp"
-#include "modules/core/precision.hpp"
+#include "modules/core/data/covariance.hpp"
+#include "modules/core/geometry/precision.hpp"
 #include "modules/recorded_graph/g2o_io.hpp"
 #include "test/support/random_pose.hpp"
 #include "test/support/shared_data.hpp"

@@ -1,6 +1,6 @@
 #include <Eigen/LU>
 
-#include "modules/core/covariance.hpp"
+#include "modules/core/data/covariance.hpp"
 #include "modules/recorded_graph/g2o_io.hpp"
 #include "modules/recorded_graph/jrl_io.hpp"
 #include "test/support/corrupted_input.hpp"

@@ -4,7 +4,7 @@
 
 #include <cstdint>
 
-#include "modules/core/bytes.hpp"
+#include "modules/core/io/bytes.hpp"
 #include "test/modules/recordings/bag_contents.hpp"
 
 namespace km {

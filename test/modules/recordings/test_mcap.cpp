@@ -1,7 +1,7 @@
 #include <nlohmann/json.hpp>
 
-#include "modules/core/input_file.hpp"
-#include "modules/core/json.hpp"
+#include "modules/core/io/input_file.hpp"
+#include "modules/core/io/json.hpp"
 #include "modules/recordings/mcap_writer.hpp"
 #include "modules/recordings/open_bag.hpp"
 #include "test/modules/recordings/listed_sum.hpp"

@@ -1,5 +1,5 @@
-#include "modules/core/bytes.hpp"
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
+#include "modules/core/io/bytes.hpp"
 #include "modules/recordings/ros_camera.hpp"
 #include "modules/recordings/ros_messages.hpp"
 #include "test/modules/sensors/listed_bag.hpp"

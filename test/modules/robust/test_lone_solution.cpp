@@ -1,4 +1,4 @@
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "modules/robust/lone_solution.hpp"
 #include "modules/robust/robust_schedule.hpp"
 #include "test/support/random_pose.hpp"

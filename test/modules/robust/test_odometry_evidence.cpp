@@ -1,4 +1,4 @@
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "modules/robust/odometry_evidence.hpp"
 #include "modules/robust/tree_messages.hpp"
 #include "test/support/random_pose.hpp"

@@ -1,6 +1,6 @@
 #include <sys/resource.h>
 
-#include "modules/core/bytes.hpp"
+#include "modules/core/io/bytes.hpp"
 #include "modules/robust/tree_messages.hpp"
 #include "test/support/random_pose.hpp"
 #include "test/support/test.hpp"

@@ -7,10 +7,10 @@
 #include <limits>
 #include <numbers>
 
-#include "modules/core/camera.hpp"
-#include "modules/core/frame.hpp"
-#include "modules/core/geometry.hpp"
-#include "modules/core/label_palette.hpp"
+#include "modules/core/camera/camera.hpp"
+#include "modules/core/camera/frame.hpp"
+#include "modules/core/geometry/geometry.hpp"
+#include "modules/core/map/label_palette.hpp"
 #include "modules/semantic_mapping/semantic_mapper.hpp"
 
 namespace km {

@@ -1,4 +1,4 @@
-#include "modules/core/imu_limits.hpp"
+#include "modules/core/data/imu_limits.hpp"
 #include "modules/sensors/image_file.hpp"
 #include "modules/sensors/node/open_folder.hpp"
 #include "test/modules/sensors/euroc_folder.hpp"

@@ -1,4 +1,4 @@
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "modules/sensors/rig_completion.hpp"
 #include "test/modules/sensors/listed_bag.hpp"
 #include "test/support/test.hpp"

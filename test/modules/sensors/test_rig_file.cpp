@@ -1,4 +1,4 @@
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "modules/sensors/node/rig_file.hpp"
 #include "test/modules/sensors/euroc_folder.hpp"
 #include "test/support/test.hpp"

@@ -1,4 +1,4 @@
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "modules/core/stamp.hpp"
 #include "modules/sensors/sample_streams.hpp"
 #include "modules/sensors/stream_stamps.hpp"

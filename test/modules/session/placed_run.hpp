@@ -1,7 +1,7 @@
 #pragma once
 
-#include "modules/core/lie.hpp"
-#include "modules/core/measurement_limits.hpp"
+#include "modules/core/data/measurement_limits.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "modules/rbcd/solver_choice.hpp"
 #include "test/support/random_pose.hpp"
 #include "test/support/team_network.hpp"

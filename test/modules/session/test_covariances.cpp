@@ -1,5 +1,5 @@
-#include "modules/core/lie.hpp"
-#include "modules/core/symmetric_eigen.hpp"
+#include "modules/core/geometry/lie.hpp"
+#include "modules/core/geometry/symmetric_eigen.hpp"
 #include "modules/robust/tree_newton.hpp"
 #include "modules/tree_newton/edge_model.hpp"
 #include "test/support/solver_team.hpp"

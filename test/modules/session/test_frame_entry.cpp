@@ -1,4 +1,4 @@
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "modules/robust/lone_solution.hpp"
 #include "modules/session/frame_entry.hpp"
 #include "test/support/random_pose.hpp"

@@ -1,4 +1,4 @@
-#include "modules/core/bytes.hpp"
+#include "modules/core/io/bytes.hpp"
 #include "modules/session/session_part.hpp"
 #include "test/support/random_pose.hpp"
 #include "test/support/test.hpp"

@@ -1,4 +1,4 @@
-#include "modules/core/team_links.hpp"
+#include "modules/core/data/team_links.hpp"
 #include "test/support/test.hpp"
 
 namespace km {

@@ -1,4 +1,4 @@
-#include "modules/core/bytes.hpp"
+#include "modules/core/io/bytes.hpp"
 #include "modules/session/team_message_bytes.hpp"
 #include "modules/session/team_notices.hpp"
 #include "test/support/random_pose.hpp"

@@ -1,4 +1,4 @@
-#include "modules/core/precision.hpp"
+#include "modules/core/geometry/precision.hpp"
 #include "modules/rbcd/solver_choice.hpp"
 #include "modules/session/node/team_node.hpp"
 #include "test/support/captured_log.hpp"

@@ -1,4 +1,4 @@
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "modules/rbcd/solver_choice.hpp"
 #include "test/support/team_network.hpp"
 #include "test/support/test.hpp"

@@ -1,4 +1,4 @@
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "modules/rbcd/stiefel.hpp"
 #include "modules/tree_newton/edge_model.hpp"
 #include "modules/tree_newton/vertical_prior.hpp"

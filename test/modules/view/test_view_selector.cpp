@@ -1,4 +1,4 @@
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "modules/view/view_selector.hpp"
 #include "test/modules/view/watcher.hpp"
 #include "test/support/random_pose.hpp"

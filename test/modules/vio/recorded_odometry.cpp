@@ -10,7 +10,7 @@
 #include <optional>
 #include <utility>
 
-#include "modules/core/depth_lookup.hpp"
+#include "modules/core/camera/depth_lookup.hpp"
 #include "modules/dense_sensing/stereo_depth.hpp"
 #include "modules/evaluation/association.hpp"
 #include "modules/evaluation/trajectory_error.hpp"

@@ -6,10 +6,10 @@
 #include <span>
 #include <vector>
 
-#include "modules/core/camera.hpp"
-#include "modules/core/frame.hpp"
-#include "modules/core/geometry.hpp"
-#include "modules/core/odometry.hpp"
+#include "modules/core/camera/camera.hpp"
+#include "modules/core/camera/frame.hpp"
+#include "modules/core/data/odometry.hpp"
+#include "modules/core/geometry/geometry.hpp"
 #include "modules/vio/vio.hpp"
 
 namespace km {

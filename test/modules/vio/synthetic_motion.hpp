@@ -4,9 +4,9 @@
 #include <random>
 #include <vector>
 
-#include "modules/core/camera.hpp"
-#include "modules/core/lie.hpp"
-#include "modules/core/odometry.hpp"
+#include "modules/core/camera/camera.hpp"
+#include "modules/core/data/odometry.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "modules/vio/fixed_lag_smoother.hpp"
 #include "test/support/random_pose.hpp"
 

@@ -1,4 +1,4 @@
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "modules/vio/fixed_lag_smoother.hpp"
 #include "synthetic_motion.hpp"
 #include "test/support/numeric_jacobian.hpp"

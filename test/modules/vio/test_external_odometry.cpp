@@ -1,5 +1,5 @@
-#include "modules/core/covariance.hpp"
-#include "modules/core/lie.hpp"
+#include "modules/core/data/covariance.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "modules/vio/external_odometry.hpp"
 #include "test/support/test.hpp"
 

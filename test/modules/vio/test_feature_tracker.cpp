@@ -1,4 +1,4 @@
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "modules/core/quantile.hpp"
 #include "modules/vio/feature_detector.hpp"
 #include "modules/vio/feature_tracker.hpp"

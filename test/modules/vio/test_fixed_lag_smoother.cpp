@@ -1,6 +1,6 @@
 #include <Eigen/LU>
 
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "modules/vio/fixed_lag_smoother.hpp"
 #include "modules/vio/gyro_noise_scale.hpp"
 #include "modules/vio/window_optimizer.hpp"

@@ -1,6 +1,6 @@
 #include <Eigen/LU>
 
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "modules/vio/patches.hpp"
 #include "test/support/test.hpp"
 #include "textured_plane.hpp"

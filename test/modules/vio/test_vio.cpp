@@ -1,5 +1,5 @@
-#include "modules/core/covariance.hpp"
-#include "modules/core/precision.hpp"
+#include "modules/core/data/covariance.hpp"
+#include "modules/core/geometry/precision.hpp"
 #include "modules/vio/keyframe_rule.hpp"
 #include "modules/vio/vio.hpp"
 #include "synthetic_motion.hpp"

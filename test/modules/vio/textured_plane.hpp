@@ -11,8 +11,8 @@
 #include <utility>
 #include <vector>
 
-#include "modules/core/camera.hpp"
-#include "modules/core/frame.hpp"
+#include "modules/core/camera/camera.hpp"
+#include "modules/core/camera/frame.hpp"
 
 namespace km {
 

@@ -8,8 +8,8 @@
 #include <sstream>
 
 #include "modules/core/config.hpp"
-#include "modules/core/json.hpp"
-#include "modules/core/write_file.hpp"
+#include "modules/core/io/json.hpp"
+#include "modules/core/io/write_file.hpp"
 #include "modules/images/image_codec.hpp"
 #include "modules/images/image_view.hpp"
 

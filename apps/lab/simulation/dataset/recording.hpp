@@ -10,10 +10,10 @@
 #include <vector>
 
 #include "apps/lab/simulation/world/world.hpp"
-#include "modules/core/camera.hpp"
-#include "modules/core/frame.hpp"
-#include "modules/core/geometry.hpp"
-#include "modules/core/label_palette.hpp"
+#include "modules/core/camera/camera.hpp"
+#include "modules/core/camera/frame.hpp"
+#include "modules/core/geometry/geometry.hpp"
+#include "modules/core/map/label_palette.hpp"
 #include "modules/core/stamp.hpp"
 
 namespace km {

@@ -1,6 +1,6 @@
 #include "apps/lab/simulation/motion/default_rig.hpp"
 
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 
 namespace km {
 namespace {

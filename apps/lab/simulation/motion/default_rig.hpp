@@ -1,6 +1,6 @@
 #pragma once
 
-#include "modules/core/camera.hpp"
+#include "modules/core/camera/camera.hpp"
 
 namespace km {
 

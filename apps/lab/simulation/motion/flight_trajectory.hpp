@@ -5,7 +5,7 @@
 #include <span>
 
 #include "apps/lab/simulation/motion/spline_trajectory.hpp"
-#include "modules/core/stamped_pose.hpp"
+#include "modules/core/data/stamped_pose.hpp"
 
 namespace km {
 

@@ -6,8 +6,8 @@
 
 #include "apps/lab/simulation/motion/sensor_errors.hpp"
 #include "apps/lab/simulation/motion/spline_trajectory.hpp"
-#include "modules/core/camera.hpp"
-#include "modules/core/frame.hpp"
+#include "modules/core/camera/camera.hpp"
+#include "modules/core/camera/frame.hpp"
 #include "modules/core/stamp.hpp"
 
 namespace km {

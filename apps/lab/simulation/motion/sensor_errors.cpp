@@ -5,7 +5,7 @@
 #include <numbers>
 
 #include "apps/lab/simulation/world/seeded_random.hpp"
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 
 namespace km {
 namespace {

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "modules/core/camera.hpp"
+#include "modules/core/camera/camera.hpp"
 #include "modules/core/config.hpp"
 #include "modules/core/stamp.hpp"
 

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "modules/core/geometry.hpp"
+#include "modules/core/geometry/geometry.hpp"
 
 namespace km {
 

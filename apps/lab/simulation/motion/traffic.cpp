@@ -8,7 +8,7 @@
 #include "apps/lab/simulation/world/objects.hpp"
 #include "apps/lab/simulation/world/scene.hpp"
 #include "apps/lab/simulation/world/seeded_random.hpp"
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 
 namespace km {
 namespace {

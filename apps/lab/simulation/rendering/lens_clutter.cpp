@@ -5,7 +5,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "apps/lab/simulation/world/seeded_random.hpp"
-#include "modules/core/geometry.hpp"
+#include "modules/core/geometry/geometry.hpp"
 
 namespace km {
 namespace {

@@ -6,7 +6,7 @@
 
 #include "apps/lab/simulation/rendering/sensor_effects_config.hpp"
 #include "apps/lab/simulation/rendering/shot.hpp"
-#include "modules/core/camera.hpp"
+#include "modules/core/camera/camera.hpp"
 
 namespace km {
 

@@ -8,8 +8,8 @@
 
 #include "apps/lab/simulation/rendering/shot.hpp"
 #include "apps/lab/simulation/world/world.hpp"
-#include "modules/core/camera.hpp"
-#include "modules/core/geometry.hpp"
+#include "modules/core/camera/camera.hpp"
+#include "modules/core/geometry/geometry.hpp"
 
 namespace km {
 

@@ -8,8 +8,8 @@
 #include "apps/lab/simulation/rendering/renderer.hpp"
 #include "apps/lab/simulation/rendering/sensor_effects_config.hpp"
 #include "apps/lab/simulation/rendering/shot.hpp"
-#include "modules/core/frame.hpp"
-#include "modules/core/geometry.hpp"
+#include "modules/core/camera/frame.hpp"
+#include "modules/core/geometry/geometry.hpp"
 
 namespace km {
 

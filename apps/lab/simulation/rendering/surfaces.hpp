@@ -8,7 +8,7 @@
 
 #include "apps/lab/simulation/rendering/ray_tracer.hpp"
 #include "apps/lab/simulation/world/world.hpp"
-#include "modules/core/geometry.hpp"
+#include "modules/core/geometry/geometry.hpp"
 
 namespace km {
 

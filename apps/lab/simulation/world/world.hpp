@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "apps/lab/simulation/world/texture.hpp"
-#include "modules/core/label_palette.hpp"
+#include "modules/core/map/label_palette.hpp"
 
 namespace km {
 

@@ -1,6 +1,6 @@
 #include "apps/lab/pgo/agent_team.hpp"
 #include "apps/lab/pgo/solvers.hpp"
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "modules/tree_newton/chordal.hpp"
 #include "test/support/team_graphs.hpp"
 #include "test/support/test.hpp"

@@ -1,8 +1,8 @@
 #include "apps/lab/pgo/certificate.hpp"
 
 #include "apps/lab/pgo/solvers.hpp"
-#include "modules/core/lie.hpp"
-#include "modules/core/symmetric_eigen.hpp"
+#include "modules/core/geometry/lie.hpp"
+#include "modules/core/geometry/symmetric_eigen.hpp"
 #include "modules/rbcd/stiefel.hpp"
 #include "test/support/pose_graph_problems.hpp"
 #include "test/support/shared_data.hpp"

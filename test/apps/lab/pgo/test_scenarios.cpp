@@ -1,7 +1,7 @@
 #include "apps/lab/pgo/outlier_study.hpp"
 #include "apps/lab/pgo/scenario.hpp"
 #include "apps/lab/pgo/team_graph_file.hpp"
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "test/support/team_graphs.hpp"
 #include "test/support/test.hpp"
 

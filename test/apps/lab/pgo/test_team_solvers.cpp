@@ -1,6 +1,6 @@
 #include "apps/lab/pgo/member_team.hpp"
 #include "apps/lab/pgo/solvers.hpp"
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "modules/rbcd/member_rbcd.hpp"
 #include "modules/tree_newton/chordal.hpp"
 #include "test/support/pose_graph_problems.hpp"

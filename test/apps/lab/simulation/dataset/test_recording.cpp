@@ -2,8 +2,8 @@
 
 #include "apps/lab/simulation/dataset/recording.hpp"
 #include "apps/lab/simulation/world/scene.hpp"
-#include "modules/core/json.hpp"
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
+#include "modules/core/io/json.hpp"
 #include "modules/sensors/node/open_folder.hpp"
 #include "test/support/temporary_folder.hpp"
 #include "test/support/test.hpp"

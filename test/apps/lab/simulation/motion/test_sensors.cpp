@@ -4,7 +4,7 @@
 #include "apps/lab/simulation/motion/imu_simulator.hpp"
 #include "apps/lab/simulation/motion/sensor_errors.hpp"
 #include "apps/lab/simulation/motion/vehicle_trajectory.hpp"
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "modules/vio/preintegration.hpp"
 #include "test/support/test.hpp"
 

@@ -6,7 +6,7 @@
 #include "apps/lab/simulation/motion/spline_trajectory.hpp"
 #include "apps/lab/simulation/motion/vehicle_trajectory.hpp"
 #include "apps/lab/simulation/world/seeded_random.hpp"
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "test/support/test.hpp"
 
 namespace km {

@@ -6,7 +6,7 @@
 #include "apps/lab/simulation/rendering/renderer.hpp"
 #include "apps/lab/simulation/world/scene.hpp"
 #include "apps/lab/simulation/world/world.hpp"
-#include "modules/core/camera.hpp"
+#include "modules/core/camera/camera.hpp"
 
 namespace km::small_world {
 

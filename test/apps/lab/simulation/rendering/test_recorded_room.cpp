@@ -5,7 +5,7 @@
 #include "apps/lab/simulation/motion/default_rig.hpp"
 #include "apps/lab/simulation/motion/flight_trajectory.hpp"
 #include "apps/lab/simulation/rendering/sensor_effects.hpp"
-#include "modules/core/text_rows.hpp"
+#include "modules/core/io/text_rows.hpp"
 #include "modules/evaluation/trajectory_file.hpp"
 #include "test/support/image_file.hpp"
 #include "test/support/shared_data.hpp"

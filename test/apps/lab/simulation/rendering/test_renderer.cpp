@@ -1,5 +1,5 @@
 #include "apps/lab/simulation/rendering/renderer.hpp"
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "test/apps/lab/simulation/rendering/small_world.hpp"
 #include "test/support/test.hpp"
 

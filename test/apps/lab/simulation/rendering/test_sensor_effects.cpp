@@ -1,7 +1,7 @@
 #include "apps/lab/simulation/rendering/sensor_effects.hpp"
 #include "apps/lab/simulation/rendering/surfaces.hpp"
 #include "apps/lab/simulation/world/objects.hpp"
-#include "modules/core/lie.hpp"
+#include "modules/core/geometry/lie.hpp"
 #include "test/apps/lab/simulation/rendering/small_world.hpp"
 #include "test/support/test.hpp"
 

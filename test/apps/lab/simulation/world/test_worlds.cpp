@@ -3,7 +3,7 @@
 #include "apps/lab/simulation/world/scene.hpp"
 #include "apps/lab/simulation/world/seeded_random.hpp"
 #include "apps/lab/simulation/world/world.hpp"
-#include "modules/core/text_rows.hpp"
+#include "modules/core/io/text_rows.hpp"
 #include "test/support/command.hpp"
 #include "test/support/shared_data.hpp"
 #include "test/support/test.hpp"
