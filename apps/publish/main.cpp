@@ -35,6 +35,8 @@ Examples
     kimera_multi_publish MH_01_easy --wait 1 --from 10 --to 40
   With the fixes of a receiver:
     kimera_multi_publish MH_01_easy --wait 1 --fixes fixes.csv --fix-topic /fix
+  The same with a bad driver: up to 20 ms late, one message in ten lost:
+    kimera_multi_publish recording.bag --jitter 0.02 --drop 0.1
 
 Exit codes: 0 done, also after Ctrl-C; 1 bad input, or too few readers; 2 bad command line.)";
 
@@ -80,6 +82,14 @@ Options options_of(int argc, char** argv) {
       ->capture_default_str();
   app.add_flag("--reliable", options.play.reliable,
                "Send lost messages again; otherwise best effort, as drivers of sensors do");
+  app.add_option("--delay", options.play.delay_s, "Delay of every message [s]")
+      ->check(CLI::Range(0., 60.));
+  app.add_option("--jitter", options.play.jitter_s,
+                 "Additional random delay, uniform from 0 to this [s]")
+      ->check(CLI::Range(0., 60.));
+  app.add_option("--drop", options.play.drop_share, "Share of messages that are lost, at random")
+      ->check(CLI::Range(0., 1.));
+  app.add_option("--seed", options.play.seed, "Seed of the random numbers")->capture_default_str();
   const char* const domain = std::getenv("ROS_DOMAIN_ID");
   options.ros.domain = domain != nullptr ? std::atoi(domain) : 0;
   app.add_option(
@@ -124,10 +134,11 @@ std::unique_ptr<BagReader> open(const Options& options) {
 }
 
 std::string table(const std::vector<PlayedTopic>& topics) {
-  std::vector<std::vector<std::string>> rows = {{"topic", "type", "published", "not of the type"}};
+  std::vector<std::vector<std::string>> rows = {
+      {"topic", "type", "published", "dropped", "not of the type"}};
   for (const PlayedTopic& topic : topics)
-    rows.push_back(
-        {topic.topic, topic.type, std::to_string(topic.published), std::to_string(topic.refused)});
+    rows.push_back({topic.topic, topic.type, std::to_string(topic.published),
+                    std::to_string(topic.dropped), std::to_string(topic.refused)});
   return align_columns(rows);
 }
 

@@ -208,7 +208,10 @@ std::unique_ptr<BagReader> with_fixes(std::unique_ptr<BagReader> recording,
 MessagePlayer::MessagePlayer(std::unique_ptr<BagReader> recording,
                              const std::shared_ptr<const RosNetwork>& network,
                              const PlayOptions& options)
-    : recording_(std::move(recording)), options_(options), clock_(options.rate) {
+    : recording_(std::move(recording)),
+      options_(options),
+      random_(options.seed),
+      clock_(options.rate) {
   for (const BagChannel& channel : recording_->channels()) {
     const bool is_wanted = options.topics.empty() ||
                            std::ranges::find(options.topics, channel.topic) != options.topics.end();
@@ -246,31 +249,52 @@ std::vector<std::string> MessagePlayer::topics_short_of(std::size_t readers) con
   return topics;
 }
 
-bool MessagePlayer::step() {
-  while (auto message = recording_->next()) {
-    const Stamp begin = first_.value_or(message->log_time) + nanoseconds(options_.from_s);
-    if (!first_) {
-      first_ = message->log_time;
-      static_cast<void>(clock_.due(begin, ReplayClock::TimePoint::clock::now()));
-    }
-    if (seconds_between(*first_, message->log_time) >= options_.to_s) return false;
-    const BagChannel& channel = recording_->channels()[message->channel];
-    if (message->log_time < begin && channel.topic != kLatchedTopic) continue;
-    if (message->channel >= topic_of_.size() || !topic_of_[message->channel]) continue;
-    const std::size_t topic = *topic_of_[message->channel];
-    const auto bytes = as_published(channel, std::move(message->bytes));
-    if (!bytes) {
-      ++topics_[topic].refused;
-      continue;
-    }
-    const Stamp due = std::max(message->log_time, begin);
-    if (!clock_.wait_until(due)) return false;
-    publishers_[topic]->publish(*bytes);
-    ++topics_[topic].published;
-    played_s_ = seconds_between(*first_, due);
-    return true;
+// Schedules a message; false after the end of the part to play.
+bool MessagePlayer::take(BagMessage message) {
+  const Stamp begin = first_.value_or(message.log_time) + nanoseconds(options_.from_s);
+  if (!first_) {
+    first_ = message.log_time;
+    static_cast<void>(clock_.due(begin, ReplayClock::TimePoint::clock::now()));
   }
-  return false;
+  if (seconds_between(*first_, message.log_time) >= options_.to_s) return false;
+  const bool is_latched = recording_->channels()[message.channel].topic == kLatchedTopic;
+  if (message.log_time < begin && !is_latched) return true;
+  message.log_time = std::max(message.log_time, begin);
+  schedule(std::move(message));
+  return true;
+}
+
+void MessagePlayer::schedule(BagMessage message) {
+  newest_ = std::max(newest_.value_or(message.log_time), message.log_time);
+  if (message.channel >= topic_of_.size() || !topic_of_[message.channel]) return;
+  const std::size_t topic = *topic_of_[message.channel];
+  std::uniform_real_distribution<double> uniform;
+  if (uniform(random_) < options_.drop_share) {
+    ++topics_[topic].dropped;
+    return;
+  }
+  auto bytes = as_published(recording_->channels()[message.channel], std::move(message.bytes));
+  if (!bytes) {
+    ++topics_[topic].refused;
+    return;
+  }
+  // Delay in the time of the recording, in which clock_ counts.
+  const double delay_s = options_.rate * (options_.delay_s + options_.jitter_s * uniform(random_));
+  due_.push({message.log_time + nanoseconds(delay_s), number_++, topic, std::move(*bytes)});
+}
+
+bool MessagePlayer::step() {
+  while (!ended_ && (due_.empty() || *newest_ <= due_.top().stamp)) {
+    auto message = recording_->next();
+    ended_ = !message || !take(std::move(*message));
+  }
+  if (due_.empty() || !clock_.wait_until(due_.top().stamp)) return false;
+  const Due& due = due_.top();
+  publishers_[due.topic]->publish(due.bytes);
+  ++topics_[due.topic].published;
+  played_s_ = seconds_between(*first_, due.stamp);
+  due_.pop();
+  return true;
 }
 
 }  // namespace km

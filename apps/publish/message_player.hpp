@@ -1,9 +1,12 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <memory>
 #include <optional>
+#include <queue>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -32,9 +35,14 @@ inline constexpr const char* kMotionCaptureType = "geometry_msgs/msg/PoseStamped
                                                     const std::string& topic,
                                                     const std::string& type);
 
+/// Parameters of the playback, with errors of the transmission.
 struct PlayOptions {
-  double rate = 1.0;                     ///< Times real time.
-  bool reliable = false;                 ///< False: best effort, as drivers of sensors are.
+  double rate = 1.0;        ///< Times real time.
+  double delay_s = 0.0;     ///< Delay of every message.
+  double jitter_s = 0.0;    ///< Additional delay, uniform from 0 to this.
+  double drop_share = 0.0;  ///< Share of the messages that are dropped.
+  bool reliable = false;    ///< False: best effort, as drivers of sensors are.
+  unsigned seed = 0;
   std::vector<std::string> topics = {};  ///< Topics to play; empty: all.
   /// Part to play [s since the first message]; of earlier messages only latched ones are published.
   double from_s = 0.0, to_s = std::numeric_limits<double>::infinity();
@@ -44,11 +52,12 @@ struct PlayOptions {
 struct PlayedTopic {
   std::string topic, type;
   std::size_t published = 0;
+  std::size_t dropped = 0;
   std::size_t refused = 0;  ///< Messages with invalid content.
 };
 
-/// Publishes the messages of a recording as live topics of ROS 2. Messages of ROS 1 are
-/// converted to ROS 2.
+/// Publishes the messages of a recording as live topics of ROS 2, as recorded or with errors.
+/// Messages of ROS 1 are converted to ROS 2.
 class MessagePlayer {
  public:
   /// Topics with types unknown to RosNetwork are not played, see unsupported_topics(). Throws
@@ -72,14 +81,31 @@ class MessagePlayer {
   [[nodiscard]] double played_s() const { return played_s_; }
 
  private:
+  struct Due {
+    Stamp stamp = 0;
+    std::uint64_t number = 0;  // index in the order of the recording
+    std::size_t topic = 0;
+    std::vector<std::uint8_t> bytes;
+    bool operator>(const Due& other) const {
+      return std::pair(stamp, number) > std::pair(other.stamp, other.number);
+    }
+  };
+
+  [[nodiscard]] bool take(BagMessage message);
+  void schedule(BagMessage message);
+
   std::unique_ptr<BagReader> recording_;
   PlayOptions options_;
+  std::mt19937 random_;
   ReplayClock clock_;
   std::vector<PlayedTopic> topics_;
   std::vector<std::unique_ptr<RosPublisher>> publishers_;
   std::vector<std::optional<std::size_t>> topic_of_;  // topic of each channel; none if not played
   std::vector<std::string> left_out_;
-  std::optional<Stamp> first_;
+  std::priority_queue<Due, std::vector<Due>, std::greater<>> due_;
+  std::optional<Stamp> first_, newest_;
+  bool ended_ = false;
+  std::uint64_t number_ = 0;
   double played_s_ = 0.0;
 };
 

@@ -53,6 +53,7 @@ TEST_CASE("A recording is played in its order and pace") {
   const auto stamps = played(samples("/a"), "/a", {.rate = 2.0}, topic);
   CHECK(std::chrono::steady_clock::now() - begin >= std::chrono::milliseconds(99));  // 0.199 s
   CHECK(topic.published == kMessages);
+  CHECK(topic.dropped == 0);
   REQUIRE(stamps.size() == kMessages);
   CHECK(stamps.front() == kFirst);
   CHECK(std::ranges::is_sorted(stamps));
@@ -67,6 +68,18 @@ TEST_CASE("A part of a recording is played without waiting for its start") {
   CHECK(std::chrono::steady_clock::now() - begin < std::chrono::seconds(150));  // that of the wait
   REQUIRE(stamps.size() == 1);
   CHECK(stamps.front() == kFirst + 150 * kMinute);
+}
+
+TEST_CASE("A bad driver loses and delays messages, the same ones for a seed") {
+  const PlayOptions bad{.rate = 10.0, .jitter_s = 0.002, .drop_share = 0.3, .seed = 7};
+  PlayedTopic topic;
+  const auto stamps = played(samples("/b"), "/b", bad, topic);
+  CHECK(topic.published + topic.dropped == kMessages);
+  CHECK(topic.dropped > 30);
+  CHECK(topic.dropped < 90);
+  CHECK_FALSE(std::ranges::is_sorted(stamps));  // by up to 20 ms of the recording's time
+  for (std::size_t k = 1; k < stamps.size(); ++k) CHECK(stamps[k] > stamps[k - 1] - 20'000'000);
+  CHECK(played(samples("/b"), "/b", bad, topic) == stamps);
 }
 
 TEST_CASE("Unknown topics are left out and broken messages are counted") {
