@@ -33,7 +33,7 @@ class InputTime {
   Stamp last_ = 0;
 };
 
-/// How far a robot is, as it tells the others and viewers. Thread-safe.
+/// The progress of a robot, as it shows it to the others and to viewers. Thread-safe.
 class Progress {
  public:
   Progress(RobotCore& core, const Places& places);

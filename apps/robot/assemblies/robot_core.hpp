@@ -77,8 +77,8 @@ struct Past {
   }
 };
 
-/// What the assemblies of a robot share. An assembly adds nodes, connects them by topics, and
-/// answers for them. It must outlive the nodes.
+/// The parts that all assemblies of a robot use. An assembly adds nodes, connects them by topics,
+/// and answers for them. It must outlive the nodes.
 struct RobotCore {
   Past past;
   const RobotIdentity identity;
