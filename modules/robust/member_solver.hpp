@@ -51,8 +51,8 @@ class MemberSolver {
   /// Own poses in the frame of the session, as the team has last accepted them; at first the start.
   [[nodiscard]] virtual const std::vector<SE3>& poses() const = 0;
   /// Covariances of poses() relative to the origin of the session, once it is done, as tangent
-  /// vectors [rotation; translation] at the pose (see core/data/covariance.hpp). Empty if the solver
-  /// computes none.
+  /// vectors [rotation; translation] at the pose (see core/data/covariance.hpp). Empty if the
+  /// solver computes none.
   [[nodiscard]] virtual std::vector<Matrix6> covariances() const { return {}; }
   [[nodiscard]] virtual SolverState state() const = 0;
   /// Present verdicts on the closures that this robot weighs; empty if the solver rejects none.

@@ -1,6 +1,6 @@
 #include "apps/result_files.hpp"
-#include "apps/robot/journal_node.hpp"
 #include "apps/robot/assemblies/robot.hpp"
+#include "apps/robot/journal_node.hpp"
 #include "test/support/inbox.hpp"
 #include "test/support/patience.hpp"
 #include "test/support/temporary_folder.hpp"

@@ -8,8 +8,8 @@
 #include <string>
 #include <utility>
 
-#include "apps/robot/run.hpp"
 #include "apps/robot/assemblies/robot.hpp"
+#include "apps/robot/run.hpp"
 
 // A robot of which one module fails: what reads its topic throws, or never returns, on the module's
 // own thread. With `none lie` it sends false maps and objects to its team.
