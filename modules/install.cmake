@@ -21,9 +21,9 @@ install(EXPORT kimera_multiTargets NAMESPACE kimera_multi:: DESTINATION ${config
 
 # Headers with threads or network include those of runtime/, and are not installed. The headers
 # below are those of the runtime and the programs that have a use outside robots.
-foreach(module ${modules})
+foreach(module ${modules} core/io core/geometry core/camera core/map core/data)
   file(GLOB module_headers CONFIGURE_DEPENDS RELATIVE ${PROJECT_SOURCE_DIR} modules/${module}/*.hpp
-       modules/${module}/*/*.hpp)
+       modules/${module}/node/*.hpp)
   foreach(header ${module_headers})
     file(STRINGS ${header} of_runtime REGEX "^#include \"runtime/")
     if(NOT of_runtime)
