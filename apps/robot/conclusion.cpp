@@ -247,6 +247,9 @@ void warn_unlocated(const RobotOptions& options, const RunSummary& summary,
                           "odometry ("
                        << summary.fixes->used << " fixes used, " << summary.fixes->rejected
                        << " rejected)";
+  if (summary.localization && !summary.localization->localised)
+    log::warn("robot") << "not localised in " << summary.localization->map
+                       << ": the poses are those of odometry";
   if (!options.extend.empty() && !record.progress().located)
     log::warn("robot") << "not localised in " << options.extend.string()
                        << ": the poses of this run are those of odometry, apart from those before";

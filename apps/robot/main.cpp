@@ -176,7 +176,9 @@ void add_network(CLI::App& app, RobotOptions& options) {
 void add_output(CLI::App& app, RobotOptions& options) {
   CLI::App& group = *app.add_option_group("Output", "Where the results go");
   group.require_option(1);
-  group.add_option("--output", options.output, "Folder of the results, made if absent");
+  group.add_option(
+      "--output", options.output,
+      "Folder of the results, made if absent; those of an earlier run in it are replaced");
   group.add_option_function<std::string>(
       "--resume",
       [&options](const std::string& folder) {

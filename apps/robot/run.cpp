@@ -56,7 +56,7 @@ void make_output(const fs::path& folder) {
 // Call when all inputs of the run have been checked, because earlier results are removed.
 void remove_former(const fs::path& folder, bool continues, bool resume) {
   if (!resume && is_file(folder / kSummary))
-    log::info("robot") << folder.string() << ": the results of an earlier run are replaced";
+    log::warn("robot") << folder.string() << ": the results of an earlier run are replaced";
   remove_results(folder, continues);
   if (resume) return;
   for (const char* file : {kJournal, kMapFile}) fs::remove(folder / file);

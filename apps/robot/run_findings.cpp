@@ -202,7 +202,9 @@ class FindingsOfRun {
           "find the program; in a team without keys it can also send measurements (--security)");
     for (const auto& [name, why] : run_.unmet_peers)
       add(kWarning, "network.unmet", (name + " was never met: ").append(why),
-          "its messages were not used", "kimera_multi_doctor --network examines the network");
+          "its messages were not used",
+          why.find("keys") != why.npos ? "give all robots keys of one team: kimera_multi_keys"
+                                       : "kimera_multi_doctor --network examines the network");
     for (const auto& [name, seconds] : run_.lost_peers)
       add(kWarning, "link.lost",
           name + " was not received in the last " + fixed(seconds, 1) + " s of the run",
