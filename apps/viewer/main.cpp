@@ -30,8 +30,8 @@ receives whom, cost, bytes, loads, memory. Its time slider goes back to any mome
 constexpr const char* kFooter = R"(
 RESULTS is the folder of a team or of one robot, also if it still runs or was killed. Everything appears
 at the time at which the robot knew it, with two exceptions. Meshes are those of the end of the run: each
-chunk appears at the time at which the robot saw its surface. Objects, 2D map, distances and the team's
-mesh appear at the end of the run.
+chunk appears at the time at which the robot saw its surface. Objects, 2D map and the team's mesh
+appear at the end of the run.
 
 With --domain the viewer joins the DDS domain of a running team as a listener; robots do not wait for it.
 Robots that run with --view send about 2 kB/s, chunks of the map as they change, and small camera images

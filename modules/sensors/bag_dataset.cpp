@@ -256,11 +256,13 @@ void BagDataset::take(SensorRole role, BagMessage message) {
     reject(role, doubtful.front());
     return doubtful.pop_front();
   }
-  for (Doubtful& one : std::exchange(doubtful, {}))
+  for (; !doubtful.empty(); doubtful.pop_front()) {
+    Doubtful& one = doubtful.front();
     if (const auto time = time_.between(index_of(role), one.stated, stamp))
       take_stamped(role, *time, std::move(one.message));
     else
       reject(role, one);
+  }
   take_stamped(role, stamp, std::move(message));
 }
 

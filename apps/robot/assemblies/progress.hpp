@@ -12,33 +12,16 @@
 
 namespace km {
 
-/// Progress of a robot in its input: time from the first stamp to the latest. Thread-safe.
-class InputTime {
- public:
-  void reach(Stamp stamp) {
-    const std::lock_guard lock(mutex_);
-    if (!first_) first_ = last_ = stamp;
-    last_ = std::max(last_, stamp);
-  }
-
-  /// [s]; 0 before the first stamp.
-  [[nodiscard]] double seconds() const {
-    const std::lock_guard lock(mutex_);
-    return first_ ? seconds_between(*first_, last_) : 0.0;
-  }
-
- private:
-  mutable std::mutex mutex_;
-  std::optional<Stamp> first_;
-  Stamp last_ = 0;
-};
-
 /// The progress of a robot, as it shows it to the others and to viewers. Thread-safe.
 class Progress {
  public:
   Progress(RobotCore& core, const Places& places);
 
-  [[nodiscard]] double input_s() const { return input_time_.seconds(); }
+  /// Time from the first stamp of the input to the latest [s]; 0 before the first.
+  [[nodiscard]] double input_s() const {
+    const std::lock_guard lock(mutex_);
+    return seconds_between(first_.value_or(last_), last_);
+  }
   /// Time in the input at which closures tied this run to the map, or fixes determined the absolute
   /// frame; absent before.
   [[nodiscard]] std::optional<double> located_after_s() const {
@@ -59,14 +42,16 @@ class Progress {
   void add_to(RobotSample& sample) const;
 
  private:
+  void reach(Stamp stamp);
   void take(const Topic<OptimizerProgress>::Message& progress);
 
   RobotCore& core_;
   const Node* const locator_;
-  InputTime input_time_;
   std::atomic<std::uint32_t> keyframes_ = 0;
   std::atomic<std::uint8_t> settled_links_ = 0;
-  mutable std::mutex mutex_;  // guards the rest
+  mutable std::mutex mutex_;    // guards the rest
+  std::optional<Stamp> first_;  // stamps of the input
+  Stamp last_ = 0;
   Topic<OptimizerProgress>::Message optimizer_;
   bool is_apart_ = false;  // not yet located
   std::optional<double> located_after_s_;
