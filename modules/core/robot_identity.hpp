@@ -11,7 +11,7 @@ namespace km {
 
 /// Version of the protocol between robots as a whole. Robots of different versions do not
 /// communicate. Fields appended to a topic type do not change it, see idl/README.md.
-inline constexpr std::uint16_t kProtocolVersion = 14;
+inline constexpr std::uint16_t kProtocolVersion = 15;
 
 /// Each process of a robot has its own boot id, not zero. The upper 48 bits are the incarnation,
 /// the lower 16 count how often it was resumed. Processes of one incarnation have the same
