@@ -47,10 +47,8 @@ int run_subcommands(const std::string& program, const std::string& about,
   if (exit_code.value_or(0) == 0) return 0;
   if (!app.get_subcommands().empty()) return *exit_code;
   std::cerr << program << ": the first word must be a subcommand:\n";
-  for (const CLI::App* one : app.get_subcommands(nullptr)) {
-    const std::string text = one->get_description();
-    std::cerr << "  " << one->get_name() << "  " << text.substr(0, text.find('\n')) << '\n';
-  }
+  for (const CLI::App* one : app.get_subcommands(nullptr))
+    std::cerr << "  " << one->get_name() << "  " << one->get_description() << '\n';
   return *exit_code;
 } catch (const std::exception& error) {
   std::cerr << program << ": " << error.what() << '\n';

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>  // takes seconds to compile: only for sources that define options
+#include <algorithm>
 #include <exception>
 #include <initializer_list>
 #include <memory>
@@ -32,10 +33,13 @@ int run_subcommands(const std::string& program, const std::string& about,
                     std::initializer_list<void (*)(CLI::App&)> adders, int argc, char** argv);
 
 /// Adds a subcommand to `app`. Its options are those that `define(CLI::App&)` of a Command adds,
-/// and `run()` runs it as soon as the command line names it.
+/// and `run()` runs it as soon as the command line names it. The first line of `about` is its
+/// title, which is all that the help of the program shows.
 template <typename Command>
 void add_command(CLI::App& app, const char* name, const std::string& about) {
-  CLI::App& subcommand = *app.add_subcommand(name, about);
+  const std::size_t end = std::min(about.find('\n'), about.size());
+  CLI::App& subcommand = *app.add_subcommand(name, about.substr(0, end));
+  subcommand.footer(about.substr(std::min(end + 1, about.size())));
   const auto command = std::make_shared<Command>();
   command->define(subcommand);
   subcommand.callback([command] { command->run(); });

@@ -107,8 +107,7 @@ struct RenderCommand {
 };
 
 constexpr const char* kRenderDetails =
-    R"(Shaded picture of meshes, without a display: colours of labels with a legend, a scale bar,
-and trajectories on top
+    R"(Shaded picture of meshes with a legend, a scale bar and trajectories, without a display
 
 Faces are seen from the side they were mapped from: from above one looks into rooms. Views:
   top, front, oblique     parallel, fill the picture
