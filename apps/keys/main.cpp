@@ -6,6 +6,7 @@
 #include <optional>
 #include <set>
 #include <span>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -107,7 +108,7 @@ struct IssueCommand {
         << R"(Copy each folder onto its robot, keeping modes (scp -rp), and start the robot with
   --robot ID --name NAME --security FOLDER
 then delete it here. )"
-        << (team / "authority").string() << " stays here: whoever has it can admit anyone.\n";
+        << (team / kAuthorityFolder).string() << " stays here: whoever has it can admit anyone.\n";
   } catch (const ConfigError& error) {
     throw CLI::ValidationError("--robots", error.what());
   }
@@ -131,7 +132,7 @@ struct RevokeCommand {
   void run() const {
     print_revoked(TeamFolder(team).revoke(robot));
     std::cout << "A robot refuses it once it has the new list: copy "
-              << (team / "authority" / kRevocationsFile).string()
+              << (team / kAuthorityFolder / kRevocationsFile).string()
               << "\ninto the folder of keys on every robot that stays.\n";
   }
 };
@@ -152,16 +153,18 @@ void print_certificates(std::span<const Certificate> certificates, const std::st
 }
 
 // If the folder of a robot is on this host, prints that the user must delete this folder once the
-// robot has it. Also prints if its list of revocations is old or the folder is unusable.
-void report_folder(const fs::path& folder, const Revocations& revocations) {
-  if (!fs::is_directory(folder)) return;
+// robot has it. Also prints if its list of revocations is old. False if the folder is unusable.
+bool report_folder(const fs::path& folder, const Revocations& revocations) {
+  if (!fs::is_directory(folder)) return true;
   try {
     const RobotKeys keys = load_robot_keys(folder);
     std::cout << folder.string() << ": here, with its secret: delete it once it is on the robot\n";
     if (keys.revocations.number < revocations.number)
       std::cout << folder.string() << ": its list of revocations is old\n";
+    return true;
   } catch (const std::exception& error) {
     std::cout << "unusable: " << error.what() << '\n';
+    return false;
   }
 }
 
@@ -181,7 +184,11 @@ struct ShowCommand {
                        team.revocations());
     std::set<std::string> names;
     for (const Certificate& certificate : team.issued()) names.insert(certificate.name);
-    for (const std::string& name : names) report_folder(folder / name, team.revocations());
+    bool are_usable = true;
+    for (const std::string& name : names)
+      are_usable &= report_folder(folder / name, team.revocations());
+    if (!are_usable)
+      throw std::runtime_error(folder.string() + ": has unusable folders, see above");
   }
 
   void show_robot() const {
@@ -203,16 +210,16 @@ void add_make(CLI::App& app) {
 void add_add(CLI::App& app) {
   add_command<IssueCommand<false>>(
       app, "add",
-      R"(Add robots to a team, or renew a certificate that is revoked or has expired. Running robots
-accept the new keys: nothing has to be copied to them.
+      R"(Add robots to a team, or renew a certificate that is revoked or has expired.
+Running robots accept the new keys: nothing has to be copied to them.
   kimera_multi_keys add survey --robots gamma:2)");
 }
 
 void add_revoke(CLI::App& app) {
   add_command<RevokeCommand>(
       app, "revoke",
-      R"(Revoke a robot's certificates, for a robot that is lost or whose secret was read. Copy the new
-list of revocations to the other robots: until then they still accept the robot.
+      R"(Revoke a robot's certificates, for a robot that is lost or whose secret was read.
+Copy the new list of revocations to the other robots: until then they still accept the robot.
   kimera_multi_keys revoke survey beta)");
 }
 

@@ -22,7 +22,11 @@ std::int64_t now_s() {
 std::shared_ptr<SharedSeal> make_team_seal(const std::filesystem::path& folder,
                                            const RobotIdentity& own) {
   if (folder.empty()) return nullptr;
-  return std::make_shared<SharedSeal>(load_robot_keys(folder), own, now_s());
+  const RobotKeys keys = load_robot_keys(folder);
+  auto seal = std::make_shared<SharedSeal>(keys, own, now_s());
+  log::info("keys") << folder.string() << ": robot " << keys.certificate.name << " of team "
+                    << keys.certificate.team << "; only robots of this team are heard";
+  return seal;
 }
 
 TeamKeysNode::TeamKeysNode(std::filesystem::path folder, SharedSeal& seal, Apply apply)

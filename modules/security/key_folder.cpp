@@ -25,6 +25,8 @@ Revocations checked_revocations(const std::filesystem::path& folder, const Publi
 
 RobotKeys load_robot_keys(const std::filesystem::path& folder) {
   start_sodium();
+  if (std::filesystem::exists(folder / kAuthorityFolder))
+    refuse(folder, "is a team's folder, with the authority's secret; name a robot's folder in it");
   RobotKeys keys;
   const Authority authority = read_authority(folder / kAuthorityFile);
   keys.authority = authority.key;

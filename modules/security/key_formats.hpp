@@ -7,7 +7,8 @@
 
 namespace km {
 
-/// The files of a robot's folder of keys.
+/// The folder of a team's authority, and the files of a robot's folder of keys.
+inline constexpr const char* kAuthorityFolder = "authority";
 inline constexpr const char* kSecretKeyFile = "secret_key.txt";
 inline constexpr const char* kCertificateFile = "certificate.txt";
 inline constexpr const char* kAuthorityFile = "authority.txt";

@@ -14,7 +14,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kAuthorityFolder = "authority";
 constexpr const char* kIssuedFolder = "issued";
 
 // A certificate is valid from the day before it is made, because clocks of robots may be behind.

@@ -56,7 +56,7 @@ TEST_CASE("kimera_multi_keys shows what is wrong with a robot's folder") {
   fs::permissions(keys.folder.path() / "survey/alpha/secret_key.txt", fs::perms::others_read,
                   fs::perm_options::add);
   const auto team = keys("show survey");
-  CHECK(team.exit_code == 0);
+  CHECK(team.exit_code == 1);
   CHECK_THAT(team.output, Contains("unusable: survey/alpha/secret_key.txt: has mode 0604"));
   CHECK(keys("show survey/alpha").exit_code == 1);
 }
