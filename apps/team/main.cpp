@@ -101,8 +101,8 @@ void define(CLI::App& app, TeamOptions& options) {
       "(.up, .down): "
       "each robot gets a network of its own");
   app.add_option("--json", options.json, "Also write the results to this file, as JSON");
-  app.add_option("--robot-binary", options.robot_binary, "Program of a robot")
-      ->capture_default_str();
+  app.add_option("--robot-binary", options.robot_binary,
+                 "Program of a robot (default: the one beside this)");
   app.add_option_function<std::vector<std::string>>(
          "--record", [&options](const std::vector<std::string>& file) { options.record = file[0]; },
          "Each robot writes record.mcap, for Foxglove, Lichtblick, Rerun, PlotJuggler, and at the "

@@ -51,7 +51,7 @@ struct ClosureTruthOptions {
                   "[deg] a larger error is false unless the covariance of the pose explains it");
     visitor.field("min_overlap", min_overlap, {1e-6, 1.0},
                   "two keyframes see the same place if at least this share of the image of each is "
-                  "in the other's view, see view_overlap()");
+                  "in the other's view");
     visitor.field("default_depth_m", default_depth_m, {1e-6, 1000.0},
                   "[m] depth of the scene, for keyframes without a measured depth");
   }

@@ -157,7 +157,8 @@ BagDataset::BagDataset(std::string name, std::unique_ptr<BagReader> bag, Rig rig
           << (gives_poses() ? "a pose of the odometry"
               : has_imu()   ? "inertial samples"
                             : "images of all cameras");
-  if (start_) message << " from " << window.from_s << " s to " << window.to_s << " s";
+  if (start_ && window.from_s > 0.0) message << " from " << window.from_s << " s";
+  if (start_ && std::isfinite(window.to_s)) message << " to " << window.to_s << " s";
   for (const SensorTopic& wanted : sensor_topics(rig_.topics))
     if (taken_[index_of(wanted.kind->role)] == 0)
       message << "; no message on " << readable(wanted.topic, 80);

@@ -359,8 +359,8 @@ std::string RigCompletion::missing() const {
   const auto body = body_frame(), left = camera_frame(0);
   if (!body)
     append(list, "frame of the body: " +
-                     (body_topic().empty() ? "" : "messages on " + body_topic() + ", or ") +
-                     "body_frame");
+                     (body_topic().empty() ? "" : "frame_id of " + body_topic() + ", or ") +
+                     "body_frame in the rig");
   if (!left && partial_.has_cameras)
     append(list, "frame of the left camera: images on " + partial_.rig.topics.left);
   if (!T_body_left())

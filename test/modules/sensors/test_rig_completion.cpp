@@ -213,7 +213,7 @@ TEST_CASE("A missing part of a calibration is named with the topics that could s
              Contains("a.bag: the calibration is not complete") &&
                  Contains("the left camera: sensor_msgs/CameraInfo on /left_info") &&
                  Contains("the right camera: sensor_msgs/CameraInfo on /right_info") &&
-                 Contains("frame of the body: messages on /imu, or body_frame") &&
+                 Contains("frame of the body: frame_id of /imu, or body_frame in the rig") &&
                  Contains("pose of the left camera on the body: /tf_static"));
   ListedBag bag;
   bag.add("/left_info", camera_info("left_optical", 0.0));
