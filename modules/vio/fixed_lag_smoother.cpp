@@ -72,10 +72,6 @@ constexpr double kHeldHeading_rad = 1e-3;
 constexpr double kBridgeGyro = 0.5;   // [rad/s/sqrt(Hz)]
 constexpr double kBridgeAccel = 2.0;  // [m/s^2/sqrt(Hz)]
 
-constexpr double kGyroBiasSigma = 0.02;  // around the guess of the start [rad/s]
-// Standard deviation of the angular rate at a start without an inertial sensor [rad/s].
-constexpr double kRateSigma = 3.0;
-
 // Rows of a prior that hold heading and position of a state. The heading is the rotation about the
 // vertical, expressed in the body frame.
 Eigen::MatrixXd held_gauge(const OdometryState& state) {
@@ -98,8 +94,13 @@ Eigen::Matrix<double, 11, 15> without_gauge(const OdometryState& state) {
 
 }  // namespace
 
-FixedLagSmoother::FixedLagSmoother(const SensorRig& rig, const VioConfig& config)
-    : config_(config_for(rig, config)), noise_(rig.imu), has_imu_(rig.has_imu) {
+FixedLagSmoother::FixedLagSmoother(const SensorRig& rig, const MotionModel& model,
+                                   const LearnedSensors& learned)
+    : model_(model),
+      config_(model.config),
+      noise_(rig.imu),
+      gyro_noise_(learned.gyro_noise),
+      shown_motion_(learned.shown_motion) {
   noise_.gyro_noise_density *= config_.gyro_noise_factor;
   noise_.accel_noise_density *= config_.accel_noise_factor;
   for (std::size_t c = 0; c < 2; ++c)
@@ -107,6 +108,7 @@ FixedLagSmoother::FixedLagSmoother(const SensorRig& rig, const VioConfig& config
   window_.calibrates = config_.calibrate;
   calibrate(window_, {});
   calibration_covariance_ = calibration_prior();
+  if (window_.calibrates && learned.calibration) take_calibration(*learned.calibration);
   window_.gravity_mps2 = config_.gravity_mps2;
   window_.loss_scale = config_.loss_scale;
   focal_px_ = window_.views[0].weight * config_.noise_px;
@@ -116,7 +118,6 @@ FixedLagSmoother::FixedLagSmoother(const SensorRig& rig, const VioConfig& config
 
 std::optional<std::vector<OdometryState>> FixedLagSmoother::start(
     std::span<const InertialFrame> frames, std::span<const OdometryState> guess) {
-  clear();
   Stamp last_keyframe = 0;
   for (std::size_t k = 0; k < frames.size(); ++k) {
     if (!append(frames[k], guess[k], 0.0)) return std::nullopt;
@@ -142,7 +143,6 @@ std::optional<std::vector<OdometryState>> FixedLagSmoother::start(
 
 void FixedLagSmoother::start(const InertialFrame& frame, const OdometryState& state,
                              const StateCovariance& covariance) {
-  clear();
   (void)append(frame, state, first_offset_s(frame));  // true: the first frame has no factor
   observe(window_, frame.tracked);
   window_.frames.back().keyframe = true;
@@ -155,24 +155,15 @@ void FixedLagSmoother::start(const InertialFrame& frame, const OdometryState& st
   hold_calibration();
 }
 
-void FixedLagSmoother::set_calibration_prior(const UncertainCalibration& known) {
-  if (!window_.calibrates) return;
+// Begins with a calibration of before if that is plausible.
+void FixedLagSmoother::take_calibration(const UncertainCalibration& known) {
+  const CalibrationVector moved = CameraCalibration{}.local_coordinates_to(known.calibration);
+  if (known.covariance.llt().info() != Eigen::Success ||
+      !(moved.dot(calibration_covariance_.llt().solve(moved)) <
+        kMostCalibration * kMostCalibration))
+    return;
   calibrate(window_, known.calibration);
   calibration_covariance_ = known.covariance;
-}
-
-// Removes frames, landmarks and prior. Keeps the estimated calibration if it is plausible.
-void FixedLagSmoother::clear() {
-  const UncertainCalibration known = calibration();
-  const CalibrationVector moved = CameraCalibration{}.local_coordinates_to(known.calibration);
-  const bool possible =
-      known.covariance.llt().info() == Eigen::Success &&
-      moved.dot(calibration_prior().llt().solve(moved)) < kMostCalibration * kMostCalibration;
-  calibration_covariance_ = possible ? known.covariance : calibration_prior();
-  if (!possible) calibrate(window_, {});
-  window_.frames.clear();
-  window_.landmarks.clear();
-  window_.prior = {};
 }
 
 SmootherUpdate FixedLagSmoother::add(const InertialFrame& frame, bool rests) {
@@ -182,7 +173,7 @@ SmootherUpdate FixedLagSmoother::add(const InertialFrame& frame, bool rests) {
   WindowFrame& newest = window_.frames.back();
   const OdometryState predicted = predict(window_.frames[window_.frames.size() - 2].state,
                                           newest.imu->imu(), config_.gravity_mps2);
-  const bool is_moved = !has_imu_ && frame.tracked.T_previous_current;
+  const bool is_moved = !model_.is_measured && frame.tracked.T_previous_current;
   newest.state = is_moved ? moved_by_images(window_.frames[window_.frames.size() - 2].state,
                                             frame.tracked, T_body_left_)
                           : predicted;
@@ -194,7 +185,7 @@ SmootherUpdate FixedLagSmoother::add(const InertialFrame& frame, bool rests) {
   update.solution = optimize(window_, kIterations);
   update.fit = fit_of_newest();
   update.outliers = reject_outliers();
-  if (has_imu_ && !newest.imu->rests() && !newest.is_bridged) compare_gyro();
+  if (model_.is_measured && !newest.imu->rests() && !newest.is_bridged) compare_gyro();
   if (is_moved)
     shown_motion_.add(
         window_.frames[last_keyframe()].state, newest.state,
@@ -219,7 +210,7 @@ bool FixedLagSmoother::append(const InertialFrame& frame, OdometryState state, d
   if (now == 0) return true;
   added.samples = frame.samples;
   added.is_bridged = frame.is_bridged;
-  added.is_smooth = !has_imu_ && !frame.tracked.T_previous_current;
+  added.is_smooth = !model_.is_measured && !frame.tracked.T_previous_current;
   // The prior determines the velocity after the last image before the loss of vision, too.
   WindowFrame& before = window_.frames[now - 1];
   if (added.is_smooth && before.imu && !before.imu->rests()) {
@@ -249,9 +240,7 @@ bool FixedLagSmoother::share_samples() {
 bool FixedLagSmoother::set_imu(std::size_t frame) {
   const WindowFrame& before = window_.frames[frame - 1];
   WindowFrame& f = window_.frames[frame];
-  ImuNoise noise = noise_;
-  if (!has_imu_)
-    noise = prior_noise(f.is_smooth, seconds_between(before.state.stamp, f.state.stamp));
+  ImuNoise noise = noise_between(f.is_smooth, seconds_between(before.state.stamp, f.state.stamp));
   noise.gyro_noise_density *= gyro_noise_.scale();
   if (f.is_bridged) {
     noise.gyro_noise_density = std::max(noise.gyro_noise_density, kBridgeGyro);
@@ -273,8 +262,8 @@ bool FixedLagSmoother::set_imu(std::size_t frame) {
   return f.imu.has_value();
 }
 
-// Noise of the virtual sensor, see motion_prior.hpp.
-ImuNoise FixedLagSmoother::prior_noise(bool is_smooth, double dt_s) const {
+ImuNoise FixedLagSmoother::noise_between(bool is_smooth, double dt_s) const {
+  if (model_.is_measured) return noise_;
   const MotionNoise allowed{.accel = config_.motion_accel, .turn = config_.motion_turn};
   return virtual_imu_noise(is_smooth ? shown_motion_.noise(allowed) : allowed, dt_s);
 }
@@ -334,7 +323,7 @@ void FixedLagSmoother::decide_keyframe() {
   if (seen_now < kMinKeyframeFeatures) return;
   // The window lacks some lost features of the keyframe. With an inertial sensor, motion is
   // also determined without common features.
-  if (!has_imu_) seen_in_keyframe = keyframe.features;
+  if (!model_.is_measured) seen_in_keyframe = keyframe.features;
   if (patience * static_cast<double>(parallax.size()) <= kKeyframeTrackedShare * seen_in_keyframe ||
       parallax.empty()) {
     newest.keyframe = true;
@@ -488,11 +477,11 @@ void FixedLagSmoother::set_first_prior() {
   StatePrior& prior = window_.prior;
   prior.frames = {window_.frames.front().id};
   prior.linearization = {first};
-  prior.J = Eigen::MatrixXd::Zero(has_imu_ ? 10 : 15, 15);
+  prior.J = Eigen::MatrixXd::Zero(model_.is_measured ? 10 : 15, 15);
   prior.J.topRows<4>() = held_gauge(first);
-  prior.J.block<3, 3>(4, 9).diagonal().setConstant(1.0 / (has_imu_ ? kGyroBiasSigma : kRateSigma));
+  prior.J.block<3, 3>(4, 9).diagonal().setConstant(1.0 / model_.gyro_bias_sigma_radps);
   prior.J.block<3, 3>(7, 12).diagonal().setConstant(1.0 / config_.accel_bias_sigma);
-  if (!has_imu_) {  // nothing determines the tilt, and a single image no velocity
+  if (!model_.is_measured) {  // nothing determines the tilt, and a single image no velocity
     prior.J.block<2, 3>(10, 0) = first.T_odom_body.linear().topRows<2>() / kHeldHeading_rad;
     prior.J.block<3, 3>(12, 6).diagonal().setConstant(1.0 / config_.max_speed_mps);
   }
@@ -575,7 +564,7 @@ void FixedLagSmoother::drop_at_rest(std::size_t frame) {
     if (std::ranges::none_of(landmark.observations, in_keyframe)) landmark.located = false;
   WindowFrame& later = window_.frames[frame];
   const double dt_s = seconds_between(window_.frames[frame - 1].state.stamp, later.state.stamp);
-  later.imu = ImuFactor::at_rest(has_imu_ ? noise_ : prior_noise(false, dt_s), dt_s);
+  later.imu = ImuFactor::at_rest(noise_between(false, dt_s), dt_s);
 }
 
 }  // namespace km

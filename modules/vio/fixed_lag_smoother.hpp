@@ -8,7 +8,7 @@
 #include "modules/core/data/covariance.hpp"
 #include "modules/vio/estimate_watch.hpp"
 #include "modules/vio/gyro_noise_scale.hpp"
-#include "modules/vio/motion_prior.hpp"
+#include "modules/vio/motion_model.hpp"
 #include "modules/vio/tracked_frame.hpp"
 #include "modules/vio/vio_config.hpp"
 #include "modules/vio/window.hpp"
@@ -41,8 +41,15 @@ struct RelativeMotion {
   double error_ratio = 1.0;         ///< See WindowEquations::error_ratio().
 };
 
+/// Knowledge of the sensors that a window hands to the next one.
+struct LearnedSensors {
+  std::optional<UncertainCalibration> calibration;
+  GyroNoiseScale gyro_noise;
+  ShownMotion shown_motion;  ///< Without an inertial sensor.
+};
+
 /// Fixed-lag smoother over the poses, velocities, biases and landmarks of a few keyframes and the
-/// most recent images.
+/// most recent images. It begins once, with one of start(); what restarts makes a new one.
 ///
 /// The window slides in two ways. An image that is neither a keyframe nor recent is removed with
 /// its observations. One inertial factor, integrated from all samples, replaces the factors before
@@ -61,26 +68,23 @@ struct RelativeMotion {
 /// Deterministic; not thread-safe.
 class FixedLagSmoother {
  public:
-  /// Throws ConfigError if `config` is out of bounds.
-  FixedLagSmoother(const SensorRig& rig, const VioConfig& config);
+  /// A learned calibration is used if the model calibrates and the calibration is plausible.
+  FixedLagSmoother(const SensorRig& rig, const MotionModel& model,
+                   const LearnedSensors& learned = {});
 
-  /// Starts from guessed states of consecutive images, one for each of `frames`, and discards all
-  /// earlier frames. A prior holds the first position and heading, and weakly the guessed biases.
+  /// Starts from guessed states of consecutive images, one for each of `frames`. A prior holds the
+  /// first position and heading, and weakly the guessed biases.
   /// Returns the refined states, or nullopt if the optimisation failed or the samples between two
   /// images make no inertial factor.
   [[nodiscard]] std::optional<std::vector<OdometryState>> start(
       std::span<const InertialFrame> frames, std::span<const OdometryState> guess);
 
-  /// Starts on one image, from an earlier estimate of its state, and discards all earlier frames.
-  /// Heading and position are held; the positive definite `covariance` constrains the other
+  /// Starts on one image, from an earlier estimate of its state. Heading and position are held;
+  /// the positive definite `covariance` constrains the other
   /// variables. The state belongs to the instant given by the current calibration. If this instant
   /// lies before the image, frame.samples should begin before the instant.
   void start(const InertialFrame& frame, const OdometryState& state,
              const StateCovariance& covariance);
-
-  /// Replaces the prior on the calibration by the estimate `known` of an earlier process, if the
-  /// calibration is estimated and `known` is plausible. Call before start().
-  void set_calibration_prior(const UncertainCalibration& known);
 
   /// Adds the next image; `rests`: the body stands still. Precondition: start() succeeded. If
   /// frame.samples do not cover the time since the image before or make no inertial factor, the
@@ -105,6 +109,10 @@ class FixedLagSmoother {
   /// not calibrate.
   [[nodiscard]] UncertainCalibration calibration() const;
 
+  [[nodiscard]] LearnedSensors learned() const {
+    return {calibration(), gyro_noise_, shown_motion_};
+  }
+
   /// Factor on the noise of the gyroscope, in addition to VioConfig::gyro_noise_factor.
   [[nodiscard]] double gyro_noise_scale() const { return gyro_noise_.scale(); }
 
@@ -121,13 +129,13 @@ class FixedLagSmoother {
   [[nodiscard]] bool share_samples();
   [[nodiscard]] bool set_imu(std::size_t frame);
   void compare_gyro();
-  [[nodiscard]] ImuNoise prior_noise(bool is_smooth, double dt_s) const;
+  [[nodiscard]] ImuNoise noise_between(bool is_smooth, double dt_s) const;
   [[nodiscard]] std::size_t last_keyframe() const;
   void decide_keyframe();
   int reject_outliers();
   [[nodiscard]] ImageFit fit_of_newest() const;
   void locate_landmarks();
-  void clear();
+  void take_calibration(const UncertainCalibration& known);
   void set_first_prior();
   void hold_calibration();
   [[nodiscard]] double first_offset_s(const InertialFrame& frame) const;
@@ -138,11 +146,11 @@ class FixedLagSmoother {
   [[nodiscard]] std::optional<Eigen::MatrixXd> covariance_of(Eigen::MatrixXd D_T) const;
   [[nodiscard]] std::size_t keyframes() const;
 
-  VioConfig config_;
+  MotionModel model_;
+  VioConfig config_;  // Copied from the model.
   ImuNoise noise_;
-  bool has_imu_;  // False: see motion_prior.hpp.
   GyroNoiseScale gyro_noise_;
-  ShownMotion shown_motion_;  // Without an inertial sensor.
+  ShownMotion shown_motion_;
   double focal_px_;
   Eigen::Matrix3d R_cam_body_;
   SE3 T_body_left_;

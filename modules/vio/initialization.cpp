@@ -8,7 +8,7 @@
 #include <stdexcept>
 
 #include "modules/core/geometry/lie.hpp"
-#include "modules/vio/motion_prior.hpp"
+#include "modules/vio/motion_model.hpp"
 #include "modules/vio/rest_detector.hpp"
 #include "modules/vio/window.hpp"
 

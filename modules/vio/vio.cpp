@@ -11,7 +11,6 @@
 #include "modules/core/data/imu_limits.hpp"
 #include "modules/core/geometry/lie.hpp"
 #include "modules/vio/keyframe_rule.hpp"
-#include "modules/vio/motion_prior.hpp"
 
 namespace km {
 namespace {
@@ -19,11 +18,8 @@ namespace {
 // Largest lead of a sample over its image; a wrong stamp would block all later samples.
 constexpr double kMaxAhead_s = 1.0;
 constexpr double kMaxCostPerLandmark = 100.0;  // a hundred times that of a usable fit
-// Larger estimated biases show that the estimate has diverged. Without an inertial sensor the bias
-// of the gyroscope is the angular rate.
-constexpr double kMaxGyroBias_radps = 0.5;
+// A larger estimated bias shows that the estimate has diverged.
 constexpr double kMaxAccelBias_mps2 = 3.0;
-constexpr double kUnbounded = std::numeric_limits<double>::infinity();
 
 // After this time without a successful start, the oldest images held back are dropped.
 constexpr double kStartTimeout_s = 3.0;
@@ -52,10 +48,6 @@ constexpr double kRecovered_s = 0.8;
 constexpr int kLeastTracked = 30;
 constexpr double kLongestBridge_s = 3.0;
 
-// Longest pause of the images over which inertial samples alone give the pose. Samples that are
-// older than this are dropped. After a longer pause odometry starts again from the last pose.
-constexpr double kLongestPause_s = 10.0;
-
 // Longest time between two samples; infinite without samples.
 double longest_step_s(const std::vector<ImuSample>& samples) {
   if (samples.empty()) return std::numeric_limits<double>::infinity();
@@ -64,10 +56,6 @@ double longest_step_s(const std::vector<ImuSample>& samples) {
     longest_s = std::max(longest_s, seconds_between(samples[k - 1].stamp, samples[k].stamp));
   return longest_s;
 }
-
-// Without an inertial sensor, the longest time for which the last speeds give the pose while images
-// do not. After it odometry starts again from the last pose.
-constexpr double kLongestCoast_s = 1.0;
 
 // Ratio of the variance of a motion to that of WindowEquations::error_ratio(), for errors that all
 // landmarks share. Chosen on these flights, on halves of MH_01 and on the room of apps/demo. Images
@@ -83,12 +71,12 @@ constexpr double kMostTiltSigma = 1.5;    // a larger uncertainty means that the
 Vio::Vio(RobotId robot, const SensorRig& rig, const TrackerConfig& tracker, const VioConfig& config)
     : robot_(robot),
       rig_(rig),
-      config_(config_for(rig, config)),
+      model_(motion_model(rig, config)),
+      config_(model_.config),
       readout_s_(tracker.readout_s),
       tracker_(rig.stereo, tracker, rig.has_imu),
-      smoother_(rig, config),
       rest_detector_(config_, rig.stereo.cameras[0].fx),
-      vision_(rig.has_imu) {
+      vision_(model_.vision_patience_s) {
   statistics_.has_imu = rig.has_imu;
 }
 
@@ -97,13 +85,12 @@ void Vio::continue_from(const VioCheckpoint& checkpoint) {
   last_keyframe_ = checkpoint.keyframe;
   T_chain_odom_ = last_ ? checkpoint.keyframe.T_odom_kf * last_->T_odom_body.inverse()
                         : chain_of_next_run(checkpoint.keyframe);
-  if (checkpoint.keyframe.calibration)
-    smoother_.set_calibration_prior(*checkpoint.keyframe.calibration);
+  learned_.calibration = checkpoint.keyframe.calibration;
 }
 
 VioResult Vio::process(const SensorPacket& packet) {
   VioResult result;
-  const int refused = rig_.has_imu ? take_samples(packet) : 0;
+  const int refused = model_.is_measured ? take_samples(packet) : 0;
   drop_old_samples();
   if (refused > 0) result.problem = VioProblem::kBadSamples;
   statistics_.refused_samples += refused;
@@ -116,7 +103,7 @@ VioResult Vio::process(const SensorPacket& packet) {
   }
   ++statistics_.images;
   const Stamp before = last_image_.value_or(frame->stamp);
-  if (!rig_.has_imu) samples_ = virtual_samples(before, frame->stamp);
+  if (!model_.is_measured) samples_ = virtual_samples(before, frame->stamp);
   Held held;
   held.frame = frame;
   held.data.samples = samples_since(before, frame->stamp);
@@ -127,10 +114,10 @@ VioResult Vio::process(const SensorPacket& packet) {
     result.tracked.push_back(feature.left);
   const int features = static_cast<int>(held.data.tracked.features.size());
   const bool first = !last_image_.has_value();
-  const bool paused = rig_.has_imu && seconds_between(before, frame->stamp) > kLongestPause_s;
+  const bool paused = seconds_between(before, frame->stamp) > model_.longest_pause_s;
   last_image_ = frame->stamp;
 
-  held.data.is_bridged = rig_.has_imu && !first && !paused && gap_s > config_.max_imu_gap_s;
+  held.data.is_bridged = !first && !paused && gap_s > config_.max_imu_gap_s;
   statistics_.gaps += held.data.is_bridged && !in_gap_;
   in_gap_ = held.data.is_bridged;
   if (in_gap_) result.problem = VioProblem::kInertialGap;
@@ -140,7 +127,7 @@ VioResult Vio::process(const SensorPacket& packet) {
     restart(std::move(held));
   } else if (first && can_continue_at(held)) {
     continue_at(held, result);
-  } else if (running_) {
+  } else if (smoother_) {
     advance(held, result);
   } else {
     held_.push_back(std::move(held));
@@ -167,11 +154,11 @@ int Vio::take_samples(const SensorPacket& packet) {
   return refused;
 }
 
-// Keeps the samples from the last one at or before the last image on, but at most those of
-// kLongestPause_s.
+// Keeps the samples from the last one at or before the last image on, but at most those of the
+// longest pause.
 void Vio::drop_old_samples() {
-  if (samples_.empty()) return;
-  Stamp needed = samples_.back().stamp - nanoseconds(kLongestPause_s);
+  if (samples_.empty() || !model_.is_measured) return;
+  Stamp needed = samples_.back().stamp - nanoseconds(model_.longest_pause_s);
   if (last_image_) needed = std::max(needed, *last_image_);
   const auto later = std::ranges::upper_bound(samples_, needed, {}, &ImuSample::stamp);
   if (later != samples_.begin()) samples_.erase(samples_.begin(), std::prev(later));
@@ -196,7 +183,7 @@ std::vector<ImuSample> Vio::samples_since(Stamp last, Stamp now) const {
 
 // True if images can carry the motion over a gap of the samples.
 bool Vio::takes_over(const TrackerStatistics& tracking, double gap_s) const {
-  return running_ && tracking.tracked >= kLeastTracked && gap_s <= kLongestBridge_s;
+  return smoother_ && tracking.tracked >= kLeastTracked && gap_s <= kLongestBridge_s;
 }
 
 Eigen::Matrix3d Vio::turn(const std::vector<ImuSample>& samples, Stamp from, Stamp to) const {
@@ -218,7 +205,6 @@ void Vio::continue_at(const Held& held, VioResult& result) {
   ++statistics_.start_attempts;
   ++statistics_.starts;
   result.start = StartStatus::kContinues;
-  running_ = true;
   seen_ = last_->stamp;
   locate(*last_, held.frame, result);
 }
@@ -227,7 +213,8 @@ void Vio::start_on(const Held& held, const OdometryState& state,
                    const StateCovariance& covariance) {
   InertialFrame frame = held.data;
   frame.samples = samples_;  // includes samples from before the image
-  smoother_.start(frame, state, covariance);
+  if (smoother_) learned_ = smoother_->learned();
+  smoother_.emplace(rig_, model_, learned_).start(frame, state, covariance);
 }
 
 void Vio::try_start(VioResult& result) {
@@ -237,30 +224,30 @@ void Vio::try_start(VioResult& result) {
     ++statistics_.images_without_pose;
   }
   if (held_.empty()) return;
-  if (!rig_.has_imu) {
+  if (!model_.is_measured) {
     statistics_.images_without_pose += static_cast<int>(held_.size()) - 1;
     held_.erase(held_.begin(), std::prev(held_.end()));
   }
   const double span_s =
       seconds_between(held_.front().data.tracked.stamp, held_.back().data.tracked.stamp);
-  if (rig_.has_imu && span_s < config_.start_s - 1e-3) return;
+  if (span_s < config_.start_s - 1e-3) return;
   ++statistics_.start_attempts;
   std::vector<InertialFrame> frames;
   for (const Held& held : held_) frames.push_back(held.data);
-  StartGuess guess = rig_.has_imu ? guess_start(frames, rig_, config_)
-                                  : guess_start_by_images(frames.back(), rig_);
+  StartGuess guess = model_.is_measured ? guess_start(frames, rig_, config_)
+                                        : guess_start_by_images(frames.back(), rig_);
   result.start = guess.status;
   if (started(guess.status)) {
     continue_from_last_pose(guess.states);
-    if (const auto states = smoother_.start(frames, guess.states)) {
+    smoother_.emplace(rig_, model_, learned_);
+    if (const auto states = smoother_->start(frames, guess.states)) {
       ++statistics_.starts;
       result.states = *states;
-      running_ = true;
       seen_ = states->back().stamp;
       continue_or_add_first_keyframe(result);
       locate(states->front(), held_.front().frame, result);
       for (std::size_t k = 1; k < held_.size(); ++k) {
-        if (smoother_.window().frames[k].keyframe && due((*states)[k], *held_[k].frame))
+        if (smoother_->window().frames[k].keyframe && due((*states)[k], *held_[k].frame))
           add_keyframe((*states)[k], result);
         locate((*states)[k], held_[k].frame, result);
       }
@@ -270,6 +257,7 @@ void Vio::try_start(VioResult& result) {
                     [this](const auto& s) { return last_ && s.stamp <= last_->stamp; });
       return;
     }
+    smoother_.reset();
     result.start = StartStatus::kInconsistent;
   }
   if (span_s < kStartTimeout_s) return;
@@ -290,7 +278,7 @@ void Vio::continue_from_last_pose(std::vector<OdometryState>& states) const {
   // Rotation about the vertical that minimises the difference of the two attitudes.
   const Eigen::Matrix3d Q = last_->T_odom_body.linear() * first.linear().transpose();
   const double turn = std::atan2(Q(1, 0) - Q(0, 1), Q(0, 0) + Q(1, 1));
-  const Eigen::Matrix3d R = rig_.has_imu ? so3_exp(turn * Eigen::Vector3d::UnitZ()) : Q;
+  const Eigen::Matrix3d R = model_.is_measured ? so3_exp(turn * Eigen::Vector3d::UnitZ()) : Q;
   const double coasting = coasting_s(unmeasured_s(states.front().stamp));
   const Eigen::Vector3d way = coasting * (last_->v_odom + R * states.front().v_odom);
   const SE3 T = make_pose(R, last_->T_odom_body.translation() + way - R * first.translation());
@@ -301,11 +289,11 @@ void Vio::continue_from_last_pose(std::vector<OdometryState>& states) const {
 }
 
 void Vio::advance(const Held& held, VioResult& result) {
-  const bool rested = smoother_.window().frames.back().rests;
+  const bool rested = smoother_->window().frames.back().rests;
   const bool rests = rest_detector_.add(held.data, *last_);
   statistics_.rests += rests && !rested;
   if (rests) rested_s_ += seconds_between(last_->stamp, held.frame->stamp);
-  result.smoother = smoother_.add(held.data, rests);
+  result.smoother = smoother_->add(held.data, rests);
   const bool contradicted = is_contradicted(*held.frame, held.data.tracked, *result.smoother);
   if (contradicted || !plausible(*result.smoother)) {
     ++statistics_.divergences;
@@ -322,7 +310,7 @@ void Vio::advance(const Held& held, VioResult& result) {
     return;
   }
   result.states.push_back(result.smoother->state);
-  const bool last_chance = last_keyframe_ && smoother_.leaves_next(last_keyframe_->stamp);
+  const bool last_chance = last_keyframe_ && smoother_->leaves_next(last_keyframe_->stamp);
   const bool recovered = has_recovered(*held.frame);
   if (recovered ||
       (result.smoother->keyframe && (last_chance || due(result.smoother->state, *held.frame))))
@@ -334,12 +322,12 @@ void Vio::advance(const Held& held, VioResult& result) {
 // True if the pose would be extrapolated for too long, because there is no inertial sensor.
 bool Vio::is_lost(Stamp now, const SmootherUpdate& update) {
   if (update.seen >= VisionWatch::kMinLandmarks) seen_ = now;
-  return !rig_.has_imu && seconds_between(seen_, now) > kLongestCoast_s;
+  return seconds_between(seen_, now) > model_.longest_coast_s;
 }
 
 bool Vio::has_recovered(const StereoFrame& frame) const {
   return vision_back_since_ && seconds_between(*vision_back_since_, frame.stamp) >= kRecovered_s &&
-         locates_points(frame) && !smoother_.window().frames.back().rests;
+         locates_points(frame) && !smoother_->window().frames.back().rests;
 }
 
 // Restarts the smoother at `state` without its prior. States during a loss of vision have large
@@ -354,9 +342,9 @@ void Vio::discard_prior(const Held& held, const OdometryState& state) {
 // An image on which a start succeeded counts as an image that holds the pose (see VisionWatch).
 void Vio::watch_vision(Stamp stamp, int features, VioResult& result) {
   const bool has_started = result.start && started(*result.start);
-  const int seen = has_started                   ? VisionWatch::kMinLandmarks
-                   : result.smoother && running_ ? result.smoother->seen
-                                                 : 0;
+  const int seen = has_started                    ? VisionWatch::kMinLandmarks
+                   : result.smoother && smoother_ ? result.smoother->seen
+                                                  : 0;
   result.vision = vision_.add(stamp, features, seen);
   if (has_started || vision_.is_lost())
     vision_back_since_.reset();
@@ -387,13 +375,14 @@ bool Vio::plausible(const SmootherUpdate& update) const {
     return false;
   const double allowed = kMaxCostPerLandmark * (50.0 + update.landmarks);
   return update.solution.final_cost < allowed && s.v_odom.norm() < config_.max_speed_mps &&
-         s.gyro_bias.norm() < (rig_.has_imu ? kMaxGyroBias_radps : kUnbounded) &&
+         s.gyro_bias.norm() < model_.max_gyro_bias_radps &&
          s.accel_bias.norm() < kMaxAccelBias_mps2;
 }
 
 void Vio::restart(Held held) {
   statistics_.images_without_pose += static_cast<int>(held_.size());
-  running_ = false;
+  if (smoother_) learned_ = smoother_->learned();
+  smoother_.reset();
   unlocated_images_ = 0;
   estimate_watch_ = {};
   held_.clear();
@@ -403,16 +392,16 @@ void Vio::restart(Held held) {
 // Live odometry refines the recent keyframes after they were published; the chain of published
 // keyframes does not change.
 void Vio::locate(const OdometryState& state, const Frame& frame, VioResult& result) {
-  if (const WindowFrame* keyframe = smoother_.frame_at(last_keyframe_->stamp))
+  if (const WindowFrame* keyframe = smoother_->frame_at(last_keyframe_->stamp))
     T_chain_odom_ = last_keyframe_->T_odom_kf * keyframe->state.T_odom_body.inverse();
-  const CameraCalibration& calibration = smoother_.window().calibration;
+  const CameraCalibration& calibration = smoother_->window().calibration;
   LocatedFrame& located = result.frames.emplace_back();
   located.frame = frame;
   located.keyframe = last_keyframe_->id.index;
   located.T_odom_body = T_chain_odom_ * state.T_odom_body;
   located.T_body_rig = calibration.T_body_rig;
   located.readout_s = readout_s_ + calibration.readout_s;
-  if (const WindowFrame* newest = smoother_.frame_at(state.stamp))
+  if (const WindowFrame* newest = smoother_->frame_at(state.stamp))
     located.twist_body << newest->gyro - state.gyro_bias,
         state.T_odom_body.linear().transpose() * state.v_odom;
 }
@@ -425,7 +414,7 @@ bool Vio::due(const OdometryState& state, const StereoFrame& frame) const {
   // A keyframe without points cannot close a loop; wait for a better image.
   if (!locates_points(frame)) return false;
   const double dt = moved_s(state.stamp);
-  const WindowFrame* previous = smoother_.frame_at(last_keyframe_->stamp);
+  const WindowFrame* previous = smoother_->frame_at(last_keyframe_->stamp);
   if (previous == nullptr) return dt >= config_.output_interval_s - 1e-3;
   return is_keyframe_due(config_, dt, previous->state.T_odom_body.inverse() * state.T_odom_body);
 }
@@ -442,7 +431,7 @@ double Vio::moved_s(Stamp stamp) const {
 
 std::optional<UncertainCalibration> Vio::known_calibration() const {
   if (!config_.calibrate) return std::nullopt;
-  const UncertainCalibration known = smoother_.calibration();
+  const UncertainCalibration known = smoother_->calibration();
   return known.covariance.allFinite() ? std::optional(known) : std::nullopt;
 }
 
@@ -453,7 +442,7 @@ std::optional<Vertical> Vio::vertical_at(const OdometryState& state) const {
 }
 
 std::optional<StateCovariance> Vio::state_covariance_at(const OdometryState& state) const {
-  const auto covariance = smoother_.state_covariance(state.stamp);
+  const auto covariance = smoother_->state_covariance(state.stamp);
   return covariance && is_usable(*covariance) ? covariance : std::nullopt;
 }
 
@@ -472,7 +461,8 @@ void Vio::add_first_keyframe(const OdometryState& state, VioResult& result) {
     keyframe.id.index = last_keyframe_->id.index + 1;
     keyframe.T_previous_kf = last_keyframe_->T_odom_kf.inverse() * keyframe.T_odom_kf;
     std::optional<Eigen::Vector3d> up_body;
-    if (rig_.has_imu) up_body = state.T_odom_body.linear().transpose() * Eigen::Vector3d::UnitZ();
+    if (model_.is_measured)
+      up_body = state.T_odom_body.linear().transpose() * Eigen::Vector3d::UnitZ();
     keyframe.covariance =
         last_
             ? restart_covariance({.lasts_s = unmeasured_s(state.stamp),
@@ -487,10 +477,9 @@ void Vio::add_first_keyframe(const OdometryState& state, VioResult& result) {
 // (and without) that: MH_01 5.0 (5.0) mm, TartanAir's hospital 15.6 (14.6) mm. The kitchen has 45.8
 // (46.5) mm, desk_c 32.6 (26.1) mm.
 void Vio::add_keyframe(const OdometryState& state, VioResult& result) {
-  const auto relative = smoother_.relative_pose(last_keyframe_->stamp, state.stamp);
-  // Without an inertial sensor the window understates the error of the rotation on KITTI.
+  const auto relative = smoother_->relative_pose(last_keyframe_->stamp, state.stamp);
   const double factor =
-      relative ? kCommonErrors * std::max(relative->error_ratio, rig_.has_imu ? 0.0 : 1.0) : 1.0;
+      relative ? kCommonErrors * std::max(relative->error_ratio, model_.least_error_ratio) : 1.0;
   KeyframeOdometry keyframe;
   keyframe.id = {robot_, last_keyframe_->id.index + 1};
   keyframe.T_previous_kf =
@@ -499,7 +488,7 @@ void Vio::add_keyframe(const OdometryState& state, VioResult& result) {
   keyframe.covariance =
       relative ? keyframe_covariance(config_, moved_s(state.stamp), factor * relative->Sigma)
                : restart_covariance();
-  if (!rig_.has_imu)
+  if (!model_.is_measured)
     keyframe.covariance += calibration_covariance(keyframe.T_previous_kf, rig_.stereo.depth_source);
   keyframe.T_odom_kf = last_keyframe_->T_odom_kf * keyframe.T_previous_kf;
   publish(keyframe, state, result);

@@ -10,6 +10,7 @@
 #include "modules/vio/feature_tracker.hpp"
 #include "modules/vio/fixed_lag_smoother.hpp"
 #include "modules/vio/initialization.hpp"
+#include "modules/vio/motion_model.hpp"
 #include "modules/vio/rest_detector.hpp"
 #include "modules/vio/vio_config.hpp"
 #include "modules/vio/vio_statistics.hpp"
@@ -61,7 +62,7 @@ struct VioCheckpoint {
 };
 
 /// Stereo-inertial or RGB-D-inertial odometry, or odometry by images alone if the rig has no
-/// inertial sensor (motion_prior.hpp): one call per image, a pose for every image.
+/// inertial sensor (motion_model.hpp): one call per image, a pose for every image.
 ///
 /// Images of the first VioConfig::start_s are held back. Then all their poses are published at
 /// once, and from there one pose per image. Images alone start with the first image. A body that
@@ -129,10 +130,12 @@ class Vio {
 
   RobotId robot_;
   SensorRig rig_;
-  VioConfig config_;
+  MotionModel model_;
+  VioConfig config_;  // Copied from the model.
   double readout_s_;  // as stated, without the estimated correction
   FeatureTracker tracker_;
-  FixedLagSmoother smoother_;
+  LearnedSensors learned_;                    // for the next window
+  std::optional<FixedLagSmoother> smoother_;  // nullopt while starting
   RestDetector rest_detector_;
   VisionWatch vision_;
   EstimateWatch estimate_watch_;
@@ -142,8 +145,7 @@ class Vio {
   VioStatistics statistics_;
   std::vector<ImuSample> samples_;  // Samples from the last one before or at the last image on.
   std::optional<Stamp> last_image_;
-  std::vector<Held> held_;  // Images held back; not empty while starting.
-  bool running_ = false;
+  std::vector<Held> held_;    // Images held back; not empty while starting.
   bool in_gap_ = false;       // The inertial samples have a gap.
   Stamp seen_ = 0;            // Last image that determined the pose; without an inertial sensor.
   int unlocated_images_ = 0;  // Images in a row with many features and few located landmarks.

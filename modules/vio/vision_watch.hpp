@@ -16,14 +16,13 @@ struct VisionEvent {
 
 /// Detects from each image whether vision still determines the pose. An image holds the pose if it
 /// shows at least kMinLandmarks located landmarks. Vision is lost when no image has held the pose
-/// for kPatience_s, and returns with the next image that holds the pose. Without an inertial sensor
-/// nothing else holds the pose, and there is no patience.
+/// for the patience, and returns with the next image that holds the pose.
 class VisionWatch {
  public:
   static constexpr int kMinLandmarks = 8;
   static constexpr double kPatience_s = 0.3;
 
-  explicit VisionWatch(bool has_imu = true) : patience_s_(has_imu ? kPatience_s : 0.0) {}
+  explicit VisionWatch(double patience_s = kPatience_s) : patience_s_(patience_s) {}
 
   /// Adds an image with `features` features, `seen` of them located landmarks; `seen` is 0 while
   /// odometry has no pose. Stamps ascend. There is no loss before the first image that holds the

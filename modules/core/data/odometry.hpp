@@ -13,7 +13,7 @@ namespace km {
 /// Estimate of the body's motion at one image. `odom` has z up, against gravity. Without an
 /// inertial sensor gravity is unknown: z is then the upward direction of the left camera at the
 /// first image, and x its viewing direction. The gyro bias is then the negative angular rate of the
-/// body (see motion_prior.hpp), and the accelerometer bias is zero.
+/// body (see motion_model.hpp), and the accelerometer bias is zero.
 struct OdometryState {
   Stamp stamp = 0;
   SE3 T_odom_body = SE3::Identity();

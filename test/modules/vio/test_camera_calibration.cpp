@@ -94,7 +94,7 @@ UncertainCalibration estimated(const std::vector<InertialFrame>& frames,
                                const SyntheticWorld& world) {
   constexpr std::size_t kStart = 16;
   VioConfig config{.gravity_mps2 = kGravity_mps2};
-  FixedLagSmoother smoother(synthetic_rig(), config);
+  FixedLagSmoother smoother(synthetic_rig(), motion_model(synthetic_rig(), config));
   REQUIRE(smoother.start(std::span(frames).first(kStart), world.states(kStart)));
   for (std::size_t k = kStart; k < frames.size(); ++k)
     CHECK(smoother.add(frames[k]).solution.usable);

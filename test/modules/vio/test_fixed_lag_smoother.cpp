@@ -27,7 +27,7 @@ VioConfig gaussian_config() {
 // Smooths `frames` from a guess that is off by `guess_error`.
 Run run_smoother(const std::vector<InertialFrame>& frames, const SyntheticWorld& world,
                  double guess_error, const VioConfig& config) {
-  Run run{FixedLagSmoother(synthetic_rig(), config), {}, {}};
+  Run run{FixedLagSmoother(synthetic_rig(), motion_model(synthetic_rig(), config)), {}, {}};
   std::mt19937 rng(99);
   std::vector<OdometryState> guess = world.states(kStartImages);
   for (std::size_t k = 1; k < guess.size(); ++k) {
@@ -184,7 +184,7 @@ ModelledRun run_as_modelled(unsigned seed, const VioConfig& config, std::size_t 
   add_inertial_noise(frames, config, rng);
   std::vector<OdometryState> guess = world.states(kStartImages);
   for (OdometryState& state : guess) state.gyro_bias = state.accel_bias = {0.0, 0.0, 0.0};
-  ModelledRun run{motion, FixedLagSmoother(synthetic_rig(), config)};
+  ModelledRun run{motion, FixedLagSmoother(synthetic_rig(), motion_model(synthetic_rig(), config))};
   REQUIRE(run.smoother.start(std::span(frames).first(kStartImages), guess));
   for (std::size_t k = kStartImages; k < frames.size(); ++k) (void)run.smoother.add(frames[k]);
   return run;
@@ -253,7 +253,7 @@ TEST_CASE("A gyroscope that is noisier than assumed has less weight") {
     SyntheticWorld world({}, 6, 40);
     std::vector<InertialFrame> frames = world.frames(100, 0.5);
     add_inertial_noise(frames, noisy, rng);
-    FixedLagSmoother smoother(synthetic_rig(), config);
+    FixedLagSmoother smoother(synthetic_rig(), motion_model(synthetic_rig(), config));
     REQUIRE(smoother.start(std::span(frames).first(kStartImages), world.states(kStartImages)));
     for (std::size_t k = kStartImages; k < frames.size(); ++k) (void)smoother.add(frames[k]);
     return smoother.gyro_noise_scale();
@@ -275,7 +275,7 @@ TEST_CASE("A start from a state with its covariance keeps that covariance") {
   const OdometryState& last = before.states.back();
   const auto known = before.smoother.state_covariance(last.stamp);
   REQUIRE(known);
-  FixedLagSmoother smoother(synthetic_rig(), gaussian_config());
+  FixedLagSmoother smoother(synthetic_rig(), motion_model(synthetic_rig(), gaussian_config()));
   smoother.start(frames[kLast], last, *known);
   const auto kept = smoother.state_covariance(last.stamp);
   REQUIRE(kept);

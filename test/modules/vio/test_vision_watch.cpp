@@ -53,7 +53,7 @@ TEST_CASE("A few images without landmarks and a start without vision are no loss
 }
 
 TEST_CASE("Without an inertial sensor a single image without landmarks is a loss") {
-  Watched run{.watch = VisionWatch(false)};
+  Watched run{.watch = VisionWatch(0.0)};
   run.add(20, 50);
   run.add(1, VisionWatch::kMinLandmarks - 1);
   REQUIRE(run.events.size() == 1);

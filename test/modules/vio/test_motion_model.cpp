@@ -1,4 +1,4 @@
-#include "modules/vio/motion_prior.hpp"
+#include "modules/vio/motion_model.hpp"
 
 #include "modules/vio/residuals.hpp"
 #include "recorded_odometry.hpp"
@@ -14,7 +14,7 @@ constexpr Stamp kStep = 100'000'000;
 VioConfig without_imu() {
   SensorRig rig;
   rig.has_imu = false;
-  return config_for(rig, {});
+  return motion_model(rig, {}).config;
 }
 
 ImuPreintegration virtual_preintegration(Stamp to) {
@@ -47,7 +47,7 @@ TEST_CASE("Images alone determine the motion from exact tracks") {
   SyntheticWorld world(SyntheticMotion{}, 7);
   SensorRig rig = synthetic_rig();
   rig.has_imu = false;
-  FixedLagSmoother smoother(rig, {});
+  FixedLagSmoother smoother(rig, motion_model(rig, {}));
   std::vector<InertialFrame> frames = world.frames(40);
   for (std::size_t k = 1; k < frames.size(); ++k)
     frames[k].samples = virtual_samples(frames[k - 1].tracked.stamp, frames[k].tracked.stamp);

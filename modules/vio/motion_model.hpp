@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <vector>
 
 #include "modules/core/camera/camera.hpp"
@@ -7,9 +8,13 @@
 #include "modules/core/data/odometry.hpp"
 #include "modules/vio/tracked_frame.hpp"
 #include "modules/vio/vio_config.hpp"
+#include "modules/vio/vision_watch.hpp"
 
 namespace km {
 
+/// The motion between images is measured by inertial samples, or assumed to have a constant
+/// velocity.
+///
 /// Odometry by images alone: a rig without an inertial sensor gets a virtual one.
 ///
 /// The prior on the motion is a constant velocity with white noise on the acceleration and on the
@@ -25,12 +30,29 @@ namespace km {
 /// - The accelerometer bias is held at zero.
 ///
 /// Smoother, marginalisation, rest and resume are therefore those of stereo-inertial odometry.
+struct MotionModel {
+  static constexpr double kNever_s = std::numeric_limits<double>::infinity();
 
-/// Checked `config` for odometry with `rig`. Without an inertial sensor there is no gravity, no
-/// calibration of the cameras against it, no vertical, and no bound on the "gyro bias". The loss on
-/// reprojection errors then has a third of the scale.
+  bool is_measured = true;  ///< False: by the virtual sensor, so without vertical and calibration.
+  /// Checked settings. Without an inertial sensor there is no gravity, no calibration of the
+  /// cameras against it, no vertical, and a third of the scale of the loss on reprojection errors.
+  VioConfig config;
+  /// Longest pause of the images over which the model alone gives the pose. After a longer one
+  /// odometry starts again from the last pose.
+  double longest_pause_s = 10.0;
+  /// Longest time for which the model gives the pose while images do not.
+  double longest_coast_s = kNever_s;
+  double vision_patience_s = VisionWatch::kPatience_s;
+  /// Standard deviation of the guess at a start, and largest plausible value. The "bias" of the
+  /// virtual gyroscope is minus the angular rate [rad/s].
+  double gyro_bias_sigma_radps = 0.02, max_gyro_bias_radps = 0.5;
+  /// Least WindowEquations::error_ratio(). By images alone the window understates the error of the
+  /// rotation on KITTI.
+  double least_error_ratio = 0.0;
+};
+
 /// Throws ConfigError if `config` is out of bounds.
-[[nodiscard]] VioConfig config_for(const SensorRig& rig, const VioConfig& config);
+[[nodiscard]] MotionModel motion_model(const SensorRig& rig, const VioConfig& config);
 
 /// Noise densities of the acceleration and of the angular acceleration, see VioConfig.
 struct MotionNoise {
@@ -45,9 +67,9 @@ struct MotionNoise {
 /// show no motion. VioConfig allows for more, so that the prior does not affect other images.
 ///
 /// A velocity that changes by dv in dt has the density |dv| / sqrt(3 dt), each axis. The density is
-/// the root mean square over kTimeConstant_s. Five true
-/// flights of EuRoC and three walks of TUM-VI were extrapolated over 0.1 to 0.3 s. Position has 0.8
-/// to 6.2 times the variance by this density, and rotation 1.5 to 5.6 times. Hence kCaution.
+/// the root mean square over kTimeConstant_s. Five true flights of EuRoC and three walks of TUM-VI
+/// were extrapolated over 0.1 to 0.3 s. Position has 0.8 to 6.2 times the variance by this density,
+/// and rotation 1.5 to 5.6 times. Hence kCaution.
 class ShownMotion {
  public:
   static constexpr double kTimeConstant_s = 3.0;

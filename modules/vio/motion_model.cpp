@@ -1,4 +1,4 @@
-#include "modules/vio/motion_prior.hpp"
+#include "modules/vio/motion_model.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -29,16 +29,27 @@ Eigen::Matrix3d body_axes_of_camera() {
 
 }  // namespace
 
-VioConfig config_for(const SensorRig& rig, const VioConfig& config) {
-  VioConfig result = checked(config);
-  if (rig.has_imu) return result;
-  result.gravity_mps2 = 0.0;
-  result.calibrate = false;
-  result.loss_scale *= kLossShare;
-  result.tilt_sigma = 0.0;
-  result.accel_bias_sigma = kHeldAccel;
-  result.gyro_noise_factor = result.accel_noise_factor = 1.0;
-  return result;
+MotionModel motion_model(const SensorRig& rig, const VioConfig& config) {
+  MotionModel model;
+  model.config = checked(config);
+  if (rig.has_imu) return model;
+  model.is_measured = false;
+  model.longest_pause_s = MotionModel::kNever_s;
+  model.longest_coast_s = 1.0;
+  model.vision_patience_s = 0.0;
+  model.gyro_bias_sigma_radps = 3.0;
+  model.max_gyro_bias_radps = std::numeric_limits<double>::infinity();
+  model.least_error_ratio = 1.0;
+  VioConfig& adapted = model.config;
+  adapted.gravity_mps2 = 0.0;
+  adapted.calibrate = false;
+  adapted.loss_scale *= kLossShare;
+  adapted.tilt_sigma = 0.0;
+  adapted.accel_bias_sigma = kHeldAccel;
+  adapted.gyro_noise_factor = adapted.accel_noise_factor = 1.0;
+  adapted.max_imu_gap_s = MotionModel::kNever_s;
+  adapted.start_s = 0.0;
+  return model;
 }
 
 ImuNoise virtual_imu_noise(const MotionNoise& motion, double dt_s) {
