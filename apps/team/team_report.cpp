@@ -123,8 +123,8 @@ std::string closure_table(const TeamResult& team) {
 
 // The bytes that the robots have sent, by category, as shares of those that the server of a
 // centralised system would receive. It receives as many keypoints of a keyframe as the paper's
-// system, or as many as the robots. The map is not counted, because keypoints do not show it. Empty
-// without keyframes.
+// system, or as many as the robots, packed equally (packed_keypoints.hpp). The map is not counted,
+// because keypoints do not show it. Empty without keyframes.
 std::string centralised_remark(const std::map<std::string, std::uint64_t>& traffic,
                                std::uint64_t keyframes, const PeerKeyframeCounts& received) {
   constexpr double kKeypointsOfPaper = 1000.0;
@@ -133,19 +133,22 @@ std::string centralised_remark(const std::map<std::string, std::uint64_t>& traff
   for (const auto& [category, bytes] : traffic)
     if (category != kMapTraffic) sent += static_cast<double>(bytes);
   if (sent == 0.0 || keyframes == 0) return "";
-  const auto share = [&](double keypoints) {
-    const double bytes = static_cast<double>(keyframes) * keypoints * kKeypointBytes;
+  constexpr double kPackedBytes = 16.6;
+  const auto share = [&](double keypoints, double keypoint_bytes) {
+    const double bytes = static_cast<double>(keyframes) * keypoints * keypoint_bytes;
     return bytes_text(bytes) + ", of which the robots send " + fixed(100.0 * sent / bytes, 1) +
            " %";
   };
   std::string remark = "A server that receives each keyframe with " + fixed(kKeypointsOfPaper, 0) +
                        " keypoints of " + fixed(kKeypointBytes, 0) + " bytes would receive\n" +
-                       share(kKeypointsOfPaper) + ".";
+                       share(kKeypointsOfPaper, kKeypointBytes) + ".";
   if (received.keypoints > 0) {
     const double keypoints =
         static_cast<double>(received.keypoints) / static_cast<double>(received.keyframes);
-    remark += " With " + fixed(keypoints, 0) + ", the mean of a keyframe that a robot receives,\n" +
-              "it would receive " + share(keypoints) + ".";
+    remark += " With " + fixed(keypoints, 0) + ", as many as a robot receives of\n" +
+              "a keyframe, of " + fixed(kPackedBytes, 1) +
+              " bytes, as robots pack them, it would receive " + share(keypoints, kPackedBytes) +
+              ".";
   }
   return remark + "\n";
 }

@@ -167,9 +167,10 @@ TEST_CASE("The bytes of robots are compared with a server that receives all keyf
   team.robots[0].summary->keyframes = 1000;  // each has 40 kB, and the robot has sent 3 MB
   CHECK_THAT(to_table(team), Contains("would receive\n40.0 MB, of which the robots send 7.5 %.\n"));
   team.robots[0].summary->peer_keyframes = {.keyframes = 10, .keypoints = 1500};
-  CHECK_THAT(to_table(team),
-             Contains("With 150, the mean of a keyframe that a robot receives,\nit would receive "
-                      "6.0 MB, of which the robots send 50.0 %.\n"));
+  CHECK_THAT(
+      to_table(team),
+      Contains("With 150, as many as a robot receives of\na keyframe, of 16.6 bytes, as robots "
+               "pack them, it would receive 2.5 MB, of which the robots send 120.6 %.\n"));
   team.robots[0].summary->keyframes = 0;
   CHECK_THAT(to_table(team), !Contains("A server"));
 }
