@@ -195,6 +195,27 @@ class Tables(unittest.TestCase):
             self.assertAlmostEqual(row[2][3], half)
 
 
+class Results(unittest.TestCase):
+    def checked(self, readme):
+        with Folder() as folder:
+            path = os.path.join(folder, "README.md")
+            with open(path, "w", encoding="utf-8") as file:
+                file.write(readme)
+            return subprocess.run([sys.executable, os.path.join(EXPERIMENTS, "results.py"), "check", path],
+                                  capture_output=True, text=True, check=False)
+
+    def test_the_readme_has_the_measured_numbers(self):
+        with open(os.path.join(EXPERIMENTS, "../../../README.md"), encoding="utf-8") as file:
+            readme = file.read()
+        self.assertEqual(self.checked(readme).returncode, 0)
+        begin = readme.index("<!-- results.py table -->")
+        digit = next(k for k in range(readme.index(" mm", begin) - 1, 0, -1) if readme[k].isdigit())
+        other = readme[:digit] + str((int(readme[digit]) + 1) % 10) + readme[digit + 1:]
+        wrong = self.checked(other)
+        self.assertEqual(wrong.returncode, 1)
+        self.assertIn("not that of results.json", wrong.stderr)
+
+
 class Commands(unittest.TestCase):
     """Outlier rejection by the real programs."""
 
