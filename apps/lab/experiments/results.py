@@ -115,7 +115,7 @@ def one_robot(runner):
         process = alone(runner, mapping)["process"]
         result[f"{mapping}_cores"] = [process["cpu_s"] / 15.0]
     runner.call("kimera_multi_evaluate", "trajectory", "--truth",
-                runner.find("euroc/MH_01_easy/mav0/state_groundtruth_estimate0/data.csv"),
+                runner.find("euroc/MH_01_easy/mav0/state_groundtruth_estimate0/*.[ct]*"),
                 "--estimate", runner.path("off/odometry.tum"), "--json", runner.path("ate.json"))
     odometry = runner.read("ate.json")["robots"][0]
     with open(runner.path("off/timing.csv"), encoding="utf-8") as file:
