@@ -147,9 +147,10 @@ class Db3Reader final : public BagReader {
     if (channel == channel_of_.end())
       return lose(BagFault::kUnknownChannel, "topic " + std::to_string(topic));
     const std::string& name = channels_[channel->second].topic;
-    if (sqlite3_column_type(rows_.get(), 2) != SQLITE_INTEGER)
-      return lose(BagFault::kMalformed, name + ": a time that is no number");
+    const bool is_number = sqlite3_column_type(rows_.get(), 2) == SQLITE_INTEGER;
     const Stamp log_time = sqlite3_column_int64(rows_.get(), 2);
+    if (!is_number || log_time < 0)
+      return lose(BagFault::kMalformed, name + ": a time that is no number from 0 on");
     if (last_ && log_time < *last_) return lose(BagFault::kUnordered, name);
     auto data = data_of(id);
     if (!data) return lose(BagFault::kMalformed, name + ": its data cannot be read");

@@ -115,12 +115,12 @@ TEST_CASE("Rows that are no messages are lost with their place") {
       database_of(folder, "a.db3",
                   std::string(kTables) + kRows +
                       "INSERT INTO messages VALUES (7, 99, 40, x'01'), (8, 3, 'noon', x'01'),"
-                      " (9, 3, 40, 'text');");
+                      " (9, 3, 40, 'text'), (10, 3, -9223372036854775808, x'01');");
   const auto reader = open_db3(path);
   CHECK(messages_of(*reader).size() == 4);
   const BagReport report = reader->report();
   CHECK(report.count(BagFault::kUnknownChannel) == 1);
-  CHECK(report.count(BagFault::kMalformed) == 2);
+  CHECK(report.count(BagFault::kMalformed) == 3);
   CHECK(report.entries().at(BagFault::kUnknownChannel).first ==
         path.string() + ": message 7: topic 99");
 }
