@@ -52,8 +52,9 @@ KeyFile KeyFile::read(const fs::path& file, std::string_view format, KeyFileAcce
   result.file_ = file;
   std::string_view rest = text;
   for (int number = 1; !rest.empty(); ++number) {
-    const std::string_view line = trimmed(rest.substr(0, rest.find('\n')));
-    rest.remove_prefix(std::min(rest.size(), rest.find('\n') + 1));
+    const std::size_t end = std::min(rest.find('\n'), rest.size());
+    const std::string_view line = trimmed(rest.substr(0, end));
+    rest.remove_prefix(std::min(rest.size(), end + 1));
     if (line.empty() || line.front() == '#') continue;
     const std::size_t colon = line.find(':');
     if (colon == std::string_view::npos)

@@ -77,6 +77,13 @@ TEST_CASE("A changed file is refused with its name and line") {
   CHECK_THAT(team.refusal(), Contains(refusal));
 }
 
+TEST_CASE("The last line of a file of keys may lack its end") {
+  const TeamOnDisk team;
+  const std::string text = team.folder.read("survey/alpha/authority.txt");
+  team.folder.write("survey/alpha/authority.txt", text.substr(0, text.size() - 1));
+  CHECK(team.refusal().empty());
+}
+
 TEST_CASE("A wrong or incomplete file of keys is refused") {
   const TeamOnDisk team;
   SECTION("something behind its end") {
