@@ -32,8 +32,10 @@ WireSample::~WireSample() {
 }
 
 bool WireSample::read(std::span<const std::uint8_t> bytes) {
-  // An aligned copy, because DDS assumes alignment and converts the byte order in place.
-  std::vector<std::uint64_t> aligned(bytes.size() / sizeof(std::uint64_t) + 1);
+  // An aligned copy, because DDS assumes alignment and converts the byte order in place. It is
+  // twice as long, because Cyclone DDS 0.10.2 counts four bytes for each number of eight when it
+  // compares an array with the size.
+  std::vector<std::uint64_t> aligned(2 * bytes.size() / sizeof(std::uint64_t) + 1);
   std::ranges::copy(bytes, reinterpret_cast<std::uint8_t*>(aligned.data()));  // `bytes` may be
                                                                               // empty
   const auto size = static_cast<std::uint32_t>(bytes.size());
@@ -47,7 +49,7 @@ bool WireSample::read(std::span<const std::uint8_t> bytes) {
   dds_istream_init(&stream, size, aligned.data(), kXcdr2);
   dds_stream_read(&stream, reinterpret_cast<char*>(sample_.data()), type_.m_ops);
   dds_istream_fini(&stream);
-  return true;
+  return stream.m_index <= size;
 }
 
 }  // namespace km

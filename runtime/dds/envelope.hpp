@@ -32,7 +32,7 @@ class WireSample {
   WireSample& operator=(const WireSample&) = delete;
 
   /// False if `bytes` are not one sample of the type, possibly with fields that later versions
-  /// append; then the sample is unchanged. Call once.
+  /// append; then the sample is of no use. Call once.
   [[nodiscard]] bool read(std::span<const std::uint8_t> bytes);
 
   [[nodiscard]] const void* get() const { return sample_.data(); }

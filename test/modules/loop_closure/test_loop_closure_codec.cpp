@@ -1,4 +1,5 @@
 #include "modules/loop_closure/node/loop_closure_codec.hpp"
+#include "runtime/dds/envelope.hpp"
 #include "test/support/corrupted_message.hpp"
 #include "test/support/random_pose.hpp"
 #include "test/support/test.hpp"
@@ -103,6 +104,20 @@ TEST_CASE("A closure survives the wire exactly") {
   CHECK((result.value->T_from_to.matrix() - sent.T_from_to.matrix()).norm() < 1e-12);
   CHECK(result.value->inliers == 77);
   CHECK(result.value->similarity == 0.75);
+}
+
+TEST_CASE("A closure that ends within an array is not read") {
+  const auto encoded = encoded_by(kOwner, Closure{.T_from_to = SE3::Identity()});
+  auto bytes = serialize(Codec<Closure>::descriptor(), &encoded.wire);
+  std::set<std::size_t> read;
+  while (bytes.size() > 4) {
+    bytes.pop_back();
+    const std::size_t length = bytes.size() - 4;
+    bytes[0] = static_cast<std::uint8_t>(length);
+    bytes[1] = static_cast<std::uint8_t>(length >> 8U);
+    if (WireSample(Codec<Closure>::descriptor()).read(bytes)) read.insert(bytes.size());
+  }
+  CHECK(read == std::set<std::size_t>{4, 136, 268, 324, 492, 496});  // ends of fields
 }
 
 TEST_CASE("Hostile closures and requests are refused with a reason") {
