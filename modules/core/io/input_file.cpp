@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstddef>
 #include <system_error>
@@ -17,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::uintmax_t kChunk_bytes = std::uintmax_t{1} << 20U;
+constexpr std::size_t kChunk_bytes = std::size_t{1} << 16U;
 constexpr int kPipe_ms = 10'000;  // longest wait for bytes of a pipe
 
 [[noreturn]] void fail(const fs::path& file, const std::string& why) {
@@ -108,14 +109,12 @@ InputFile open_input_file(const fs::path& file, std::uintmax_t max_bytes) {
       .status = fs::file_status(is_regular ? fs::file_type::regular : fs::file_type::fifo,
                                 static_cast<fs::perms>(status.st_mode) & fs::perms::mask)};
   if (is_regular) read.bytes.reserve(static_cast<std::size_t>(status.st_size));
+  std::array<char, kChunk_bytes> chunk;  // not zeroed: most files are small
   for (bool more = true; more;) {
     if (!is_regular) await_pipe(opened.get(), file);
-    const std::size_t before = read.bytes.size();
-    const auto room = static_cast<std::size_t>(std::min(kChunk_bytes, max_bytes + 1));
-    read.bytes.resize(before + room);
-    const ssize_t count = ::read(opened.get(), read.bytes.data() + before, room);
+    const ssize_t count = ::read(opened.get(), chunk.data(), chunk.size());
     if (count < 0 && errno != EINTR && errno != EAGAIN) fail(file, "cannot be read to its end");
-    read.bytes.resize(before + static_cast<std::size_t>(std::max<ssize_t>(count, 0)));
+    if (count > 0) read.bytes.append(chunk.data(), static_cast<std::size_t>(count));
     if (read.bytes.size() > max_bytes) fail_as_too_large(file, max_bytes);
     more = count != 0;
   }
