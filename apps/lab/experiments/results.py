@@ -192,7 +192,8 @@ PARTS = {
     "one_robot": (one_robot, 3, [
         ("EuRoC MH_01, 15 s, one robot: ATE of odometry; OpenVINS; Basalt",
          "{odometry_mm:1}; 5.2; 9.3 mm", "`kimera_multi_robot --rate 1`"),
-        ("MH_01, 752x480 at 20 Hz, with the start: odometry and back-end; also a metric map by stereo", "{off_cores:2}; {metric_cores:2} of a core", "`kimera_multi_robot --rate 1`")]),
+        ("MH_01, 752x480 at 20 Hz, with the start: odometry and back-end; also a metric map by "
+         "stereo", "{off_cores:2}; {metric_cores:2} of a core", "`kimera_multi_robot --rate 1`")]),
 }
 
 
