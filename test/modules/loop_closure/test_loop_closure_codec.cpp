@@ -1,4 +1,7 @@
 #include "modules/loop_closure/node/loop_closure_codec.hpp"
+
+#include <set>
+
 #include "runtime/dds/envelope.hpp"
 #include "test/support/corrupted_message.hpp"
 #include "test/support/random_pose.hpp"
@@ -107,7 +110,9 @@ TEST_CASE("A closure survives the wire exactly") {
 }
 
 TEST_CASE("A closure that ends within an array is not read") {
-  const auto encoded = encoded_by(kOwner, Closure{.T_from_to = SE3::Identity()});
+  Closure closure;
+  closure.T_from_to = SE3::Identity();
+  const auto encoded = encoded_by(kOwner, closure);
   auto bytes = serialize(Codec<Closure>::descriptor(), &encoded.wire);
   std::set<std::size_t> read;
   while (bytes.size() > 4) {
