@@ -42,6 +42,7 @@ int run_subcommands(const std::string& program, const std::string& about,
                     std::initializer_list<void (*)(CLI::App&)> adders, int argc, char** argv) try {
   CLI::App app(about, program);
   app.require_subcommand(1);
+  app.footer(program + " SUBCOMMAND --help has the details, and examples.");
   for (const auto add : adders) add(app);
   const std::optional<int> exit_code = parse_options(app, argc, argv);
   if (exit_code.value_or(0) == 0) return 0;
