@@ -339,11 +339,9 @@ void Vio::discard_prior(const Held& held, const OdometryState& state) {
   if (last_keyframe_->state_covariance) start_on(held, state, *last_keyframe_->state_covariance);
 }
 
-// An image on which a start succeeded counts as an image that holds the pose (see VisionWatch). An
-// image held back for a start is no loss: it gets a pose if the start succeeds.
+// An image on which a start succeeded counts as an image that holds the pose (see VisionWatch).
 void Vio::watch_vision(Stamp stamp, int features, VioResult& result) {
   const bool has_started = result.start && started(*result.start);
-  if (!smoother_ && !held_.empty() && !vision_.is_lost() && features >= kLeastTracked) return;
   const int seen = has_started                    ? VisionWatch::kMinLandmarks
                    : result.smoother && smoother_ ? result.smoother->seen
                                                   : 0;

@@ -98,7 +98,7 @@ const std::vector<SensorFault>& sensor_faults() {
       {"samples 1 s ahead", 0.2, move_samples, "inertial samples out of order"},
       {"right images 2 ms late", 5.0, delay_right, "2.00 ms after"},
       // 3 m: distance of the flight during the restart
-      {"drivers restart", 2.0, drop_everything, "gaps between inertial samples", 3.0},
+      {"drivers restart", 2.0, drop_everything, "gaps between inertial samples", 3.0, true},
   };
   return faults;
 }
