@@ -97,21 +97,20 @@ Eigen::Matrix<double, 11, 15> without_gauge(const OdometryState& state) {
 FixedLagSmoother::FixedLagSmoother(const SensorRig& rig, const MotionModel& model,
                                    const LearnedSensors& learned)
     : model_(model),
-      config_(model.config),
       noise_(rig.imu),
       gyro_noise_(learned.gyro_noise),
       shown_motion_(learned.shown_motion) {
-  noise_.gyro_noise_density *= config_.gyro_noise_factor;
-  noise_.accel_noise_density *= config_.accel_noise_factor;
+  noise_.gyro_noise_density *= model_.config.gyro_noise_factor;
+  noise_.accel_noise_density *= model_.config.accel_noise_factor;
   for (std::size_t c = 0; c < 2; ++c)
-    window_.rig_views[c] = view_model(rig.stereo.cameras[c], config_.noise_px);
-  window_.calibrates = config_.calibrate;
+    window_.rig_views[c] = view_model(rig.stereo.cameras[c], model_.config.noise_px);
+  window_.calibrates = model_.config.calibrate;
   calibrate(window_, {});
   calibration_covariance_ = calibration_prior();
   if (window_.calibrates && learned.calibration) take_calibration(*learned.calibration);
-  window_.gravity_mps2 = config_.gravity_mps2;
-  window_.loss_scale = config_.loss_scale;
-  focal_px_ = window_.views[0].weight * config_.noise_px;
+  window_.gravity_mps2 = model_.config.gravity_mps2;
+  window_.loss_scale = model_.config.loss_scale;
+  focal_px_ = window_.views[0].weight * model_.config.noise_px;
   R_cam_body_ = window_.views[0].R_cam_body;
   T_body_left_ = rig.stereo.cameras[0].T_body_cam;
 }
@@ -172,7 +171,7 @@ SmootherUpdate FixedLagSmoother::add(const InertialFrame& frame, bool rests) {
     return update;
   WindowFrame& newest = window_.frames.back();
   const OdometryState predicted = predict(window_.frames[window_.frames.size() - 2].state,
-                                          newest.imu->imu(), config_.gravity_mps2);
+                                          newest.imu->imu(), model_.config.gravity_mps2);
   const bool is_moved = !model_.is_measured && frame.tracked.T_previous_current;
   newest.state = is_moved ? moved_by_images(window_.frames[window_.frames.size() - 2].state,
                                             frame.tracked, T_body_left_)
@@ -257,14 +256,14 @@ bool FixedLagSmoother::set_imu(std::size_t frame) {
     samples = held;
   }
   const bool covered = imu.add(samples, before.instant(), f.instant());
-  f.imu = covered ? ImuFactor::of(imu, config_.gravity_mps2) : std::nullopt;
+  f.imu = covered ? ImuFactor::of(imu, model_.config.gravity_mps2) : std::nullopt;
   if (f.imu) f.gyro = gyro_at(samples, f.instant());
   return f.imu.has_value();
 }
 
 ImuNoise FixedLagSmoother::noise_between(bool is_smooth, double dt_s) const {
   if (model_.is_measured) return noise_;
-  const MotionNoise allowed{.accel = config_.motion_accel, .turn = config_.motion_turn};
+  const MotionNoise allowed{.accel = model_.config.motion_accel, .turn = model_.config.motion_turn};
   return virtual_imu_noise(is_smooth ? shown_motion_.noise(allowed) : allowed, dt_s);
 }
 
@@ -279,7 +278,7 @@ void FixedLagSmoother::compare_gyro() {
   const WindowFrame& newest = window_.frames.back();
   const WindowFrame& before = window_.frames[window_.frames.size() - 2];
   const ImuPreintegration& imu = newest.imu->imu();
-  const SE3 by_samples = predict(before.state, imu, config_.gravity_mps2).T_odom_body;
+  const SE3 by_samples = predict(before.state, imu, model_.config.gravity_mps2).T_odom_body;
   const double scale = gyro_noise_.scale();
   gyro_noise_.add(angle_of(by_samples.linear().transpose() * newest.state.T_odom_body.linear()),
                   imu.covariance().topLeftCorner<3, 3>().trace() / (scale * scale), imu.dt_s());
@@ -335,7 +334,7 @@ void FixedLagSmoother::decide_keyframe() {
 }
 
 void FixedLagSmoother::locate_landmarks() {
-  const double max_error = config_.outlier_px / config_.noise_px;
+  const double max_error = model_.config.outlier_px / model_.config.noise_px;
   const std::vector<SE3> images = image_poses(window_);
   const auto behind = [&](const WindowLandmark& landmark) {
     const WindowObservation& o = landmark.observations.back();
@@ -356,7 +355,7 @@ void FixedLagSmoother::locate_landmarks() {
 }
 
 ImageFit FixedLagSmoother::fit_of_newest() const {
-  const double limit = config_.outlier_px / config_.noise_px;
+  const double limit = model_.config.outlier_px / model_.config.noise_px;
   const SE3 T_odom_body = image_poses(window_).back();
   ImageFit fit;
   Eigen::Vector2d r;
@@ -375,7 +374,7 @@ ImageFit FixedLagSmoother::fit_of_newest() const {
 }
 
 int FixedLagSmoother::reject_outliers() {
-  const double limit = config_.outlier_px / config_.noise_px;
+  const double limit = model_.config.outlier_px / model_.config.noise_px;
   const std::vector<SE3> images = image_poses(window_);
   int dropped = 0;
   Eigen::Vector2d r;
@@ -399,7 +398,7 @@ int FixedLagSmoother::reject_outliers() {
 }
 
 bool FixedLagSmoother::leaves_next(Stamp stamp) const {
-  const auto too_many = keyframes() > static_cast<std::size_t>(config_.window_keyframes);
+  const auto too_many = keyframes() > static_cast<std::size_t>(model_.config.window_keyframes);
   return window_.frames.empty() || stamp < window_.frames.front().state.stamp ||
          (too_many && stamp == window_.frames.front().state.stamp);
 }
@@ -480,10 +479,10 @@ void FixedLagSmoother::set_first_prior() {
   prior.J = Eigen::MatrixXd::Zero(model_.is_measured ? 10 : 15, 15);
   prior.J.topRows<4>() = held_gauge(first);
   prior.J.block<3, 3>(4, 9).diagonal().setConstant(1.0 / model_.gyro_bias_sigma_radps);
-  prior.J.block<3, 3>(7, 12).diagonal().setConstant(1.0 / config_.accel_bias_sigma);
+  prior.J.block<3, 3>(7, 12).diagonal().setConstant(1.0 / model_.config.accel_bias_sigma);
   if (!model_.is_measured) {  // nothing determines the tilt, and a single image no velocity
     prior.J.block<2, 3>(10, 0) = first.T_odom_body.linear().topRows<2>() / kHeldHeading_rad;
-    prior.J.block<3, 3>(12, 6).diagonal().setConstant(1.0 / config_.max_speed_mps);
+    prior.J.block<3, 3>(12, 6).diagonal().setConstant(1.0 / model_.config.max_speed_mps);
   }
   hold_calibration();
 }
@@ -513,8 +512,8 @@ UncertainCalibration FixedLagSmoother::calibration() const {
 
 CalibrationMatrix FixedLagSmoother::calibration_prior() const {
   CalibrationVector sigma;
-  sigma << config_.calibration_offset_s, Eigen::Vector3d::Constant(kMountingRotation_rad),
-      Eigen::Vector3d::Constant(kMountingTranslation_m), config_.calibration_readout_s;
+  sigma << model_.config.calibration_offset_s, Eigen::Vector3d::Constant(kMountingRotation_rad),
+      Eigen::Vector3d::Constant(kMountingTranslation_m), model_.config.calibration_readout_s;
   return sigma.cwiseAbs2().asDiagonal();
 }
 
@@ -535,7 +534,7 @@ bool FixedLagSmoother::slide(bool rests) {
     else if (!drop_and_merge(k))
       return false;
   }
-  while (keyframes() > static_cast<std::size_t>(config_.window_keyframes))
+  while (keyframes() > static_cast<std::size_t>(model_.config.window_keyframes))
     marginalize_oldest(window_);
   const auto gone = [&](const WindowLandmark& landmark) {
     return landmark.observations.size() < 2 && !tracked_now(window_, landmark);

@@ -79,16 +79,16 @@ class FixedLagSmoother {
   [[nodiscard]] std::optional<std::vector<OdometryState>> start(
       std::span<const InertialFrame> frames, std::span<const OdometryState> guess);
 
-  /// Starts on one image, from an earlier estimate of its state. Heading and position are held;
-  /// the positive definite `covariance` constrains the other
-  /// variables. The state belongs to the instant given by the current calibration. If this instant
-  /// lies before the image, frame.samples should begin before the instant.
+  /// Starts on one image, from an earlier estimate of its state. Heading and position are held; the
+  /// positive definite `covariance` constrains the other variables. The state belongs to the
+  /// instant given by the current calibration. If this instant lies before the image, frame.samples
+  /// should begin before the instant.
   void start(const InertialFrame& frame, const OdometryState& state,
              const StateCovariance& covariance);
 
   /// Adds the next image; `rests`: the body stands still. Precondition: start() succeeded. If
   /// frame.samples do not cover the time since the image before or make no inertial factor, the
-  /// solution is not usable, and only start() may follow.
+  /// solution is not usable, and the window of no further use.
   [[nodiscard]] SmootherUpdate add(const InertialFrame& frame, bool rests = false);
 
   /// Current states of the window, in order of time.
@@ -147,7 +147,6 @@ class FixedLagSmoother {
   [[nodiscard]] std::size_t keyframes() const;
 
   MotionModel model_;
-  VioConfig config_;  // Copied from the model.
   ImuNoise noise_;
   GyroNoiseScale gyro_noise_;
   ShownMotion shown_motion_;

@@ -72,10 +72,9 @@ Vio::Vio(RobotId robot, const SensorRig& rig, const TrackerConfig& tracker, cons
     : robot_(robot),
       rig_(rig),
       model_(motion_model(rig, config)),
-      config_(model_.config),
       readout_s_(tracker.readout_s),
       tracker_(rig.stereo, tracker, rig.has_imu),
-      rest_detector_(config_, rig.stereo.cameras[0].fx),
+      rest_detector_(model_.config, rig.stereo.cameras[0].fx),
       vision_(model_.vision_patience_s) {
   statistics_.has_imu = rig.has_imu;
 }
@@ -117,7 +116,7 @@ VioResult Vio::process(const SensorPacket& packet) {
   const bool paused = seconds_between(before, frame->stamp) > model_.longest_pause_s;
   last_image_ = frame->stamp;
 
-  held.data.is_bridged = !first && !paused && gap_s > config_.max_imu_gap_s;
+  held.data.is_bridged = !first && !paused && gap_s > model_.config.max_imu_gap_s;
   statistics_.gaps += held.data.is_bridged && !in_gap_;
   in_gap_ = held.data.is_bridged;
   if (in_gap_) result.problem = VioProblem::kInertialGap;
@@ -213,8 +212,13 @@ void Vio::start_on(const Held& held, const OdometryState& state,
                    const StateCovariance& covariance) {
   InertialFrame frame = held.data;
   frame.samples = samples_;  // includes samples from before the image
-  if (smoother_) learned_ = smoother_->learned();
+  end_window();
   smoother_.emplace(rig_, model_, learned_).start(frame, state, covariance);
+}
+
+void Vio::end_window() {
+  if (smoother_) learned_ = smoother_->learned();
+  smoother_.reset();
 }
 
 void Vio::try_start(VioResult& result) {
@@ -230,11 +234,11 @@ void Vio::try_start(VioResult& result) {
   }
   const double span_s =
       seconds_between(held_.front().data.tracked.stamp, held_.back().data.tracked.stamp);
-  if (span_s < config_.start_s - 1e-3) return;
+  if (span_s < model_.config.start_s - 1e-3) return;
   ++statistics_.start_attempts;
   std::vector<InertialFrame> frames;
   for (const Held& held : held_) frames.push_back(held.data);
-  StartGuess guess = model_.is_measured ? guess_start(frames, rig_, config_)
+  StartGuess guess = model_.is_measured ? guess_start(frames, rig_, model_.config)
                                         : guess_start_by_images(frames.back(), rig_);
   result.start = guess.status;
   if (started(guess.status)) {
@@ -263,7 +267,7 @@ void Vio::try_start(VioResult& result) {
   if (span_s < kStartTimeout_s) return;
   result.problem = VioProblem::kStartTimeout;
   while (seconds_between(held_.front().data.tracked.stamp, held_.back().data.tracked.stamp) >
-         0.5 * config_.start_s) {
+         0.5 * model_.config.start_s) {
     held_.erase(held_.begin());
     ++statistics_.images_without_pose;
   }
@@ -374,15 +378,14 @@ bool Vio::plausible(const SmootherUpdate& update) const {
   if (!update.solution.usable || !s.T_odom_body.matrix().allFinite() || !s.v_odom.allFinite())
     return false;
   const double allowed = kMaxCostPerLandmark * (50.0 + update.landmarks);
-  return update.solution.final_cost < allowed && s.v_odom.norm() < config_.max_speed_mps &&
+  return update.solution.final_cost < allowed && s.v_odom.norm() < model_.config.max_speed_mps &&
          s.gyro_bias.norm() < model_.max_gyro_bias_radps &&
          s.accel_bias.norm() < kMaxAccelBias_mps2;
 }
 
 void Vio::restart(Held held) {
   statistics_.images_without_pose += static_cast<int>(held_.size());
-  if (smoother_) learned_ = smoother_->learned();
-  smoother_.reset();
+  end_window();
   unlocated_images_ = 0;
   estimate_watch_ = {};
   held_.clear();
@@ -415,8 +418,9 @@ bool Vio::due(const OdometryState& state, const StereoFrame& frame) const {
   if (!locates_points(frame)) return false;
   const double dt = moved_s(state.stamp);
   const WindowFrame* previous = smoother_->frame_at(last_keyframe_->stamp);
-  if (previous == nullptr) return dt >= config_.output_interval_s - 1e-3;
-  return is_keyframe_due(config_, dt, previous->state.T_odom_body.inverse() * state.T_odom_body);
+  if (previous == nullptr) return dt >= model_.config.output_interval_s - 1e-3;
+  return is_keyframe_due(model_.config, dt,
+                         previous->state.T_odom_body.inverse() * state.T_odom_body);
 }
 
 // Not negative, even if the clock was set back since an earlier process.
@@ -430,14 +434,14 @@ double Vio::moved_s(Stamp stamp) const {
 }
 
 std::optional<UncertainCalibration> Vio::known_calibration() const {
-  if (!config_.calibrate) return std::nullopt;
+  if (!model_.config.calibrate) return std::nullopt;
   const UncertainCalibration known = smoother_->calibration();
   return known.covariance.allFinite() ? std::optional(known) : std::nullopt;
 }
 
 std::optional<Vertical> Vio::vertical_at(const OdometryState& state) const {
-  const double sigma_rad = config_.tilt_sigma * std::sqrt(kTiltKeyframes);
-  if (config_.tilt_sigma < kLeastTiltSigma || sigma_rad > kMostTiltSigma) return std::nullopt;
+  const double sigma_rad = model_.config.tilt_sigma * std::sqrt(kTiltKeyframes);
+  if (model_.config.tilt_sigma < kLeastTiltSigma || sigma_rad > kMostTiltSigma) return std::nullopt;
   return Vertical{state.T_odom_body.linear().transpose() * Eigen::Vector3d::UnitZ(), sigma_rad};
 }
 
@@ -486,7 +490,7 @@ void Vio::add_keyframe(const OdometryState& state, VioResult& result) {
       relative ? relative->T
                : last_keyframe_->T_odom_kf.inverse() * T_chain_odom_ * state.T_odom_body;
   keyframe.covariance =
-      relative ? keyframe_covariance(config_, moved_s(state.stamp), factor * relative->Sigma)
+      relative ? keyframe_covariance(model_.config, moved_s(state.stamp), factor * relative->Sigma)
                : restart_covariance();
   if (!model_.is_measured)
     keyframe.covariance += calibration_covariance(keyframe.T_previous_kf, rig_.stereo.depth_source);

@@ -105,6 +105,7 @@ class Vio {
   void start_on(const Held& held, const OdometryState& state, const StateCovariance& covariance);
   void try_start(VioResult& result);
   void advance(const Held& held, VioResult& result);
+  void end_window();
   void restart(Held held);
   [[nodiscard]] bool has_recovered(const StereoFrame& frame) const;
   void discard_prior(const Held& held, const OdometryState& state);
@@ -131,7 +132,6 @@ class Vio {
   RobotId robot_;
   SensorRig rig_;
   MotionModel model_;
-  VioConfig config_;  // Copied from the model.
   double readout_s_;  // as stated, without the estimated correction
   FeatureTracker tracker_;
   LearnedSensors learned_;                    // for the next window
