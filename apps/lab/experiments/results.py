@@ -17,10 +17,12 @@ import subprocess
 import sys
 import time
 
+sys.dont_write_bytecode = True
+import tables
+
 HERE = os.path.dirname(os.path.abspath(__file__))
 ROOT = os.path.join(HERE, "../../..")
 RESULTS = os.path.join(HERE, "results.json")
-KEYPOINT_BYTES = 16.6  # of a keypoint with its descriptor as robots send it
 BEGIN, END = "<!-- results.py table -->\n", "<!-- end -->\n"
 
 
@@ -53,7 +55,7 @@ class Runner:
     def find(self, pattern):
         found = sorted(glob.glob(os.path.join(self.data, pattern)))
         if not found:
-            raise FileNotFoundError(f"{pattern} in {self.data}")
+            raise FileNotFoundError(f"no {pattern} in {self.data}")
         return found[0]
 
     def call(self, program, *arguments):
@@ -77,11 +79,10 @@ def errors_of(team):
 
 
 def share_of(team):
-    """Bytes of all robots, without the map, relative to those of a server [%]."""
     total = lambda *keys: sum(value_at(robot, keys) for robot in team["robots"])
-    sent = total("traffic") - total("traffic", "map")
-    keypoints = total("peer_keyframes", "keypoints") / total("peer_keyframes", "keyframes")
-    return [100.0 * sent / (total("keyframes") * keypoints * KEYPOINT_BYTES)]
+    return [tables.equal_percent(total("traffic") - total("traffic", "map"), total("keyframes"),
+                                 total("peer_keyframes", "keyframes"),
+                                 total("peer_keyframes", "keypoints"))]
 
 
 def value_at(node, keys):
@@ -152,11 +153,10 @@ def dpgo(runner):
 
 
 def paper(runner):
-    """From what `make trajectory` has left in --data."""
+    """From what `make trajectory` has left beside --output."""
     result = {}
     for world, unit in (("city", 1e-3), ("camp", 1e-3), ("v1", 1.0), ("v2", 1.0)):
-        with open(runner.find(f"team-{world}.json"), encoding="utf-8") as file:
-            errors = errors_of(json.load(file))
+        errors = errors_of(runner.read(f"../../../team-{world}.json"))
         place = world if unit < 1.0 else "rooms"
         for name, values in errors.items():
             result.setdefault(f"{place}_{name.split('_')[0]}", []).extend(unit * v for v in values)
@@ -221,7 +221,7 @@ def run(options):
                 result["load"].append(round(os.getloadavg()[0], 1))
                 result["runs"].append(function(Runner(options, part, number)))
         except FileNotFoundError as error:
-            print(f"{part}: left out, no {error}", file=sys.stderr)
+            print(f"{part}: left out: {error}", file=sys.stderr)
             continue
         results = load() | {part: result}
         with open(RESULTS, "w", encoding="utf-8") as file:

@@ -356,11 +356,9 @@ class Run:
         # Keypoints do not show the map, so it is not counted.
         self.all_sent = 1e-6 * sum(size for robot in self.robots
                                    for category, size in robot.sent.items() if category != "map")
-        # A server receives as many keypoints as the robots receive of a keyframe, packed equally.
         received, keypoints = (sum(getattr(robot, name) for robot in self.robots)
                                for name in ("peer_keyframes", "peer_keypoints"))
-        server = 1e-6 * PACKED_KEYPOINT_BYTES * self.keyframes * divided(keypoints, received)
-        self.equal_percent = 100.0 * divided(self.all_sent, server)
+        self.equal_percent = equal_percent(1e6 * self.all_sent, self.keyframes, received, keypoints)
 
     @staticmethod
     def truths_of(team_file):
@@ -425,6 +423,12 @@ def or_nan(value):
 
 def divided(a, b):
     return a / b if b else NAN
+
+
+def equal_percent(sent, keyframes, received, keypoints):
+    """The bytes `sent`, without the map, as a share of those of a server [%]. It receives each of the
+    team's keyframes with as many keypoints as the robots have of those they received, packed equally."""
+    return 100.0 * divided(sent, PACKED_KEYPOINT_BYTES * keyframes * divided(keypoints, received))
 
 
 def fixed(value, decimals):
