@@ -204,7 +204,10 @@ const std::map<std::string, void (*)(const std::string&)> kReaders = {
 }  // namespace km
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  static const auto read = km::kReaders.at(std::getenv("KM_FUZZ_READER"));
+  const char* const name = std::getenv("KM_FUZZ_READER");
+  if (name == nullptr || !km::kReaders.contains(name))
+    throw std::invalid_argument("KM_FUZZ_READER names no reader, see idl/README.md");
+  static const auto read = km::kReaders.at(name);
   read({data, data + size});
   return 0;
 }
