@@ -82,10 +82,8 @@ Options options_of(int argc, char** argv) {
       ->capture_default_str();
   app.add_flag("--reliable", options.play.reliable,
                "Send lost messages again; otherwise best effort, as drivers of sensors do");
-  app.add_option("--delay", options.play.delay_s, "Delay of every message [s]")
-      ->check(CLI::Range(0., 60.));
   app.add_option("--jitter", options.play.jitter_s,
-                 "Additional random delay, uniform from 0 to this [s]")
+                 "Random delay of each message, uniform from 0 to this [s]")
       ->check(CLI::Range(0., 60.));
   app.add_option("--drop", options.play.drop_share, "Share of messages that are lost, at random")
       ->check(CLI::Range(0., 1.));

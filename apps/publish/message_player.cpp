@@ -279,7 +279,7 @@ void MessagePlayer::schedule(BagMessage message) {
     return;
   }
   // Delay in the time of the recording, in which clock_ counts.
-  const double delay_s = options_.rate * (options_.delay_s + options_.jitter_s * uniform(random_));
+  const double delay_s = options_.rate * options_.jitter_s * uniform(random_);
   due_.push({message.log_time + nanoseconds(delay_s), number_++, topic, std::move(*bytes)});
 }
 

@@ -38,8 +38,7 @@ inline constexpr const char* kMotionCaptureType = "geometry_msgs/msg/PoseStamped
 /// Parameters of the playback, with errors of the transmission.
 struct PlayOptions {
   double rate = 1.0;        ///< Times real time.
-  double delay_s = 0.0;     ///< Delay of every message.
-  double jitter_s = 0.0;    ///< Additional delay, uniform from 0 to this.
+  double jitter_s = 0.0;    ///< Delay of each message, uniform from 0 to this.
   double drop_share = 0.0;  ///< Share of the messages that are dropped.
   bool reliable = false;    ///< False: best effort, as drivers of sensors are.
   unsigned seed = 0;
